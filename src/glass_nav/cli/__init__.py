@@ -1,0 +1,1 @@
+"""The command glass_nav: a file per subcommand."""

@@ -1,0 +1,1 @@
+"""How good was it?  Trajectories to errors, tables and pictures."""

@@ -1,0 +1,1 @@
+"""Angles, rigid motions in the plane and paths of poses: numpy only."""

@@ -1,0 +1,27 @@
+"""Angles on the circle, in radians."""
+
+from __future__ import annotations
+
+from typing import Optional
+
+import numpy as np
+
+
+def wrap(angle_rad: np.ndarray) -> np.ndarray:
+    """The same angle in [-pi, pi); any shape, NaN stays NaN."""
+    return np.mod(np.asarray(angle_rad) + np.pi, 2.0 * np.pi) - np.pi
+
+
+def mean(angle_rad: np.ndarray, weights: Optional[np.ndarray] = None) -> float:
+    """Direction of the weighted sum of unit vectors: the mean of +179 and -179 degrees is 180.
+
+    Args:
+        angle_rad: (N,) angles.
+        weights: (N,) non-negative, not all zero; equal when not given.
+
+    Returns:
+        Mean angle in [-pi, pi].
+    """
+    angle_rad = np.asarray(angle_rad)
+    return float(np.arctan2(np.average(np.sin(angle_rad), weights=weights),
+                            np.average(np.cos(angle_rad), weights=weights)))

@@ -1,0 +1,1 @@
+"""Where in the map?  SCAN -> CASES -> WEIGHTS -> POSE."""

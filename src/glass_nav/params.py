@@ -1,0 +1,90 @@
+"""A mapping of names to values -> a validated dataclass.
+
+One flat set of names, as ROS keeps parameters; the dataclass may nest other dataclasses, one struct
+per model. Nothing is converted or repaired: a wrong value is refused in one line that says who, what,
+what was given and what is allowed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import typing
+from typing import Any, Dict, Iterator, List, Mapping, Tuple, Type, TypeVar
+
+T = TypeVar("T")
+
+
+class ParamError(ValueError):
+    """A parameter that cannot be used; the text says which and why."""
+
+
+def names(cls: type) -> List[str]:
+    """All parameter names that a dataclass takes, nested ones included."""
+    return [name for name, _, _ in _leaves(cls)]
+
+
+def load(cls: Type[T], mapping: Mapping[str, Any], owner: str) -> T:
+    """An instance of the dataclass cls with the values of the mapping, defaults for the rest.
+
+    Args:
+        cls: dataclass; fields are bool, int, float, str, or dataclasses of these.
+        mapping: flat names -> values; an int is taken for a float, nothing else is converted.
+        owner: who is asking, the first word of an error ("/localization", "params.yaml").
+
+    Raises:
+        ParamError: unknown name, wrong type, or a value that the dataclass refuses.
+    """
+    known = {name: kind for name, kind, _ in _leaves(cls)}
+    for name in mapping:
+        if name not in known:
+            near = difflib.get_close_matches(str(name), list(known), n=1)
+            hint = f"; did you mean ~{near[0]}?" if near else ""
+            raise ParamError(f"{owner}: unknown parameter ~{name}{hint}")
+    checked: Dict[str, Any] = {name: _typed(owner, name, known[name], value)
+                               for name, value in mapping.items()}
+    return _build(cls, checked, owner)
+
+
+def as_mapping(instance: Any) -> Dict[str, Any]:
+    """The flat mapping that load() would turn into an equal instance."""
+    flat: Dict[str, Any] = {}
+    for field in dataclasses.fields(instance):
+        value = getattr(instance, field.name)
+        flat.update(as_mapping(value) if dataclasses.is_dataclass(value) else {field.name: value})
+    return flat
+
+
+def _leaves(cls: type) -> Iterator[Tuple[str, type, type]]:
+    kinds = typing.get_type_hints(cls)
+    for field in dataclasses.fields(cls):
+        kind = kinds[field.name]
+        if dataclasses.is_dataclass(kind):
+            yield from _leaves(kind)
+        else:
+            yield field.name, kind, cls
+
+
+def _typed(owner: str, name: str, kind: type, value: Any) -> Any:
+    if kind is float and type(value) is int:
+        return float(value)
+    if type(value) is not kind:  # bool is an int to isinstance, and "0" would be True to bool()
+        raise ParamError(f"{owner}: ~{name} must be {kind.__name__}, got {value!r}")
+    return value
+
+
+def _build(cls: Type[T], checked: Mapping[str, Any], owner: str) -> T:
+    kinds = typing.get_type_hints(cls)
+    arguments: Dict[str, Any] = {}
+    for field in dataclasses.fields(cls):  # type: ignore[arg-type]
+        kind = kinds[field.name]
+        if dataclasses.is_dataclass(kind):
+            arguments[field.name] = _build(kind, checked, owner)  # type: ignore[type-var]
+        elif field.name in checked:
+            arguments[field.name] = checked[field.name]
+    try:
+        return cls(**arguments)
+    except ParamError:
+        raise
+    except ValueError as err:
+        raise ParamError(f"{owner}: {err}") from err

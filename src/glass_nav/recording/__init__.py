@@ -1,0 +1,1 @@
+"""Recorded robots: bags and rawlogs to our own types. No roscore, no rospy."""

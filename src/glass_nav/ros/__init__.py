@@ -1,0 +1,1 @@
+"""The only room that knows rospy, tf2 and messages: nodes are wiring."""

@@ -1,0 +1,1 @@
+"""What the robot senses, and what the map lets it expect: scans and ray casts."""

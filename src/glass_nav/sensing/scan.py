@@ -1,0 +1,84 @@
+"""One turn of a 2D lidar, checked once and for all.
+
+B beams. Ranges follow REP 117: -inf too near, +inf nothing met, NaN no measurement.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+class ScanError(ValueError):
+    """A scan that cannot be used; the text says why."""
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Ranges along the beams of one lidar, and where that lidar sits on the robot."""
+    stamp_ns: int                # time of the data [ns]
+    ranges_m: np.ndarray         # (B,) along each beam; REP 117 for what is no range
+    angles_rad: np.ndarray       # (B,) direction of each beam in the laser's frame
+    range_min_m: float
+    range_max_m: float
+    base_from_laser: np.ndarray  # (3,) planar pose of the laser on the robot
+
+    def __len__(self) -> int:
+        return len(self.ranges_m)
+
+    @property
+    def answered(self) -> np.ndarray:
+        """(B,) bool: the beam came back with a range."""
+        return np.isfinite(self.ranges_m)
+
+    def points_in_base(self) -> np.ndarray:
+        """(B, 2) end points [m] in the robot's frame; not finite where the beam did not answer."""
+        x, y, yaw = self.base_from_laser
+        bearing = self.angles_rad + yaw
+        return np.stack([x + self.ranges_m * np.cos(bearing),
+                         y + self.ranges_m * np.sin(bearing)], axis=-1)
+
+
+def scan_from_fields(stamp_ns: int, ranges_m: np.ndarray, angle_min_rad: float,
+                     angle_increment_rad: float, range_min_m: float, range_max_m: float,
+                     base_from_laser: np.ndarray, upside_down: bool = False) -> Scan:
+    """The fields of a LaserScan as a Scan, by REP 117.
+
+    A range at or beyond range_max is +inf (nothing met), one below range_min -inf (too near),
+    NaN stays NaN; many old drivers write 0 or range_max + 1 for "no answer", and both land where
+    REP 117 wants them (0 is a failed measurement, so NaN).
+
+    Args:
+        stamp_ns: time of the scan [ns].
+        ranges_m: (B,) as the driver wrote them.
+        angle_min_rad, angle_increment_rad: first beam and step in the laser's frame.
+        range_min_m, range_max_m: the sensor's limits.
+        base_from_laser: (3,) planar pose of the laser on the robot.
+        upside_down: the laser's z points down; its angles run clockwise seen from above.
+
+    Raises:
+        ScanError: no beams, or fields that describe no lidar.
+    """
+    ranges_m = np.array(ranges_m, dtype=float).reshape(-1)
+    when = f"scan at {stamp_ns * 1e-9:.3f} s"
+    if not len(ranges_m):
+        raise ScanError(f"{when}: no ranges, a scan needs at least 1")
+    if not (np.isfinite(angle_increment_rad) and angle_increment_rad != 0.0) and len(ranges_m) > 1:
+        raise ScanError(f"{when}: angle_increment must be finite and not 0 rad, got {angle_increment_rad}")
+    if not np.isfinite(angle_min_rad):
+        raise ScanError(f"{when}: angle_min must be finite, got {angle_min_rad}")
+    if not (np.isfinite(range_max_m) and range_max_m > 0.0):
+        raise ScanError(f"{when}: range_max must be finite and > 0 m, got {range_max_m}")
+    if not (np.isfinite(range_min_m) and 0.0 <= range_min_m < range_max_m):
+        raise ScanError(f"{when}: range_min must be in [0, range_max = {range_max_m}) m, got {range_min_m}")
+    if np.shape(base_from_laser) != (3,) or not np.all(np.isfinite(base_from_laser)):
+        raise ScanError(f"{when}: the laser's pose on the robot must be finite x, y, yaw, got {base_from_laser}")
+    angles_rad = angle_min_rad + angle_increment_rad * np.arange(len(ranges_m))
+    with np.errstate(invalid="ignore"):
+        ranges_m[ranges_m >= range_max_m] = np.inf
+        failed = ranges_m == 0.0
+        ranges_m[ranges_m < range_min_m] = -np.inf
+        ranges_m[failed] = np.nan
+    return Scan(int(stamp_ns), ranges_m, -angles_rad if upside_down else angles_rad,
+                float(range_min_m), float(range_max_m), np.asarray(base_from_laser, float))
