@@ -1,0 +1,139 @@
+"""From callback threads to the run loop: what came in, what is asked for, and scans waiting for tf.
+
+Callbacks only store; the run loop takes. No ROS in here: messages are opaque, stamps are integer ns.
+"""
+
+from __future__ import annotations
+
+import collections
+import threading
+from dataclasses import dataclass
+from typing import Any, Callable, Deque, Dict, Generic, List, Optional, Tuple, TypeVar
+
+T = TypeVar("T")
+
+
+class Mailbox:
+    """Bounded lanes of items: put() from any thread, take() from the run loop.
+
+    A lane that is full loses its oldest item, so a flood of scans cannot push out a command.
+    """
+
+    def __init__(self, **capacities: int) -> None:
+        """Lanes by name, and how many items each may hold."""
+        self._lanes: Dict[str, Deque[Any]] = {lane: collections.deque(maxlen=capacity)
+                                              for lane, capacity in capacities.items()}
+        self._changed = threading.Condition()
+
+    def put(self, lane: str, item: Any) -> None:
+        with self._changed:
+            self._lanes[lane].append(item)
+            self._changed.notify()
+
+    def take(self, timeout_s: float) -> Dict[str, List[Any]]:
+        """Lane -> what came since the last call, oldest first; waits for a first item up to the timeout."""
+        with self._changed:
+            if not any(self._lanes.values()):
+                self._changed.wait(timeout_s)
+            taken = {lane: list(items) for lane, items in self._lanes.items()}
+            for items in self._lanes.values():
+                items.clear()
+            return taken
+
+
+class Errand:
+    """Something the run loop shall do for another thread, which waits for the outcome."""
+
+    def __init__(self, work: Callable[[], Any]) -> None:
+        self._work = work
+        self._done = threading.Event()
+        self._error: Optional[Exception] = None
+        self._abandoned = False
+
+    def run(self) -> None:
+        """Do it (run loop); a ValueError goes to the thread that waits, nothing else is caught."""
+        if self._abandoned:  # nobody waits any more and was told so: doing it now would surprise
+            return
+        try:
+            self._work()
+        except ValueError as err:
+            self._error = err
+        finally:
+            self._done.set()
+
+    def wait(self, timeout_s: float) -> None:
+        """Block until done. Raises what the work raised, or TimeoutError."""
+        if not self._done.wait(timeout_s):
+            self._abandoned = True
+            raise TimeoutError(f"the node did not come to it within {timeout_s:g} s")
+        if self._error is not None:
+            raise self._error
+
+
+@dataclass
+class ScanCounts:
+    """Where the scans went since the start; received is the sum of the others.
+
+    WaitingScans counts the last three, its user the first three.
+    """
+    received: int = 0
+    used: int = 0
+    refused: int = 0               # nonsense fields, or a stamp that is not after the last one used
+    superseded: int = 0            # a newer one was ready too: the lidar is faster than the node or tf
+    dropped_no_transform: int = 0  # no transform at its stamp within the limit
+    waiting: int = 0               # for their transform, now
+
+
+class WaitingScans(Generic[T]):
+    """Scans that wait for the transform at their stamp; the newest that has one wins.
+
+    tf2_ros for Python has no MessageFilter. A scan that arrives before its transform waits here. A scan
+    that is older than one already handed out is never handed out, so stamps only ascend.
+    """
+
+    def __init__(self, capacity: int, limit_s: float) -> None:
+        """
+        Args:
+            capacity: scans that may wait; the oldest goes first.
+            limit_s: how long one may wait, by the clock that add() and take_ready() are given.
+        """
+        self._waiting: List[Tuple[float, int, T]] = []  # arrival [s], stamp [ns], scan
+        self._capacity, self._limit_s = capacity, limit_s
+        self._newest_ns: Optional[int] = None
+        self.counts = ScanCounts()
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def add(self, scan: T, stamp_ns: int, now_s: float) -> bool:
+        """Let a scan wait; False if its stamp is not after that of the last one handed out."""
+        if self._newest_ns is not None and stamp_ns <= self._newest_ns:
+            return False
+        self._waiting.append((now_s, stamp_ns, scan))
+        if len(self._waiting) > self._capacity:
+            del self._waiting[0]
+            self.counts.dropped_no_transform += 1
+        self.counts.waiting = len(self._waiting)
+        return True
+
+    def take_ready(self, is_ready: Callable[[T], bool], now_s: float) -> "Tuple[Optional[T], List[T]]":
+        """The scan with the newest stamp that is ready, and those that waited longer than the limit."""
+        ready: Optional[T] = None
+        for _, stamp_ns, scan in sorted(self._waiting, key=lambda waiting: -waiting[1]):
+            if is_ready(scan):
+                ready, self._newest_ns = scan, stamp_ns
+                newer = [waiting for waiting in self._waiting if waiting[1] > stamp_ns]
+                self.counts.superseded += len(self._waiting) - len(newer) - 1
+                self._waiting = newer
+                break
+        given_up = [scan for arrival_s, _, scan in self._waiting if now_s - arrival_s > self._limit_s]
+        self._waiting = [waiting for waiting in self._waiting if now_s - waiting[0] <= self._limit_s]
+        self.counts.dropped_no_transform += len(given_up)
+        self.counts.waiting = len(self._waiting)
+        return ready, given_up
+
+    def restart(self) -> None:
+        """Forget what waits and which stamps were used: time has jumped."""
+        self.counts.dropped_no_transform += len(self._waiting)
+        self.counts.waiting = 0
+        self._waiting, self._newest_ns = [], None

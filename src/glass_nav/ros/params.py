@@ -1,0 +1,117 @@
+"""The private parameters of the localization node: the parameter server -> validated dataclasses.
+
+Names and defaults are AMCL's where AMCL has the parameter. Parameters of AMCL that mean nothing to
+this filter are taken off first, so that launch files written for amcl load; whatever else is unknown
+is refused with the nearest known name.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass, field
+from typing import Any, Dict, List, Mapping, Tuple
+
+import numpy as np
+
+from glass_nav import params
+from glass_nav.localization.glass_mcl import GlassMclParams
+from glass_nav.params import ParamError
+
+__all__ = ["AMCL_PARAMETERS", "LocalizationNodeParams", "LocalizationParams", "ParamError",
+           "localization_params"]
+
+# Every parameter that AMCL 1.17 reads. Those that no dataclass here has are accepted and not used.
+AMCL_PARAMETERS = frozenset("""
+    base_frame_id bag_scan_period beam_skip_distance beam_skip_error_threshold beam_skip_threshold do_beamskip
+    first_map_only force_update_after_initialpose force_update_after_set_map global_frame_id
+    gui_publish_rate initial_cov_aa initial_cov_xx initial_cov_yy initial_pose_a initial_pose_x
+    initial_pose_y kld_err kld_z laser_lambda_short laser_likelihood_max_dist laser_max_beams
+    laser_max_range laser_min_range laser_model_type laser_sigma_hit laser_z_hit laser_z_max
+    laser_z_rand laser_z_short max_particles min_particles odom_alpha1 odom_alpha2 odom_alpha3
+    odom_alpha4 odom_alpha5 odom_frame_id odom_model_type recovery_alpha_fast recovery_alpha_slow
+    resample_interval restore_defaults save_pose_rate selective_resampling std_warn_level_x
+    std_warn_level_y std_warn_level_yaw tf_broadcast transform_tolerance update_min_a update_min_d
+    use_map_topic""".split())
+
+
+@dataclass(frozen=True)
+class LocalizationNodeParams:
+    """What the node itself needs: frames, map, start, rates. Units by REP 103."""
+    odom_frame_id: str = "odom"
+    base_frame_id: str = "base_link"
+    global_frame_id: str = "map"
+    tf_broadcast: bool = True
+    transform_tolerance: float = 0.1       # [s] how far ahead of the scan map -> odom is stamped
+    transform_wait_s: float = 1.0          # [s] how long a scan waits for odom <- base <- laser
+    use_map_topic: bool = False
+    first_map_only: bool = False
+    initial_pose_x: float = 0.0            # [m]
+    initial_pose_y: float = 0.0            # [m]
+    initial_pose_a: float = 0.0            # [rad]
+    initial_cov_xx: float = 0.25           # [m^2]
+    initial_cov_yy: float = 0.25           # [m^2]
+    initial_cov_aa: float = (math.pi / 12.0) ** 2  # [rad^2]
+    force_update_after_initialpose: bool = False
+    force_update_after_set_map: bool = False
+    gui_publish_rate: float = -1.0         # [Hz] of particlecloud and ~beam_cloud; <= 0: no limit
+    save_pose_rate: float = 0.5            # [Hz]; <= 0: only when the node ends
+    std_warn_level_x: float = 0.2          # [m]
+    std_warn_level_y: float = 0.2          # [m]
+    std_warn_level_yaw: float = 0.1        # [rad]
+    random_seed: int = 0                   # < 0: another one at every start
+
+    def __post_init__(self) -> None:
+        for name in ("odom_frame_id", "base_frame_id", "global_frame_id"):
+            frame = getattr(self, name)
+            object.__setattr__(self, name, frame.lstrip("/"))  # tf2 has no "/" in front; tf1 files do
+            if not frame.strip("/ "):
+                raise ValueError(f"~{name} must name a frame, got {frame!r}")
+        frames = self.odom_frame_id, self.base_frame_id, self.global_frame_id
+        if len(set(frames)) < 3:
+            raise ValueError("~odom_frame_id, ~base_frame_id and ~global_frame_id must differ, "
+                             f"got {frames[0]!r}, {frames[1]!r}, {frames[2]!r}")
+        for name, kind in [(f.name, f.type) for f in dataclasses.fields(self)]:
+            if kind in (float, "float") and not math.isfinite(getattr(self, name)):
+                raise ValueError(f"~{name} must be finite, got {getattr(self, name)}")
+        for name in ("transform_tolerance", "transform_wait_s", "initial_cov_xx", "initial_cov_yy",
+                     "initial_cov_aa", "std_warn_level_x", "std_warn_level_y", "std_warn_level_yaw"):
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"~{name} must be >= 0, got {getattr(self, name)}")
+
+    @property
+    def initial_pose(self) -> np.ndarray:
+        """map_from_base (3,) to start at."""
+        return np.array([self.initial_pose_x, self.initial_pose_y, self.initial_pose_a])
+
+    @property
+    def initial_covariance(self) -> np.ndarray:
+        """(3, 3) of x, y, yaw at the start."""
+        return np.diag([self.initial_cov_xx, self.initial_cov_yy, self.initial_cov_aa])
+
+    @property
+    def rng(self) -> np.random.Generator:
+        """A generator that repeats itself from start to start, unless ~random_seed is negative."""
+        return np.random.default_rng(None if self.random_seed < 0 else self.random_seed)
+
+
+@dataclass(frozen=True)
+class LocalizationParams:
+    """Everything the node reads: its own parameters and the filter's, one flat set of names."""
+    node: LocalizationNodeParams = field(default_factory=LocalizationNodeParams)
+    mcl: GlassMclParams = field(default_factory=GlassMclParams)
+
+
+def localization_params(mapping: Mapping[str, Any], owner: str) -> Tuple[LocalizationParams, List[str]]:
+    """The parameters of the node, and the names in the mapping that are AMCL's and not used here.
+
+    Args:
+        mapping: names -> values as the parameter server has them under the node's name.
+        owner: the node's name, the first word of an error.
+
+    Raises:
+        ParamError: a name nobody knows, a wrong type, a value out of its range.
+    """
+    unused = sorted(AMCL_PARAMETERS.intersection(mapping).difference(params.names(LocalizationParams)))
+    ours: Dict[str, Any] = {name: value for name, value in mapping.items() if name not in unused}
+    return params.load(LocalizationParams, ours, owner), unused
