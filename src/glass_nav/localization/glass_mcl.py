@@ -1,4 +1,9 @@
-"""SCAN -> CASES -> WEIGHTS -> POSE  (skeleton: the interface is final, the filter is being written)."""
+"""SCAN -> CASES -> WEIGHTS -> POSE: Monte Carlo localization that knows glass.
+
+The filter of Thrun, Burgard, Fox, Probabilistic Robotics (2005), ch. 8, with the sensor model of the
+seed document glass_localization.txt: decide beam by beam what the beam met, then weigh the particles by
+the beams that are understood. GlassMcl.update() reads as the document does.
+"""
 
 from __future__ import annotations
 
@@ -7,24 +12,52 @@ from typing import Optional
 
 import numpy as np
 
-from glass_nav.geometry import se2
-from glass_nav.sensing.scan import Scan
+from glass_nav.geometry import angles, se2
+from glass_nav.localization import (beam_cases, beam_weights, motion, pose_estimate, pose_quality,
+                                    preliminary_samples, proposal, reference_ranges, resampling,
+                                    scan_alignment)
+from glass_nav.localization.beam_cases import BeamCases, CaseVote
+from glass_nav.localization.beam_weights import BeamMixture
+from glass_nav.localization.motion import OdometryNoise
+from glass_nav.localization.preliminary_samples import PreliminarySamples
+from glass_nav.localization.pose_quality import QualityLimits
+from glass_nav.localization.proposal import Proposal
+from glass_nav.localization.resampling import ParticleCount
+from glass_nav.localization.scan_anchor import ScanAnchor
+from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.raycast import RayCaster
+from glass_nav.sensing.scan import Scan, ScanError
 from glass_nav.world.grid_map import GridMap
 
 
 @dataclass(frozen=True)
-class BeamCases:
-    """What each beam of a scan met (B beams)."""
-    case: np.ndarray        # (B,) uint8: 1 diffuse, 2 specular, 3 first penetration, 4 second, 0 uncertain
-    expected_m: np.ndarray  # (B,) reference range of that case at the estimated pose, NaN for case 0
-    residual_m: np.ndarray  # (B,) measured minus expected, NaN for case 0
-    weight: np.ndarray      # (B,) share of the vote that the case won, 0..1
+class Schedule:
+    """When a scan moves the particles; the names and meanings are AMCL's."""
+    update_min_d: float = 0.1       # way since the last update [m]
+    update_min_a: float = 0.1       # turn since the last update [rad]
+    resample_interval: int = 1      # updates between resamplings
+    raycast_threads: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("update_min_d", "update_min_a"):
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"~{name} must be >= 0, got {getattr(self, name)}")
+        for name in ("resample_interval", "raycast_threads"):
+            if not getattr(self, name) >= 1:
+                raise ValueError(f"~{name} must be >= 1, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True)
 class GlassMclParams:
-    min_particles: int = 100
-    max_particles: int = 5000
+    """All parameters of the filter, a struct per model."""
+    schedule: Schedule = field(default_factory=Schedule)
+    count: ParticleCount = field(default_factory=ParticleCount)
+    odometry: OdometryNoise = field(default_factory=OdometryNoise)
+    proposal: Proposal = field(default_factory=Proposal)
+    samples: PreliminarySamples = field(default_factory=PreliminarySamples)
+    vote: CaseVote = field(default_factory=CaseVote)
+    mixture: BeamMixture = field(default_factory=BeamMixture)
+    quality: QualityLimits = field(default_factory=QualityLimits)
 
 
 @dataclass(frozen=True)
@@ -46,30 +79,192 @@ class GlassMcl:
     """Monte Carlo localization that decides beam by beam what the beam met."""
 
     def __init__(self, params: GlassMclParams, grid_map: GridMap, rng: np.random.Generator) -> None:
-        self._params, self._grid_map, self._rng = params, grid_map, rng
-        self._map_from_odom = np.zeros(3)
-        self._start: Optional[np.ndarray] = np.zeros(3)
+        """Starts with nothing known: call set_pose() or scatter() before update().
 
-    def set_pose(self, map_from_base: np.ndarray, covariance: np.ndarray) -> None:
-        """Start over around a pose (3,) with covariance (3, 3). ValueError if either is unusable."""
-        self._start = np.asarray(map_from_base, float)
-
-    def scatter(self) -> None:
-        """Start over anywhere in the free cells of the map (service global_localization)."""
+        Args:
+            params: of every model.
+            grid_map: where the robot is.
+            rng: source of all randomness; the same seed and input give the same output.
+        """
+        self._params = params
+        self._rng = rng
+        self.set_map(grid_map)
+        self._particles = np.zeros((0, 3))
+        self._weights = np.zeros(0)
+        self._odom_from_base: Optional[np.ndarray] = None  # at the last update of the particles
+        self._best: Optional[pose_estimate.PoseEstimate] = None
+        self._stamp_ns: Optional[int] = None
+        self._quality = pose_quality.PoseQuality(params.quality)
+        self._update_due = True
+        self._updates = 0
 
     def set_map(self, grid_map: GridMap) -> None:
         """Another map; the particles stay where they are."""
+        self._grid_map = grid_map
+        self._caster = RayCaster(grid_map, threads=self._params.schedule.raycast_threads)
+        self._field = DistanceField(grid_map)
+        self._anchor = ScanAnchor(self._field, self._params.samples)
+        self._update_due = True
+
+    def set_pose(self, map_from_base: np.ndarray, covariance: np.ndarray) -> None:
+        """Start over around a pose.
+
+        Args:
+            map_from_base: (3,) x [m], y [m], yaw [rad].
+            covariance: (3, 3) symmetric, not negative; 0 is allowed.
+
+        Raises:
+            ValueError: not finite, not symmetric, or negative; nothing is changed then.
+        """
+        pose, covariance = np.array(map_from_base, float), np.array(covariance, float)
+        if pose.shape != (3,) or not np.all(np.isfinite(pose)):
+            raise ValueError(f"a pose needs finite x, y, yaw, got {map_from_base}")
+        if covariance.shape != (3, 3) or not np.all(np.isfinite(covariance)):
+            raise ValueError(f"a pose needs a finite covariance (3, 3), got {covariance.tolist()}")
+        scale = max(float(np.abs(covariance).max()), 1e-12)
+        if np.abs(covariance - covariance.T).max() > 1e-6 * scale:
+            raise ValueError(f"the covariance of a pose must be symmetric, got {covariance.tolist()}")
+        variance, axes = np.linalg.eigh(covariance)
+        if variance.min() < -1e-6 * scale:
+            raise ValueError(f"the covariance of a pose must not be negative, got {covariance.tolist()}")
+        count = self._params.count.max_particles
+        spread = axes * np.sqrt(np.maximum(variance, 0.0))
+        particles = pose + self._rng.standard_normal((count, 3)) @ spread.T
+        particles[:, 2] = angles.wrap(particles[:, 2])
+        self._start_with(particles, searching=False)
+
+    def scatter(self) -> None:
+        """Start over anywhere in the free cells of the map (service global_localization).
+
+        Raises:
+            ValueError: the map has no free cell; nothing is changed then.
+        """
+        rows, columns = np.nonzero(self._grid_map.free)
+        if not len(rows):
+            raise ValueError("the map has no free cell to put particles on")
+        count = self._params.count.max_particles
+        chosen = self._rng.integers(len(rows), size=count)
+        inside = self._rng.uniform(-0.5, 0.5, (2, count))
+        points = self._grid_map.centres(rows[chosen] + inside[0], columns[chosen] + inside[1])
+        yaw = self._rng.uniform(-np.pi, np.pi, count)
+        self._start_with(np.column_stack([points, yaw]), searching=True)
 
     def request_update(self) -> None:
         """The next scan is used even if the robot did not move (service request_nomotion_update)."""
+        self._update_due = True
 
     def update(self, scan: Scan, odom_from_base: np.ndarray) -> Estimate:
-        """One scan and the odometry (3,) at its stamp -> pose. ScanError on a stamp that runs backwards."""
-        if self._start is not None:
-            self._map_from_odom = se2.compose(self._start, se2.inverse(odom_from_base))
-            self._start = None
-        nothing = np.full(len(scan), np.nan)
-        return Estimate(scan.stamp_ns, se2.compose(self._map_from_odom, odom_from_base), np.eye(3) * 0.01,
-                        self._map_from_odom, BeamCases(np.zeros(len(scan), np.uint8), nothing, nothing,
-                                                       np.zeros(len(scan))),
-                        np.zeros((1, 3)), "UNKNOWN", "skeleton", 0.0, True)
+        """One scan and the odometry at its stamp -> pose.
+
+        Args:
+            scan: a lidar's turn.
+            odom_from_base: (3,) odometry's pose at the scan's stamp.
+
+        Raises:
+            ScanError: the stamp runs backwards, or odometry is not finite; nothing is changed then.
+            RuntimeError: neither set_pose() nor scatter() was called.
+        """
+        odom_from_base = self._checked(scan, odom_from_base)
+        if not self._is_due(odom_from_base):
+            return self._estimate(scan, odom_from_base, updated=False)
+        predicted = self._predict(odom_from_base)
+        beams = self._beams(scan)
+        if len(beams):
+            self._correct(scan, beams, predicted)
+        else:
+            self._particles = predicted
+        self._best = pose_estimate.of(self._particles, self._weights)
+        self._resample()
+        self._odom_from_base = odom_from_base
+        self._update_due = False
+        return self._estimate(scan, odom_from_base, updated=True)
+
+    def _correct(self, scan: Scan, beams: np.ndarray, predicted: np.ndarray) -> None:
+        """The scan moves and weighs the particles."""
+        best = pose_estimate.of(predicted, self._weights)
+        points = scan.points_in_base()[beams]
+        if best.share < self._params.proposal.proposal_min_cluster_share:
+            self._particles = predicted
+            fit = scan_alignment.fit(self._field, points, predicted)
+            self._weights = resampling.normalised(np.log(self._weights) + 20.0 * fit)
+            return
+        aligned = self._anchor.find(best.map_from_base, best.covariance, points)
+        particles, log_ratio = proposal.draw(predicted, self._weights, aligned, len(beams),
+                                             self._params.proposal, self._rng)
+        cases = self._classify(scan, aligned.poses[0], np.zeros((3, 3)))
+        self._particles = particles
+        self._weights = resampling.normalised(log_ratio + self._log_weights(scan, particles, cases))
+
+    def _checked(self, scan: Scan, odom_from_base: np.ndarray) -> np.ndarray:
+        odom_from_base = np.array(odom_from_base, float)
+        if not len(self._particles):
+            raise RuntimeError("update() needs set_pose() or scatter() first")
+        if odom_from_base.shape != (3,) or not np.all(np.isfinite(odom_from_base)):
+            raise ScanError(f"scan at {scan.stamp_ns * 1e-9:.3f} s: odometry must be finite x, y, yaw, "
+                            f"got {odom_from_base}")
+        if self._stamp_ns is not None and scan.stamp_ns < self._stamp_ns:
+            raise ScanError(f"scan at {scan.stamp_ns * 1e-9:.3f} s: time runs backwards, the last scan was "
+                            f"at {self._stamp_ns * 1e-9:.3f} s")
+        self._stamp_ns = scan.stamp_ns
+        return odom_from_base
+
+    def _is_due(self, odom_from_base: np.ndarray) -> bool:
+        if self._update_due or self._odom_from_base is None:
+            return True
+        way, turn = motion.travelled(se2.compose(se2.inverse(self._odom_from_base), odom_from_base))
+        return way >= self._params.schedule.update_min_d or turn >= self._params.schedule.update_min_a
+
+    def _predict(self, odom_from_base: np.ndarray) -> np.ndarray:
+        if self._odom_from_base is None:  # the first scan: nothing to move from
+            return self._particles
+        step = se2.compose(se2.inverse(self._odom_from_base), odom_from_base)
+        return motion.sample(self._particles, step, self._params.odometry, self._rng)
+
+    def _beams(self, scan: Scan) -> np.ndarray:
+        """Indices of the answering beams that are aligned, spread evenly."""
+        return beam_weights.choose(scan.answered, self._params.proposal.proposal_max_beams)
+
+    def _classify(self, scan: Scan, map_from_base: np.ndarray, covariance: np.ndarray) -> BeamCases:
+        samples = preliminary_samples.around(map_from_base, covariance, self._params.samples)
+        vote = self._params.vote
+        references = reference_ranges.of(self._caster, samples, scan, vote.glass_max_thickness_m,
+                                         vote.normal_min_linearity)
+        return beam_cases.classify(scan.ranges_m, references, vote)
+
+    def _log_weights(self, scan: Scan, particles: np.ndarray, cases: BeamCases) -> np.ndarray:
+        chosen = beam_weights.choose(cases.case, self._params.mixture.laser_max_beams)
+        return beam_weights.log_weights(
+            self._caster, se2.compose(particles, scan.base_from_laser), scan.angles_rad[chosen],
+            scan.ranges_m[chosen], cases.case[chosen], self._params.mixture, scan.range_max_m,
+            self._params.vote.glass_max_thickness_m, self._params.vote.normal_min_linearity)
+
+    def _resample(self) -> None:
+        self._updates += 1
+        if self._updates % self._params.schedule.resample_interval:
+            return
+        limits = self._params.count
+        drawn = resampling.low_variance(self._weights, limits.max_particles, self._rng)
+        count = resampling.enough_particles(self._particles[drawn], limits)
+        self._particles = self._particles[resampling.low_variance(self._weights, count, self._rng)]
+        self._weights = np.full(count, 1.0 / count)
+
+    def _estimate(self, scan: Scan, odom_from_base: np.ndarray, updated: bool) -> Estimate:
+        """The pose of the best cluster, carried on by odometry since the last update."""
+        map_from_odom = se2.compose(self._best.map_from_base, se2.inverse(self._odom_from_base))
+        map_from_base = se2.compose(map_from_odom, odom_from_base)
+        cases = self._classify(scan, map_from_base, self._best.covariance)
+        answered = int(scan.answered.sum())
+        used_share = float(np.count_nonzero(cases.case)) / answered if answered else float("nan")
+        if updated:
+            self._quality.observe(used_share)
+        state, reason = self._quality.judge(self._best)
+        return Estimate(scan.stamp_ns, map_from_base, self._best.covariance, map_from_odom, cases,
+                        self._particles, state, reason, used_share, updated)
+
+    def _start_with(self, particles: np.ndarray, searching: bool) -> None:
+        self._particles = particles
+        self._weights = np.full(len(particles), 1.0 / len(particles))
+        self._best = pose_estimate.of(particles, self._weights)
+        self._odom_from_base = None
+        self._quality = pose_quality.PoseQuality(self._params.quality, searching)
+        self._update_due = True

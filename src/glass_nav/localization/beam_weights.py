@@ -1,0 +1,87 @@
+"""Cases -> weights: how well does each particle explain the scan, beam by beam as it was classified?
+
+Weight of a particle: the sum over beams with case c > 0 of log(z_hit exp(-r^2 / (2 s^2)) + z_rand), r
+the residual to the reference of case c, measured across the surface (range residual times cosine of
+incidence): a wall that is drawn half a cell off shifts a grazing beam by many cells, but never more
+than half a cell across. P particles, B beams; weights are natural logarithms, not normalised.
+
+The sum over beams is the document's (seed glass_localization.txt; Thrun et al. (2005), sec. 6.3.1);
+neighbouring beams err together, so that B of them weigh as laser_independent_beams.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glass_nav.localization.beam_cases import DIFFUSE
+from glass_nav.sensing.raycast import RayCaster
+
+_LEAST_COS = 0.2
+
+
+@dataclass(frozen=True)
+class BeamMixture:
+    """How often a beam ends where its case says, and how sharply; AMCL's names where it has them."""
+    laser_max_beams: int = 60
+    laser_z_hit: float = 0.95
+    laser_z_rand: float = 0.05
+    laser_sigma_hit: float = 0.05        # [m] across the surface: lidar and map together
+    laser_independent_beams: float = 20.0
+
+    def __post_init__(self) -> None:
+        if not self.laser_max_beams >= 2:
+            raise ValueError(f"~laser_max_beams must be >= 2, got {self.laser_max_beams}")
+        for name in ("laser_z_hit", "laser_z_rand", "laser_sigma_hit", "laser_independent_beams"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"~{name} must be > 0, got {getattr(self, name)}")
+
+
+def choose(case: np.ndarray, count: int) -> np.ndarray:
+    """Indices of at most count beams of case > 0, spread evenly over those there are."""
+    usable = np.flatnonzero(case > 0)
+    if len(usable) <= count:
+        return usable
+    return usable[np.linspace(0, len(usable) - 1, count).round().astype(int)]
+
+
+def log_weights(caster: RayCaster, map_from_laser: np.ndarray, angles_rad: np.ndarray,
+                measured_m: np.ndarray, case: np.ndarray, mixture: BeamMixture,
+                max_range_m: float, max_thickness_m: float, min_linearity: float) -> np.ndarray:
+    """Log likelihood of the chosen beams for every particle.
+
+    Args:
+        caster: of the map.
+        map_from_laser: (P, 3) the lidar's pose for every particle.
+        angles_rad, measured_m, case: (B,) the beams to use, all of case > 0 with finite ranges.
+        mixture: how sharply.
+        max_range_m: how far to look.
+        max_thickness_m, min_linearity: as for the references of the cases.
+
+    Returns:
+        (P,) log likelihoods; all 0 if there is no beam.
+    """
+    log_w = np.zeros(len(map_from_laser))
+    if not len(case):
+        return log_w
+    normal_rad, linearity = caster.normals()
+    for chosen in (case == DIFFUSE, case != DIFFUSE):
+        if not chosen.any():
+            continue
+        angle, z = angles_rad[chosen], measured_m[chosen]
+        if case[chosen][0] == DIFFUSE:
+            hits = caster.cast_first(map_from_laser, angle, max_range_m)
+            expected, cell = hits.range_m, hits.cell
+        else:
+            surfaces = caster.cast_surfaces(map_from_laser, angle, max_range_m,
+                                            max_thickness_m=max_thickness_m, min_linearity=min_linearity)
+            rows = (case[chosen] - 2, slice(None), np.arange(len(angle)))
+            expected = np.stack([surfaces.mirrored_m, surfaces.second_m, surfaces.third_m])[rows].T
+            cell = np.stack([surfaces.first_cell, surfaces.second_cell, surfaces.third_cell])[rows].T
+        usable = (cell >= 0) & (linearity[cell] >= min_linearity)
+        beam_rad = map_from_laser[:, 2:3] + angle
+        cos = np.where(usable, np.maximum(np.abs(np.cos(beam_rad - normal_rad[cell])), _LEAST_COS), 1.0)
+        across = np.minimum(((z - expected) * cos / mixture.laser_sigma_hit) ** 2, 100.0)
+        log_w += np.log(mixture.laser_z_hit * np.exp(-0.5 * across) + mixture.laser_z_rand).sum(axis=1)
+    return log_w * min(1.0, mixture.laser_independent_beams / len(case))
