@@ -1,2 +1,168 @@
-"""GridMap, poses -> what beams would meet: the face of the compiled module _mrpt_grid."""
-# INTERFACE SKETCH: owned by the ray caster's author, see /tmp/glass/INTERFACE.md
+"""GridMap, poses -> what beams would meet: the face of the compiled module _mrpt_grid.
+
+P poses, B beams, H rows and W columns of the map. Poses are in the frame map, beam angles in the frame of their
+pose; a cell is named by its flat index row * W + column. Ranges are exact: the length of the ray from its origin
+to the boundary of the cell it meets.
+
+What a ray meets: every occupied cell that it enters or, where it goes exactly through a corner between cells, that
+touches the corner on its way; so a wall of cells that only touch at their corners lets nothing through. A ray along a
+grid line belongs to the cells above or to the right of it, as GridMap.cells() has it. A ray that starts in an occupied
+cell meets it at 0; one that starts outside the map meets what it enters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Tuple
+
+import numpy as np
+
+from glass_nav import _mrpt_grid
+from glass_nav.geometry import angles, se2
+from glass_nav.world.grid_map import OCCUPIED_PERCENT, GridMap
+
+BACKENDS = ("exact", "mrpt")
+UNKNOWN_CELLS = ("pass", "stop")
+
+
+@dataclass(frozen=True)
+class FirstHits:
+    """The first surface along each ray."""
+    range_m: np.ndarray  # (P, B) inf: nothing within max_range
+    cell: np.ndarray     # (P, B) int32 flat index of the occupied cell met, -1: nothing
+
+
+@dataclass(frozen=True)
+class SurfaceHits:
+    """Up to three surfaces along each ray, what was passed between them, and the mirrored path. All (P, B)."""
+    first_m: np.ndarray             # range to the surface, inf: none
+    second_m: np.ndarray
+    third_m: np.ndarray
+    first_cell: np.ndarray          # int32 flat index of the cell met, -1: none
+    second_cell: np.ndarray
+    third_cell: np.ndarray
+    first_thickness_m: np.ndarray   # along the normal, along the ray where there is none; inf: not passed
+    second_thickness_m: np.ndarray
+    normal_rad: np.ndarray          # of the first surface in map, towards the ray's origin; NaN: none
+    linearity: np.ndarray           # of the first surface: 1 straight wall ... 0 no direction
+    mirrored_m: np.ndarray          # origin -> first surface -> next surface by reflection; inf: none
+
+
+class RayCaster:
+    """Casts rays on one map. Safe to share between threads."""
+
+    def __init__(self, grid_map: GridMap, backend: str = "exact", threads: int = 1, unknown: str = "pass") -> None:
+        """
+        Args:
+            grid_map: cells of at least OCCUPIED_PERCENT end a ray.
+            backend: "exact" leaps by a chessboard distance; "mrpt" is MRPT's simulateScanRay with its known faults
+                corrected, slower, for comparison.
+            threads: of each cast; the poses are dealt out to them. The results do not depend on it.
+            unknown: "pass", unknown cells are like free ones; "stop", a ray that comes to one meets nothing (inf).
+
+        Raises:
+            ValueError: unknown backend, threads < 1, another word for unknown.
+        """
+        if backend not in BACKENDS:
+            raise ValueError(f"ray caster: backend must be one of {', '.join(BACKENDS)}, got {backend!r}")
+        if unknown not in UNKNOWN_CELLS:
+            raise ValueError(f"ray caster: unknown must be one of {', '.join(UNKNOWN_CELLS)}, got {unknown!r}")
+        if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
+            raise ValueError(f"ray caster: threads must be a whole number >= 1, got {threads!r}")
+        self._grid_map = grid_map
+        self._threads = int(threads)
+        self._grid_from_map = se2.inverse(grid_map.map_from_grid)
+        self._grid = _mrpt_grid.Grid(grid_map.occupancy, grid_map.resolution_m, OCCUPIED_PERCENT, backend,
+                                     unknown == "stop")
+
+    @property
+    def grid_map(self) -> GridMap:
+        return self._grid_map
+
+    def cast(self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float) -> np.ndarray:
+        """Ranges to the first surface.
+
+        Args:
+            poses: (P, 3) x [m], y [m], yaw [rad] in map.
+            angles_rad: (B,) directions in the frame of the pose.
+            max_range_m: how far to look, > 0 and finite.
+
+        Returns:
+            (P, B) ranges [m]; inf: nothing within max_range_m.
+
+        Raises:
+            ValueError: wrong shapes, poses or angles that are not finite, max_range_m not > 0.
+        """
+        poses, angles_rad = self._checked(poses, angles_rad, max_range_m)
+        return self._grid.cast(poses, angles_rad, max_range_m, self._threads)
+
+    def cast_first(self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float) -> FirstHits:
+        """As cast(), with the cells met."""
+        poses, angles_rad = self._checked(poses, angles_rad, max_range_m)
+        return FirstHits(*self._grid.cast_first(poses, angles_rad, max_range_m, self._threads))
+
+    def cast_surfaces(self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float,
+                      max_thickness_m: float = 0.3, min_linearity: float = 0.9,
+                      min_gap_m: float = 0.1) -> SurfaceHits:
+        """The first three surfaces along each ray and the path mirrored at the first.
+
+        The thickness of a surface is the length of the ray in it times |cos incidence|. max_range_m bounds all paths,
+        the mirrored one in its whole length. The mirrored ray does not meet the cells of the mirror itself: those
+        within 8 cells of the hit and 1.5 cells of the line of the wall.
+
+        Args:
+            poses, angles_rad, max_range_m: as for cast().
+            max_thickness_m: a surface thicker than this ends the ray; >= 0, inf: none does.
+            min_linearity: a cell less straight than this counts as one without normal: nothing is mirrored, and
+                its thickness is taken along the ray; 0 to 1.
+            min_gap_m: occupied cells on a ray that are less than this apart are one surface (the staircase of a
+                slanted wall); >= 0.
+
+        Raises:
+            ValueError: as cast(), or a limit outside its bounds.
+        """
+        if not max_thickness_m >= 0.0:
+            raise ValueError(f"ray caster: max_thickness must be >= 0 m, got {max_thickness_m}")
+        if not 0.0 <= min_linearity <= 1.0:
+            raise ValueError(f"ray caster: min_linearity must be in [0, 1], got {min_linearity}")
+        if not 0.0 <= min_gap_m < np.inf:
+            raise ValueError(f"ray caster: min_gap must be finite and >= 0 m, got {min_gap_m}")
+        poses, angles_rad = self._checked(poses, angles_rad, max_range_m)
+        found = self._grid.cast_surfaces(poses, angles_rad, max_range_m, max_thickness_m, min_linearity, min_gap_m,
+                                         self._threads)
+        found["normal_rad"] = self._in_map(found["normal_rad"])
+        return SurfaceHits(**found)
+
+    def normals(self) -> Tuple[np.ndarray, np.ndarray]:
+        """Normals of all cells that a ray may meet first; computed once, when first needed.
+
+        Returns:
+            normal_rad: (H * W,) float32 axis of the normal in map, up to half a turn; NaN: none.
+            linearity: (H * W,) float32, 1 straight wall ... 0 no direction, or no normal.
+        """
+        normal_rad, linearity = self._grid.normals()
+        return self._in_map(normal_rad), linearity
+
+    def _in_map(self, grid_angle_rad: np.ndarray) -> np.ndarray:
+        yaw = self._grid_map.map_from_grid[2]
+        if yaw == 0.0:
+            return grid_angle_rad
+        return angles.wrap(grid_angle_rad + grid_angle_rad.dtype.type(yaw))
+
+    def _checked(self, poses: np.ndarray, angles_rad: np.ndarray,
+                 max_range_m: float) -> "Tuple[np.ndarray, np.ndarray]":
+        """Poses in the frame of the grid, and the angles; ValueError if a ray cannot be cast."""
+        poses, angles_rad = np.asarray(poses, float), np.asarray(angles_rad, float)
+        if poses.ndim != 2 or poses.shape[1] != 3:
+            raise ValueError(f"ray caster: poses must have shape (P, 3), got {poses.shape}")
+        if angles_rad.ndim != 1:
+            raise ValueError(f"ray caster: angles must have shape (B,), got {angles_rad.shape}")
+        if not np.isfinite(poses).all():
+            bad = int(np.flatnonzero(~np.isfinite(poses).all(axis=1))[0])
+            raise ValueError(f"ray caster: pose {bad} is not finite: {poses[bad]}")
+        if not np.isfinite(angles_rad).all():
+            bad = int(np.flatnonzero(~np.isfinite(angles_rad))[0])
+            raise ValueError(f"ray caster: angle {bad} is not finite: {angles_rad[bad]}")
+        if not (np.isfinite(max_range_m) and max_range_m > 0.0):
+            raise ValueError(f"ray caster: max_range must be finite and > 0 m, got {max_range_m}")
+        return se2.compose(self._grid_from_map, poses), angles_rad

@@ -1,0 +1,143 @@
+/// One ray on its way through the cells of a grid.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+namespace glass_nav {
+
+/// A ray in grid coordinates: cell [0, 0] is the square from (0, 0) to (1, 1), lengths are in cells.
+struct Ray {
+  double x, y;    // origin
+  double dx, dy;  // unit vector
+};
+
+/// The walk of one ray from cell to cell.
+///
+/// The axes are turned over where needed so that every ray runs towards +x and +y; `cell()` turns back. The place on
+/// the ray is kept as the cell entered (whole numbers) and the exact parameter t at which the ray crossed into it:
+/// nothing is summed up, so a walk of ten thousand cells is as exact as its first step.
+class GridWalk {
+ public:
+  // Two crossings this close [cells] are one corner: far above the rounding of the sums that place a pose on a map
+  // (1e-12), far below what a map or a sensor resolves.
+  static constexpr double kCorner = 1e-9;
+
+  /// Stands in the cell of the origin, or, if that is outside the grid, in the first cell that the ray enters.
+  GridWalk(const Ray& ray, int width, int height, double t_max)
+      : x_axis_(ray.x, ray.dx, width), y_axis_(ray.y, ray.dy, height), t_max_(t_max) {
+    cell_ = (x_axis_.turned ? width - 1 : 0) + (y_axis_.turned ? (height - 1) * width : 0);
+    step_x_ = x_axis_.turned ? -1 : 1;
+    step_y_ = y_axis_.turned ? -width : width;
+    if (x_axis_.starts_inside() && y_axis_.starts_inside()) return;
+    enter_from_outside();
+  }
+
+  /// False once the ray has left the grid or is longer than t_max.
+  bool inside() const {
+    return t_ <= t_max_ && x_axis_.cell < x_axis_.size && y_axis_.cell < y_axis_.size;
+  }
+
+  /// Length of the ray where it entered the present cell.
+  double t() const { return t_; }
+
+  double t_max() const { return t_max_; }
+
+  /// Flat index (row * width + column) of the present cell.
+  std::int32_t cell() const { return index(x_axis_.cell, y_axis_.cell); }
+
+  /// Goes on to the first cell whose chessboard distance from the present one is `cells`.
+  ///
+  /// All cells nearer than that must be of no interest; 1 steps into the very next cell.
+  void leap(int cells) {
+    const double tx = x_axis_.crossing(x_axis_.cell + cells);
+    const double ty = y_axis_.crossing(y_axis_.cell + cells);
+    crossed_x_ = tx < ty;
+    if (crossed_x_) {
+      t_ = tx;
+      y_axis_.follow(t_, cells);
+      x_axis_.cell += cells;
+    } else {
+      t_ = ty;
+      x_axis_.follow(t_, cells);
+      y_axis_.cell += cells;
+    }
+  }
+
+  /// The other cell at a corner: a ray that goes exactly through a corner touches both cells beside it, the walk
+  /// itself visits at most one of them before it stands behind the corner. -1 if there is no such corner here.
+  std::int32_t cell_beside_corner() const {
+    if (crossed_x_) {
+      return y_axis_.just_entered(t_) ? index(x_axis_.cell, y_axis_.cell - 1) : -1;
+    }
+    return x_axis_.just_entered(t_) ? index(x_axis_.cell - 1, y_axis_.cell) : -1;
+  }
+
+ private:
+  static constexpr double kAxisParallel = 1e-12;  // cos(pi / 2) is 6e-17, not 0
+
+  /// One coordinate of the walk, turned over so that it never decreases.
+  struct Axis {
+    Axis(double origin, double direction, int cells) : size(cells) {
+      if (std::abs(direction) < kAxisParallel) direction = 0.0;
+      turned = direction < 0.0;
+      const double floor_cell = std::clamp(std::floor(origin), -1.0, static_cast<double>(cells));
+      const int start_cell = static_cast<int>(floor_cell);
+      start = turned ? size - origin : origin;
+      speed = std::abs(direction);
+      per_speed = speed > 0.0 ? 1.0 / speed : std::numeric_limits<double>::infinity();
+      cell = turned ? size - 1 - start_cell : start_cell;
+      first_legal = std::max(cell, 0);
+    }
+
+    bool starts_inside() const { return cell >= 0 && cell < size; }
+
+    /// t at which the ray crosses the lower boundary of a cell ahead.
+    double crossing(int ahead) const { return (ahead - start) * per_speed; }
+
+    /// The cell at t, which rounding must not move back nor to where the other axis has to be crossed first.
+    void follow(double t, int cells) {
+      cell = std::clamp(static_cast<int>(start + t * speed), cell, cell + cells - 1);
+    }
+
+    /// The cell at t, where the ray enters the grid; `size` if it passes by.
+    void enter(double t) {
+      cell = static_cast<int>(std::clamp(std::floor(start + t * speed), std::max<double>(cell, 0.0),
+                                         static_cast<double>(size)));
+    }
+
+    /// True if t is a corner: the lower boundary of the cell was crossed at this very t.
+    bool just_entered(double t) const { return cell > first_legal && t - crossing(cell) <= kCorner; }
+
+    double start;      // coordinate of the origin
+    double speed;      // cells per unit of t, >= 0
+    double per_speed;  // its inverse, inf for a ray along the other axis
+    int cell;
+    int size;
+    int first_legal;  // the boundary below this cell is not crossed by the ray, or it is the border of the grid
+    bool turned;
+  };
+
+  void enter_from_outside() {
+    const double tx = x_axis_.cell < 0 ? x_axis_.crossing(0) : 0.0;
+    const double ty = y_axis_.cell < 0 ? y_axis_.crossing(0) : 0.0;
+    t_ = std::max(tx, ty);
+    crossed_x_ = tx >= ty;
+    if (t_ > t_max_) return;
+    x_axis_.enter(t_);
+    y_axis_.enter(t_);
+  }
+
+  std::int32_t index(int x, int y) const { return cell_ + x * step_x_ + y * step_y_; }
+
+  Axis x_axis_, y_axis_;
+  double t_max_;
+  double t_ = 0.0;
+  std::int32_t cell_;  // flat index of the cell that is (0, 0) after turning over
+  std::int32_t step_x_, step_y_;
+  bool crossed_x_ = false;
+};
+
+}  // namespace glass_nav

@@ -1,0 +1,38 @@
+/// Which way the walls of a grid face.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace glass_nav {
+
+/// Normals of all occupied cells that a ray may meet first: those with a side towards a cell that is not occupied.
+///
+/// The normal of a cell is that of the straight line through the boundary cells that are connected with it within
+/// kRadiusCells (principal axes of their centres). Connected, so that the pane behind does not bend this one.
+class WallNormals {
+ public:
+  static constexpr int kRadiusCells = 8;
+
+  struct Normal {
+    float angle_rad;  // in (-pi/2, pi/2]: the sign is the ray's business; NaN where there is none
+    float linearity;  // 1 - smaller / larger principal variance: 1 straight wall, 0 no direction at all
+  };
+
+  WallNormals(const std::vector<std::uint8_t>& occupied, int width, int height);
+
+  /// Normal of one cell; {NaN, 0} for a cell inside a wall or without neighbours.
+  Normal at(std::int32_t cell) const;
+
+  /// Flat indices of the boundary cells, ascending.
+  const std::vector<std::int32_t>& cells() const { return cells_; }
+
+ private:
+  // Sparse, since one cell in twenty is on a boundary: the cells of row y are cells_[row_begin_[y] .. row_begin_[y+1]].
+  int width_;
+  std::vector<std::int32_t> row_begin_;
+  std::vector<std::int32_t> cells_;
+  std::vector<Normal> normals_;
+};
+
+}  // namespace glass_nav
