@@ -10,7 +10,7 @@ import struct
 from dataclasses import dataclass
 from io import BytesIO
 
-import genpy
+import rospy
 import numpy as np
 from geometry_msgs.msg import (Pose, PoseArray, PoseWithCovarianceStamped, Quaternion, Transform,
                                TransformStamped)
@@ -39,12 +39,12 @@ _X_Y_YAW = np.ix_([0, 1, 5], [0, 1, 5])  # of the 6x6 covariances of ROS: x y z 
 # -- time and frames
 
 
-def ns_from_stamp(stamp: genpy.Time) -> int:
+def ns_from_stamp(stamp: rospy.Time) -> int:
     return int(stamp.secs) * 1_000_000_000 + int(stamp.nsecs)
 
 
-def stamp_from_ns(stamp_ns: int) -> genpy.Time:
-    return genpy.Time(*divmod(int(stamp_ns), 1_000_000_000))
+def stamp_from_ns(stamp_ns: int) -> rospy.Time:
+    return rospy.Time(*divmod(int(stamp_ns), 1_000_000_000))
 
 
 def frame_id(name: str) -> str:
@@ -213,7 +213,7 @@ def map_from_msg(msg: OccupancyGrid) -> GridMap:
     return GridMap(occupancy, float(np.round(info.resolution, 7)), map_from_grid)  # float32 in the message
 
 
-def msg_from_map(grid_map: GridMap, stamp: genpy.Time, map_frame: str) -> OccupancyGrid:
+def msg_from_map(grid_map: GridMap, stamp: rospy.Time, map_frame: str) -> OccupancyGrid:
     msg = OccupancyGrid(header=Header(stamp=stamp, frame_id=map_frame))
     msg.info.map_load_time = stamp
     msg.info.resolution = grid_map.resolution_m
