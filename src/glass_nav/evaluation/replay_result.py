@@ -1,0 +1,135 @@
+"""What a replay gives: a row per scan, the cases of every beam, and the figures of the whole run.
+
+S scans that the filter took, B beams of the widest of them.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Dict, List, Mapping, Optional
+
+import numpy as np
+
+from glass_nav.evaluation import pose_errors
+from glass_nav.evaluation.pose_errors import PoseErrors
+from glass_nav.geometry.trajectory import Trajectory
+
+CASES = (0, 1, 2, 3, 4)  # 0 uncertain, 1 diffuse, 2 specular, 3 first penetration, 4 second
+NO_BEAM = 255            # fills the rows of scans with fewer beams than the widest
+
+
+@dataclass(frozen=True)
+class ReplayResult:
+    """One run of the filter over one log."""
+    stamps_ns: np.ndarray       # (S,) int64
+    map_from_base: np.ndarray   # (S, 3) estimates
+    odom_from_base: np.ndarray  # (S, 3) what the odometry said
+    deviation: np.ndarray       # (S, 3) standard deviations the filter claims: x [m], y [m], yaw [rad]
+    states: List[str]           # S of them
+    reasons: List[str]          # S of them
+    used_share: np.ndarray      # (S,) share of the answering beams that a case 1-4 explains
+    updated: np.ndarray         # (S,) bool: the scan moved the particles
+    particles: np.ndarray       # (S,) int: how many there were
+    cpu_ms: np.ndarray          # (S,) CPU time of the filter, all its threads
+    cases: np.ndarray           # (S, B) uint8: 0..4, NO_BEAM where a scan has no such beam
+    refusals: "Counter[str]"    # reason -> scans of the log that could not be used
+    reference: Optional[Trajectory]  # map_from_base
+    wall_s: float               # time the whole run took, reading included
+    seed: int
+
+    def __len__(self) -> int:
+        return len(self.stamps_ns)
+
+    @property
+    def errors(self) -> PoseErrors:
+        """Of every scan against the reference."""
+        return pose_errors.of(self.stamps_ns, self.map_from_base, self.reference)
+
+    def metrics(self) -> Dict[str, Any]:
+        """The figures of the run: plain numbers and None, ready for JSON."""
+        errors = self.errors
+        counts = np.bincount(self.cases.ravel(), minlength=NO_BEAM + 1)[list(CASES)]
+        beams = int(counts.sum())
+        states = Counter(self.states)
+        log_s = float(self.stamps_ns[-1] - self.stamps_ns[0]) * 1e-9 if len(self) else 0.0
+        return {
+            "scans": len(self),
+            "scans_refused": sum(self.refusals.values()),
+            "refusals": dict(sorted(self.refusals.items())),
+            "updates": int(self.updated.sum()),
+            "scans_without_ground_truth": None if self.reference is None else int((~errors.matched).sum()),
+            **pose_errors.summary(errors),
+            "case_share": {str(case): (float(count) / beams if beams else 0.0)
+                           for case, count in zip(CASES, counts)},
+            "state_share": {state: count / len(self) for state, count in sorted(states.items())},
+            "cpu_ms_per_scan": float(self.cpu_ms.mean()) if len(self) else None,
+            "cpu_ms_per_update": float(self.cpu_ms[self.updated].mean()) if self.updated.any() else None,
+            "log_duration_s": log_s,
+            "wall_s": self.wall_s,
+            "times_real_time": log_s / self.wall_s if self.wall_s > 0.0 else None,
+            "seed": self.seed,
+        }
+
+
+def write(result: ReplayResult, folder: Path, about: Mapping[str, Any]) -> None:
+    """metrics.json, trajectory.tum, per_scan.csv and beam_cases.npz; `about` goes into the first."""
+    write_json(folder / "metrics.json", {**result.metrics(), **about})
+    _write_tum(folder / "trajectory.tum", result)
+    _write_per_scan(folder / "per_scan.csv", result)
+    np.savez_compressed(folder / "beam_cases.npz", stamps_ns=result.stamps_ns.astype(np.int64),
+                        cases=result.cases)
+
+
+def write_json(path: Path, values: Mapping[str, Any]) -> None:
+    """Strict JSON: a NaN or an infinity is a null."""
+    path.write_text(json.dumps(_strict(values), indent=2, allow_nan=False) + "\n")
+
+
+def _strict(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _strict(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_strict(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _write_tum(path: Path, result: ReplayResult) -> None:
+    """TUM rows `stamp x y z qx qy qz qw`, the stamp with its nanoseconds."""
+    with path.open("w") as file:
+        for stamp_ns, (x, y, yaw) in zip(result.stamps_ns.tolist(), result.map_from_base.tolist()):
+            seconds, rest = divmod(stamp_ns, 1_000_000_000)
+            file.write(f"{seconds}.{rest:09d} {x:.6f} {y:.6f} 0 0 0 "
+                       f"{math.sin(yaw / 2):.9f} {math.cos(yaw / 2):.9f}\n")
+
+
+def _write_per_scan(path: Path, result: ReplayResult) -> None:
+    """A row per scan; what is not known is empty."""
+    errors = result.errors
+    nowhere = np.full((len(result), 3), np.nan)
+    true = nowhere if result.reference is None or not len(result) else result.reference.at(result.stamps_ns)
+    true = np.where(errors.matched[:, None], true, np.nan)
+    counts = np.stack([(result.cases == case).sum(axis=1) for case in CASES], axis=1)
+    with path.open("w", newline="") as file:
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow(["stamp_ns", "x_m", "y_m", "yaw_rad", "odom_x_m", "odom_y_m", "odom_yaw_rad",
+                       "true_x_m", "true_y_m", "true_yaw_rad", "position_error_m", "yaw_error_deg",
+                       "std_x_m", "std_y_m", "std_yaw_rad", "state", "reason", "used_share", "updated",
+                       "particles", "cpu_ms", *(f"beams_case_{case}" for case in CASES)])
+        for i in range(len(result)):
+            rows.writerow([int(result.stamps_ns[i]), *_texts(result.map_from_base[i]),
+                           *_texts(result.odom_from_base[i]), *_texts(true[i]),
+                           *_texts([errors.position_m[i], np.degrees(errors.yaw_rad[i])]),
+                           *_texts(result.deviation[i]), result.states[i], result.reasons[i],
+                           *_texts([result.used_share[i]]), int(result.updated[i]), int(result.particles[i]),
+                           f"{result.cpu_ms[i]:.3f}", *counts[i].tolist()])
+
+
+def _texts(values: Any) -> List[str]:
+    return ["" if math.isnan(value) else f"{value:.6f}" for value in values]

@@ -1,0 +1,317 @@
+"""A bag -> Recording, through rosbags: no ROS needed, and the same for its versions 0.9.23 and later.
+
+The bag is read twice: first everything but the scans (small), then scan by scan while the replay runs,
+so that a long log does not have to fit into memory.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Dict, Iterator, List, Optional, Tuple
+
+import numpy as np
+
+from glass_nav.geometry.trajectory import Trajectory
+from glass_nav.recording import frames, trajectory_file
+from glass_nav.recording.frames import FrameError, FrameTree, Transform
+from glass_nav.recording.recording import (Entry, LogOptions, Recording, RecordingError, Refusal, Step,
+                                           trajectory_from_samples)
+from glass_nav.sensing.scan import ScanError, scan_from_fields
+
+SCAN = "sensor_msgs/LaserScan"
+ODOMETRY = "nav_msgs/Odometry"
+TF = ("tf2_msgs/TFMessage", "tf/tfMessage")
+POSES = ("geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped", ODOMETRY)
+BASE_FRAMES = ("base_link", "base_footprint")  # tried in this order when no base frame is given
+LEVEL = math.cos(math.radians(20.0))  # a scan plane tilted further does not show the plan of a floor
+
+
+def open_log(path: Path, options: LogOptions) -> Recording:
+    """The recorded robot.
+
+    Raises:
+        RecordingError: not a whole bag, or a topic or transform that is needed is missing.
+    """
+    notes: List[str] = []
+    with _Bag(path) as bag:
+        scan_topic = _scan_topic(bag, options.scan_topic, notes)
+        tree = _frame_tree(bag)
+        odometry = _odometry(bag, tree, options, notes)
+        base_frame = _base_frame(bag, tree, odometry, options)
+        _check_laser(bag, scan_topic, tree, base_frame, options)
+        truth = _ground_truth(bag, options.ground_truth, notes)
+        scan_count = bag.count(scan_topic)
+    entries = _Entries(path, scan_topic, tree, odometry, base_frame, options.laser_pose)
+    return Recording(path.name, scan_count, entries, truth, notes)
+
+
+class _Bag:
+    """What we use of rosbags, its errors as RecordingError."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._reader: Any = None
+
+    def __enter__(self) -> "_Bag":
+        if not self.path.exists():
+            raise RecordingError(f"{self.path}: does not exist")
+        try:
+            from rosbags.highlevel import AnyReader
+        except ImportError as err:
+            raise RecordingError(f"{self.path}: reading bags needs the Python package rosbags "
+                                 f"(pip install rosbags): {err}") from err
+        try:
+            self._reader = AnyReader([self.path])
+            self._reader.open()
+        except Exception as err:  # rosbags lets struct, assertion and decompression errors through
+            raise RecordingError(f"{self.path}: {_why_unreadable(self.path, err)}") from err
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._reader.close()
+
+    @property
+    def topics(self) -> Dict[str, str]:
+        """Topic -> message type as ROS 1 writes it, sorted by topic."""
+        return {connection.topic: connection.msgtype.replace("/msg/", "/")
+                for connection in sorted(self._reader.connections, key=lambda each: str(each.topic))}
+
+    def count(self, topic: str) -> int:
+        return int(sum(connection.msgcount for connection in self._reader.connections
+                       if connection.topic == topic))
+
+    def topics_of(self, *kinds: str) -> List[str]:
+        return [topic for topic, kind in self.topics.items() if kind in kinds]
+
+    def messages(self, *topics: str) -> "Iterator[Tuple[str, Any]]":
+        """Topic and message in the order they were recorded; RecordingError where the bag is damaged."""
+        connections = [connection for connection in self._reader.connections if connection.topic in topics]
+        if not connections:
+            return
+        try:
+            for connection, _, raw in self._reader.messages(connections=connections):
+                yield connection.topic, self._reader.deserialize(raw, connection.msgtype)
+        except Exception as err:
+            raise RecordingError(f"{self.path}: damaged: {_first_line(err)}") from err
+
+    def check_topic(self, topic: str, *kinds: str) -> str:
+        """The topic as the bag spells it, if it is there with one of these types."""
+        name = topic if topic in self.topics else "/" + topic
+        if name not in self.topics:
+            raise RecordingError(f"{self.path}: no topic {topic}; it has {self.listing()}")
+        if self.topics[name] not in kinds:
+            raise RecordingError(f"{self.path}: {name} is {self.topics[name]}, expected {' or '.join(kinds)}")
+        return name
+
+    def listing(self) -> str:
+        return ", ".join(f"{topic} ({kind})" for topic, kind in self.topics.items()) or "no topics"
+
+
+@dataclass(frozen=True)
+class _Odometry:
+    """Where odom_from_base comes from: a frame of tf, or a topic."""
+    frame: Optional[str] = None
+    trajectory: Optional[Trajectory] = None
+    child_frame: str = ""
+
+    def at(self, tree: FrameTree, base_frame: str, stamp_ns: int) -> np.ndarray:
+        if self.frame is not None:
+            return np.array(frames.planar(tree.lookup(self.frame, base_frame, stamp_ns)))
+        assert self.trajectory is not None
+        if not self.trajectory.covers(np.int64(stamp_ns), slack_ns=frames.EXTRAPOLATION_NS):
+            raise FrameError("no odometry at that time")
+        return self.trajectory.at(np.int64(stamp_ns))
+
+
+def _scan_topic(bag: _Bag, wanted: Optional[str], notes: List[str]) -> str:
+    if wanted is not None:
+        return bag.check_topic(wanted, SCAN)
+    found = bag.topics_of(SCAN)
+    if not found:
+        raise RecordingError(f"{bag.path}: no topic of {SCAN}; it has {bag.listing()}")
+    if len(found) > 1 and "/scan" not in found:
+        raise RecordingError(f"{bag.path}: {len(found)} topics of {SCAN} ({', '.join(found)}), "
+                             "choose one with --scan-topic")
+    topic = found[0] if len(found) == 1 else "/scan"
+    notes.append(f"scans from {topic}")
+    return topic
+
+
+def _frame_tree(bag: _Bag) -> FrameTree:
+    tree = FrameTree()
+    for topic, message in bag.messages(*bag.topics_of(*TF)):
+        for stamped in message.transforms:
+            transform = _transform(stamped.transform.translation, stamped.transform.rotation)
+            if transform is not None:
+                tree.add(stamped.header.frame_id, stamped.child_frame_id, _stamp_ns(stamped.header),
+                         transform, static=topic.endswith("tf_static"))
+    return tree
+
+
+def _odometry(bag: _Bag, tree: FrameTree, options: LogOptions, notes: List[str]) -> _Odometry:
+    """From tf, unless a topic is asked for or tf has no odometry."""
+    odom_frame = (options.odom_frame or "odom").lstrip("/")
+    bases = BASE_FRAMES if options.base_frame is None else (options.base_frame.lstrip("/"),)
+    if options.odom_topic is None:
+        base = next((frame for frame in bases if frame != odom_frame and tree.connected(odom_frame, frame)), None)
+        if base is not None:
+            notes.append(f"odometry from tf {odom_frame} <- {base}")
+            return _Odometry(frame=odom_frame)
+        if options.odom_frame is not None:
+            raise RecordingError(f"{bag.path}: no transform {odom_frame} <- {' or '.join(bases)}; "
+                                 f"frames in tf: {', '.join(tree.frames) or 'none'}")
+        found = bag.topics_of(ODOMETRY)
+        if options.ground_truth is not None:  # a reference is no odometry, even where it has the type
+            found = [topic for topic in found if topic.lstrip("/") != options.ground_truth.lstrip("/")]
+        found = [topic for topic in found if topic not in ("/ground_truth",)]
+        if not found:
+            raise RecordingError(f"{bag.path}: no odometry: no transform {odom_frame} <- {' or '.join(bases)} "
+                                 f"in tf and no topic of {ODOMETRY}; it has {bag.listing()}")
+        if len(found) > 1 and "/odom" not in found:
+            raise RecordingError(f"{bag.path}: {len(found)} topics of {ODOMETRY} ({', '.join(found)}), "
+                                 "choose one with --odom-topic")
+        topic = found[0] if len(found) == 1 else "/odom"
+    else:
+        topic = bag.check_topic(options.odom_topic, ODOMETRY)
+    trajectory, child_frame = _trajectory(bag, topic)
+    notes.append(f"odometry from {topic}")
+    return _Odometry(trajectory=trajectory, child_frame=child_frame)
+
+
+def _base_frame(bag: _Bag, tree: FrameTree, odometry: _Odometry, options: LogOptions) -> str:
+    if options.base_frame is not None:
+        return options.base_frame.lstrip("/")
+    if odometry.frame is not None:
+        return next(frame for frame in BASE_FRAMES if tree.connected(odometry.frame, frame))
+    return odometry.child_frame or next((frame for frame in BASE_FRAMES if frame in tree.frames), BASE_FRAMES[0])
+
+
+def _check_laser(bag: _Bag, scan_topic: str, tree: FrameTree, base_frame: str, options: LogOptions) -> None:
+    """Refuse at once a bag that does not say where the laser is: every scan would be refused."""
+    if options.laser_pose is not None:
+        return
+    for _, message in bag.messages(scan_topic):
+        laser_frame = message.header.frame_id.lstrip("/")
+        if not laser_frame:
+            raise RecordingError(f"{bag.path}: the scans on {scan_topic} have no frame_id; "
+                                 "say where the laser is with --laser-pose X Y YAW")
+        if laser_frame != base_frame and not tree.connected(base_frame, laser_frame):
+            raise RecordingError(f"{bag.path}: no transform {base_frame} <- {laser_frame} for the laser on "
+                                 f"{scan_topic}; frames in tf: {', '.join(tree.frames) or 'none'}; "
+                                 "say where it is with --laser-pose X Y YAW")
+        return
+
+
+def _ground_truth(bag: _Bag, source: Optional[str], notes: List[str]) -> Optional[Trajectory]:
+    if source == "none":
+        return None
+    if source is None:
+        if bag.topics.get("/ground_truth") not in POSES:
+            return None
+        source = "/ground_truth"
+    if source not in bag.topics and Path(source).is_file():
+        notes.append(f"ground truth from {source}")
+        return trajectory_file.load(Path(source))
+    if source not in bag.topics and "/" + source not in bag.topics and "." in Path(source).name:
+        raise RecordingError(f"{source}: no such file of poses, and no topic of {bag.path}")
+    topic = bag.check_topic(source, *POSES)
+    notes.append(f"ground truth from {topic}")
+    return _trajectory(bag, topic)[0]
+
+
+def _trajectory(bag: _Bag, topic: str) -> "Tuple[Trajectory, str]":
+    """The poses on a topic, and the frame that they place (Odometry says it)."""
+    stamps: List[int] = []
+    poses: List[Tuple[float, float, float]] = []
+    child_frame = ""
+    for _, message in bag.messages(topic):
+        pose = message.pose.pose if hasattr(message.pose, "pose") else message.pose
+        transform = _transform(pose.position, pose.orientation)
+        if transform is not None:
+            stamps.append(_stamp_ns(message.header))
+            poses.append(frames.planar(transform))
+        child_frame = child_frame or getattr(message, "child_frame_id", "").lstrip("/")
+    if not stamps:
+        raise RecordingError(f"{bag.path}: {topic} holds no pose that can be used")
+    return trajectory_from_samples(stamps, poses), child_frame
+
+
+class _Entries:
+    """Iterates the scans of a bag, opening it anew each time."""
+
+    def __init__(self, path: Path, scan_topic: str, tree: FrameTree, odometry: _Odometry, base_frame: str,
+                 laser_pose: Optional[Tuple[float, float, float]]) -> None:
+        self._path, self._scan_topic, self._tree, self._odometry = path, scan_topic, tree, odometry
+        self._base_frame, self._laser_pose = base_frame, laser_pose
+
+    def __iter__(self) -> Iterator[Entry]:
+        latest_ns = -1
+        with _Bag(self._path) as bag:
+            for _, message in bag.messages(self._scan_topic):
+                stamp_ns = _stamp_ns(message.header)
+                entry = self._entry(message, stamp_ns, latest_ns)
+                if isinstance(entry, Step):
+                    latest_ns = stamp_ns
+                yield entry
+
+    def _entry(self, message: Any, stamp_ns: int, latest_ns: int) -> Entry:
+        if stamp_ns < latest_ns:
+            return Refusal(stamp_ns, "time runs backwards")
+        laser_frame = message.header.frame_id.lstrip("/")
+        upside_down = False
+        try:
+            if self._laser_pose is not None:
+                base_from_laser = self._laser_pose
+            else:
+                transform = self._tree.lookup(self._base_frame, laser_frame, stamp_ns)
+                up = frames.upwardness(transform)
+                if abs(up) < LEVEL:
+                    tilt = math.degrees(math.acos(min(abs(up), 1.0)))
+                    return Refusal(stamp_ns, f"the laser is tilted by {tilt:.0f} degrees")
+                base_from_laser, upside_down = frames.planar(transform), up < 0.0
+            odom_from_base = self._odometry.at(self._tree, self._base_frame, stamp_ns)
+            scan = scan_from_fields(stamp_ns, message.ranges, float(message.angle_min),
+                                    float(message.angle_increment), float(message.range_min),
+                                    float(message.range_max), np.array(base_from_laser), upside_down)
+        except FrameError as err:
+            return Refusal(stamp_ns, str(err))
+        except ScanError as err:
+            return Refusal(stamp_ns, str(err).partition(": ")[2])
+        return Step(scan, odom_from_base)
+
+
+def _stamp_ns(header: Any) -> int:
+    return int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)
+
+
+def _transform(translation: Any, rotation: Any) -> Optional[Transform]:
+    """None where there is a NaN or a quaternion without direction."""
+    unit = frames.normalised((float(rotation.x), float(rotation.y), float(rotation.z), float(rotation.w)))
+    offset = (float(translation.x), float(translation.y), float(translation.z))
+    if unit is None or not all(math.isfinite(value) for value in offset):
+        return None
+    return offset, unit
+
+
+def _why_unreadable(path: Path, err: Exception) -> str:
+    if path.is_dir():
+        return f"is a folder without a bag that can be read: {_first_line(err)}"
+    try:
+        with path.open("rb") as file:
+            head = file.read(13)
+    except OSError as refused:
+        return f"cannot be read: {refused.strerror}"
+    if not head:
+        return "is empty"
+    if path.suffix == ".bag" or head.startswith(b"#ROSBAG"):
+        if head != b"#ROSBAG V2.0\n":
+            return "is no ROS 1 bag"
+        return "cut short or never closed (its index is missing); `rosbag reindex` may save what it holds"
+    return f"cannot be read: {_first_line(err)}"
+
+
+def _first_line(err: Exception) -> str:
+    text = str(err).strip()
+    return text.splitlines()[0] if text else type(err).__name__

@@ -1,0 +1,132 @@
+"""An MRPT .rawlog -> Recording: sensory frames with actions between them, or single observations."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any, Dict, Iterator, List, Optional, Tuple
+
+import numpy as np
+
+from glass_nav.geometry.trajectory import Trajectory
+from glass_nav.recording import trajectory_file
+from glass_nav.recording.recording import (Entry, LogOptions, Recording, RecordingError, Refusal, Step,
+                                           trajectory_from_samples)
+from glass_nav.sensing.scan import ScanError, scan_from_fields
+
+LEVEL = math.cos(math.radians(20.0))  # a scan plane tilted further does not show the plan of a floor
+FRAME_PERIOD_NS = 100_000_000  # between frames of a log without times: only their order counts
+
+
+def open_log(path: Path, options: LogOptions) -> Recording:
+    """The recorded robot.
+
+    Raises:
+        RecordingError: not a rawlog, or without laser scans or odometry.
+    """
+    from glass_nav import _mrpt_io
+
+    if not path.is_file():
+        raise RecordingError(f"{path}: does not exist")
+    try:
+        log = _mrpt_io.read_rawlog(str(path))
+    except ValueError as err:
+        raise RecordingError(f"{path}: {err}") from err
+    notes = [f"reading stopped early: the file {log['broken']}"] if log["broken"] else []
+    holds = ", ".join(f"{count} {name.split('::')[-1]}" for name, count in sorted(log["objects"].items()))
+    cut = f"; the file {log['broken']}" if log["broken"] else ""
+    scans = _scans(path, log, options, holds + cut, notes)
+    if not len(log["odometry"]):
+        raise RecordingError(f"{path}: holds no odometry; it holds {holds}{cut}")
+    if (log["stamps_ns"][scans] < 0).all() and log["paired"]:
+        notes.append("the scans have no times: 0.1 s between them assumed")
+        log["stamps_ns"][scans] = FRAME_PERIOD_NS * np.arange(len(scans))
+    odometry = None if log["paired"] else _odometry(path, log)
+    truth = _ground_truth(path, options, log["stamps_ns"][scans], notes)
+    return Recording(path.name, len(scans), _Entries(log, scans, odometry, options.laser_pose), truth, notes)
+
+
+def _scans(path: Path, log: Dict[str, Any], options: LogOptions, holds: str, notes: List[str]) -> np.ndarray:
+    """Indices of the scans of the sensor asked for; a sensor's label stands in for a topic."""
+    if not len(log["stamps_ns"]):
+        raise RecordingError(f"{path}: holds no CObservation2DRangeScan; it holds {holds}")
+    labels = np.array(log["labels"])
+    names = sorted(set(log["labels"]))
+    wanted = options.scan_topic
+    if wanted is None and len(names) > 1:
+        raise RecordingError(f"{path}: has scans of {len(names)} sensors ({', '.join(map(repr, names))}), "
+                             "choose one with --scan-topic")
+    if wanted is not None and wanted not in names:
+        raise RecordingError(f"{path}: no sensor {wanted!r}; sensors with scans: {', '.join(map(repr, names))}")
+    chosen = names[0] if wanted is None else wanted
+    notes.append(f"scans of sensor {chosen!r}, odometry from "
+                 f"{'the actions' if log['paired'] else 'CObservationOdometry'}")
+    return np.nonzero(labels == chosen)[0]
+
+
+def _odometry(path: Path, log: Dict[str, Any]) -> Trajectory:
+    stamped = log["odometry_stamps_ns"] >= 0
+    if not stamped.any():
+        raise RecordingError(f"{path}: none of its {len(stamped)} odometry readings has a time")
+    return trajectory_from_samples(log["odometry_stamps_ns"][stamped].tolist(),
+                                   log["odometry"][stamped].tolist())
+
+
+def _ground_truth(path: Path, options: LogOptions, stamps_ns: np.ndarray,
+                  notes: List[str]) -> Optional[Trajectory]:
+    if options.ground_truth == "none":
+        return None
+    beside = path.with_name(path.stem + "_GT.txt")
+    if options.ground_truth is None and not beside.is_file():
+        return None
+    source = beside if options.ground_truth is None else Path(options.ground_truth)
+    notes.append(f"ground truth from {source}")
+    return trajectory_file.load(source, stamps_ns)
+
+
+class _Entries:
+    """Iterates the scans of a rawlog that is in memory already."""
+
+    def __init__(self, log: Dict[str, Any], scans: np.ndarray, odometry: Optional[Trajectory],
+                 laser_pose: Optional[Tuple[float, float, float]]) -> None:
+        self._log, self._scans, self._odometry, self._laser_pose = log, scans, odometry, laser_pose
+        self._ends = np.cumsum(log["beams"])
+
+    def __iter__(self) -> Iterator[Entry]:
+        latest_ns = -1
+        for index in self._scans.tolist():
+            stamp_ns = int(self._log["stamps_ns"][index])
+            entry = self._entry(index, stamp_ns, latest_ns)
+            latest_ns = max(latest_ns, stamp_ns)
+            yield entry
+
+    def _entry(self, index: int, stamp_ns: int, latest_ns: int) -> Entry:
+        log = self._log
+        if stamp_ns < 0:
+            return Refusal(0, "the scan has no time")
+        if stamp_ns < latest_ns:
+            return Refusal(stamp_ns, "time runs backwards")
+        x, y, _, yaw, pitch, roll = log["sensor_pose"][index].tolist()
+        up = math.cos(pitch) * math.cos(roll)
+        yaw = math.atan2(math.sin(yaw) * math.cos(pitch), math.cos(yaw) * math.cos(pitch))
+        if abs(up) < LEVEL:
+            return Refusal(stamp_ns, f"the laser is tilted by {math.degrees(math.acos(abs(up))):.0f} degrees")
+        if self._odometry is None:
+            before = int(log["odometry_index"][index])  # -1: the frame the robot started in
+            odom_from_base = log["odometry"][before] if before >= 0 else np.zeros(3)
+        elif self._odometry.covers(np.int64(stamp_ns), slack_ns=FRAME_PERIOD_NS):
+            odom_from_base = self._odometry.at(np.int64(stamp_ns))
+        else:
+            return Refusal(stamp_ns, "no odometry at that time")
+        end = int(self._ends[index])
+        part = slice(end - int(log["beams"][index]), end)
+        # What MRPT calls invalid came back with nothing; it does not tell "nothing met" from "failed".
+        ranges_m = np.where(log["valid"][part] != 0, log["ranges_m"][part].astype(float), np.inf)
+        try:
+            scan = scan_from_fields(
+                stamp_ns, ranges_m, float(log["first_angle_rad"][index]), float(log["angle_step_rad"][index]),
+                0.0, float(log["range_max_m"][index]),
+                np.array((x, y, yaw) if self._laser_pose is None else self._laser_pose), upside_down=up < 0.0)
+        except ScanError as err:
+            return Refusal(stamp_ns, str(err).partition(": ")[2])
+        return Step(scan, np.array(odom_from_base, float))

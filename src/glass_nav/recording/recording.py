@@ -1,0 +1,71 @@
+"""A recorded robot, whatever file it came from: scans with the odometry at their stamps, in order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Iterable, Iterator, List, Optional, Tuple, Union
+
+import numpy as np
+
+from glass_nav.geometry.trajectory import Trajectory
+from glass_nav.sensing.scan import Scan
+
+
+class RecordingError(ValueError):
+    """A log that cannot be used; one line: the file, what was found, what is needed."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """What the filter gets at once."""
+    scan: Scan
+    odom_from_base: np.ndarray  # (3,) at the stamp of the scan
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A scan of the log that cannot be used. Never dropped in silence: the replay counts them."""
+    stamp_ns: int
+    reason: str  # without the stamp, so that equal reasons can be counted
+
+
+Entry = Union[Step, Refusal]
+
+
+@dataclass
+class Recording:
+    """One log, opened. Iterating reads it from the start, every time the same."""
+    name: str
+    scan_count: int           # entries to come: for a progress bar
+    entries: Iterable[Entry]  # in the order of the log
+    ground_truth: Optional[Trajectory] = None  # map_from_base
+    notes: List[str] = field(default_factory=list)  # what was chosen or found odd, a line each
+
+    def __len__(self) -> int:
+        return self.scan_count
+
+    def __iter__(self) -> Iterator[Entry]:
+        return iter(self.entries)
+
+    def in_memory(self) -> "Recording":
+        """The same with all entries read, for more than one run over it."""
+        entries = list(self.entries)
+        return Recording(self.name, len(entries), entries, self.ground_truth, self.notes)
+
+
+@dataclass(frozen=True)
+class LogOptions:
+    """What to take from a log; None: found by itself, and said in the notes."""
+    scan_topic: Optional[str] = None
+    odom_topic: Optional[str] = None
+    base_frame: Optional[str] = None
+    odom_frame: Optional[str] = None
+    laser_pose: Optional[Tuple[float, float, float]] = None  # base_from_laser instead of tf's
+    ground_truth: Optional[str] = None  # a topic or a file; "none": do not look for one
+
+
+def trajectory_from_samples(stamps_ns: "List[int]", poses: "List[Tuple[float, float, float]]") -> Trajectory:
+    """Samples in any order as a trajectory; of samples at one stamp the first counts."""
+    stamps = np.array(stamps_ns, dtype=np.int64).reshape(-1)
+    unique, first = np.unique(stamps, return_index=True)
+    return Trajectory(unique, np.array(poses, dtype=float).reshape(-1, 3)[first])
