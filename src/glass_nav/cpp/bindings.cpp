@@ -4,6 +4,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
@@ -111,7 +112,8 @@ py::tuple normals(const GridRaycaster& grid) {
     walls = &grid.normals();
   }
   const auto count = static_cast<py::ssize_t>(grid.width()) * grid.height();
-  py::array_t<float> normal_rad(count), linearity(count);
+  const std::vector<py::ssize_t> shape{count};  // not the bare number: pybind11 2.10 makes that an array of stride 0
+  py::array_t<float> normal_rad(shape), linearity(shape);
   float *angle_to = normal_rad.mutable_data(), *linearity_to = linearity.mutable_data();
   std::fill(angle_to, angle_to + count, std::numeric_limits<float>::quiet_NaN());
   std::fill(linearity_to, linearity_to + count, 0.0F);
