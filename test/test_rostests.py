@@ -20,7 +20,7 @@ TIMEOUT_S = 600.0  # of one file; the tests in it have shorter ones, and tell mo
 pytestmark = pytest.mark.skipif("ROS_PACKAGE_PATH" not in os.environ, reason="no ROS environment: run by scripts/test")
 
 
-@pytest.mark.parametrize("path", ROSTESTS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", ROSTESTS, ids=[path.stem for path in ROSTESTS])
 def test_rostest(path: Path, tmp_path: Path) -> None:
     rostest = shutil.which("rostest")
     assert rostest, "rostest is not installed: run by scripts/test"

@@ -60,7 +60,7 @@ def _leaves(cls: type) -> Iterator[Tuple[str, type, type]]:
     for field in dataclasses.fields(cls):
         kind = kinds[field.name]
         if dataclasses.is_dataclass(kind):
-            yield from _leaves(kind)
+            yield from _leaves(kind)  # type: ignore[arg-type]
         else:
             yield field.name, kind, cls
 
@@ -79,7 +79,7 @@ def _build(cls: Type[T], checked: Mapping[str, Any], owner: str) -> T:
     for field in dataclasses.fields(cls):  # type: ignore[arg-type]
         kind = kinds[field.name]
         if dataclasses.is_dataclass(kind):
-            arguments[field.name] = _build(kind, checked, owner)  # type: ignore[type-var]
+            arguments[field.name] = _build(kind, checked, owner)  # type: ignore[arg-type, type-var]
         elif field.name in checked:
             arguments[field.name] = checked[field.name]
     try:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Optional
+from typing import TYPE_CHECKING, Optional
 
 import numpy as np
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike  # numpy 1.20; Noetic has 1.17
 
-def wrap(angle_rad: np.ndarray) -> np.ndarray:
+
+def wrap(angle_rad: ArrayLike) -> np.ndarray:
     """The same angle in [-pi, pi); any shape, NaN stays NaN."""
     return np.mod(np.asarray(angle_rad) + np.pi, 2.0 * np.pi) - np.pi
 

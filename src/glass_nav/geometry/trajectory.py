@@ -6,10 +6,14 @@ N poses; stamps in integer nanoseconds, because a float second of today holds on
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from glass_nav.geometry import angles
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike  # numpy 1.20; Noetic has 1.17
 
 
 @dataclass(frozen=True)
@@ -28,7 +32,7 @@ class Trajectory:
     def __len__(self) -> int:
         return len(self.stamps_ns)
 
-    def covers(self, stamp_ns: np.ndarray, slack_ns: int = 0) -> np.ndarray:
+    def covers(self, stamp_ns: ArrayLike, slack_ns: int = 0) -> np.ndarray:
         """Whether a pose at that time follows without extrapolating by more than slack_ns."""
         if not len(self):
             return np.zeros(np.shape(stamp_ns), bool)
@@ -36,7 +40,7 @@ class Trajectory:
         return ((stamp_ns >= self.stamps_ns[0] - slack_ns)
                 & (stamp_ns <= self.stamps_ns[-1] + slack_ns))
 
-    def at(self, stamp_ns: np.ndarray) -> np.ndarray:
+    def at(self, stamp_ns: ArrayLike) -> np.ndarray:
         """Poses (..., 3) at stamps (...), linear in x, y and the shorter way in yaw.
 
         Outside the recorded time the nearest end holds; ask covers() first.
