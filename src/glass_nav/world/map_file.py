@@ -40,27 +40,29 @@ def load(path: "Union[str, os.PathLike[str]]") -> GridMap:
 
 
 def save(grid_map: GridMap, path_yaml: "Union[str, os.PathLike[str]]") -> None:
-    """Write a map_server yaml, and beside it the image, a .pgm of the same name.
+    """Write a map_server yaml, and beside it the image of the same name; load() gives an equal map, but for 99 percent,
+    which mode scale does not have: it comes back as 98.
 
-    Cells that are 0, 100 or unknown come back equal; for maps with percentages in between the image is
-    written in mode scale, which has 99 steps (a value comes back within 1 percent).
+    The image is a .pgm in mode trinary, or, for a map with percentages between 0 and 100, a .png in mode
+    scale with the unknown cells transparent.
     """
     path_yaml = Path(path_yaml)
     path_image = path_yaml.with_suffix(".pgm")
     occupancy = grid_map.occupancy.astype(int)
     graded = not np.isin(occupancy, (UNKNOWN, 0, 100)).all()
-    if graded:  # an alpha channel marks the unknown cells, as map_server reads it in mode scale
+    free, occupied = (0.002, 0.998) if graded else (0.196, 0.65)  # those of map_saver, or nearly all graded
+    if graded:
         path_image = path_yaml.with_suffix(".png")
-        grey = np.where(occupancy == UNKNOWN, 128, np.rint(255.0 * (1.0 - occupancy / 100.0)))
+        step = (occupied - free) / 98.0  # mode scale has 98 of them for 1..98, and two greys or more in each
+        probability = np.select([occupancy <= 0, occupancy == 100], [0.0, 1.0],
+                                free + step * (np.minimum(occupancy, 98) - 0.5))
+        grey = np.where(occupancy == UNKNOWN, 128, np.rint(255.0 * (1.0 - probability)))
         alpha = np.where(occupancy == UNKNOWN, 0, 255)
         image = np.stack([grey, grey, grey, alpha], axis=-1).astype(np.uint8)
     else:
         image = np.select([occupancy == 100, occupancy == 0], [0, 254], 205).astype(np.uint8)
     _image_module().fromarray(np.ascontiguousarray(image[::-1])).save(path_image)
     x, y, yaw = (float(value) for value in grid_map.map_from_grid)
-    # The image's grey 0.196 x 255 and 0.65 x 255: the thresholds map_saver writes. Mode scale needs the
-    # whole range between them to be graded.
-    free, occupied = (0.002, 0.998) if graded else (0.196, 0.65)
     path_yaml.write_text(
         f"image: {path_image.name}\nmode: {'scale' if graded else 'trinary'}\n"
         f"resolution: {float(grid_map.resolution_m)!r}\norigin: [{x!r}, {y!r}, {yaw!r}]\n"
@@ -161,18 +163,22 @@ def _occupancy(channels: np.ndarray, mode: str, negate: bool, occupied: float, f
     """(H, W) int8 by map_server's rules from channels (H, W, C), rows in the same order."""
     has_alpha = channels.shape[-1] == 4
     averaged = channels[..., :3] if has_alpha and mode != "trinary" else channels
-    grey = averaged.mean(axis=-1)  # (H, W) 0..255
+    count = averaged.shape[-1]
+    total = averaged[..., 0] if count == 1 else averaged.sum(axis=-1, dtype=np.uint16)  # (H, W)
+    grey = np.arange(255 * count + 1) / count  # of every total there can be: maps have millions of cells
     if negate:
         grey = 255.0 - grey
     if mode == "raw":  # 255 is how -1 looks in a byte; above 100 there is no percentage
-        return np.where(grey <= 100.0, np.floor(grey), UNKNOWN).astype(np.int8)
+        return np.where(grey <= 100.0, np.floor(grey), UNKNOWN).astype(np.int8)[total]
     probability = (255.0 - grey) / 255.0
     between = np.full(grey.shape, float(UNKNOWN))
     if mode == "scale":
         between = np.floor(1.0 + 98.0 * (probability - free) / (occupied - free))
-        if has_alpha:
-            between[channels[..., 3] == 0] = UNKNOWN
-    return np.select([probability > occupied, probability < free], [100.0, 0.0], between).astype(np.int8)
+    by_total = np.select([probability > occupied, probability < free], [100.0, 0.0], between).astype(np.int8)
+    occupancy = by_total[total]
+    if mode == "scale" and has_alpha:  # a transparent cell is unknown unless its colour is beyond doubt
+        occupancy[(channels[..., 3] == 0) & (occupancy > 0) & (occupancy < 100)] = UNKNOWN
+    return occupancy
 
 
 def _load_mrpt(path: Path) -> GridMap:

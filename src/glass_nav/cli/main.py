@@ -1,0 +1,56 @@
+"""The command glass_nav: finds the subcommand, and turns errors into one line and an exit code."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import List, Optional
+
+DONE, USAGE, BAD_INPUT, INTERRUPTED = 0, 2, 3, 130
+
+
+def main(argv: Optional[List[str]] = None) -> int:
+    """Run a subcommand.
+
+    Args:
+        argv: arguments without the program's name; those of the process when not given.
+
+    Returns:
+        0 done, 2 wrong usage, 3 bad input (a line on stderr says what), 130 interrupted.
+    """
+    try:
+        from glass_nav.cli import replay
+    except ImportError as err:
+        if not str(err.name).startswith("glass_nav"):
+            raise
+        print(f"glass_nav: {err.name or err} is not there: build the package and source its setup.bash",
+              file=sys.stderr)
+        return BAD_INPUT
+    parser = argparse.ArgumentParser(prog="glass_nav", description="Localization in buildings of glass: offline tools.")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
+    commands.required = True  # as an attribute: the argument came with Python 3.7 only for some callers
+    replay.add_arguments(commands.add_parser("replay", help="run the localization on a recorded log",
+                                             description=replay.DESCRIPTION))
+    try:
+        arguments = parser.parse_args(argv)
+    except SystemExit as err:  # argparse has written what is wrong
+        return int(err.code or 0)
+    wrong = replay.usage_error(arguments)
+    if wrong is not None:
+        print(f"glass_nav replay: {wrong}", file=sys.stderr)
+        return USAGE
+    try:
+        replay.main(arguments)
+    except (ValueError, OSError) as err:  # RecordingError, MapError and ParamError are ValueErrors
+        print(f"glass_nav replay: {_one_line(err)}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("glass_nav replay: interrupted, nothing written", file=sys.stderr)
+        return INTERRUPTED
+    return DONE
+
+
+def _one_line(err: Exception) -> str:
+    if isinstance(err, OSError) and err.strerror:
+        return f"{err.filename}: {err.strerror}" if err.filename else str(err.strerror)
+    return " ".join(str(err).split()) or type(err).__name__

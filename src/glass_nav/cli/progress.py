@@ -1,0 +1,55 @@
+"""How far a long job is: a bar on a terminal, a line every few seconds elsewhere. Writes to stderr only."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import Optional, TextIO
+
+BAR_PERIOD_S, LINE_PERIOD_S = 0.1, 10.0
+WIDTH = 30
+
+
+class Progress:
+    """Counts `total` things; step() once each, finish() at the end."""
+
+    def __init__(self, what: str, total: int, stream: Optional[TextIO] = None) -> None:
+        self._what, self._total = what, total
+        self._stream = sys.stderr if stream is None else stream
+        self._tty = self._stream.isatty()
+        self._start = self._shown = time.monotonic()
+        self._done = 0
+
+    def step(self) -> None:
+        """One more is done."""
+        self._done += 1
+        now = time.monotonic()
+        if now - self._shown >= (BAR_PERIOD_S if self._tty else LINE_PERIOD_S):
+            self._shown = now
+            self._show(now)
+
+    def finish(self) -> None:
+        """All is done, or as much as there was; closes the line of a bar."""
+        if self._tty:
+            self._show(time.monotonic())
+            self._stream.write("\n")
+            self._stream.flush()
+
+    def _show(self, now: float) -> None:
+        share = min(self._done / self._total, 1.0) if self._total else 1.0
+        left = (now - self._start) * (1.0 - share) / share if share else 0.0
+        text = f"{self._what}: {self._done} of {self._total} scans, {clock(left)} left"
+        if self._tty:
+            filled = int(WIDTH * share)
+            self._stream.write(f"\r[{'#' * filled}{'.' * (WIDTH - filled)}] {text}\x1b[K")
+        else:
+            self._stream.write(text + "\n")
+        self._stream.flush()
+
+
+def clock(seconds: float) -> str:
+    """75.2 -> 1:15."""
+    whole = int(round(seconds))
+    hours, rest = divmod(whole, 3600)
+    minutes, rest = divmod(rest, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

@@ -1,0 +1,174 @@
+"""glass_nav replay: a recorded robot through the filter, and how well it went. No roscore."""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import sys
+from pathlib import Path
+from typing import Callable, Dict, Optional, Tuple
+
+import numpy as np
+
+from glass_nav import params
+from glass_nav.cli import replay_params, replay_run
+from glass_nav.cli.progress import Progress
+from glass_nav.cli.replay_params import ReplayParams, StartParams
+from glass_nav.cli.replay_run import Window
+from glass_nav.evaluation import pictures, replay_result
+from glass_nav.evaluation.replay_result import ReplayResult
+from glass_nav.localization.glass_mcl import GlassMcl
+from glass_nav.recording.log_file import open_log
+from glass_nav.recording.recording import LogOptions, Recording
+from glass_nav.world import map_file
+
+DESCRIPTION = """Runs the localization on a recorded log, every scan of it, and writes metrics.json,
+trajectory.tum, per_scan.csv, beam_cases.npz and trajectory.png. Needs no roscore."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of the subcommand."""
+    parser.add_argument("log", metavar="LOG", type=Path, help="ROS bag, or MRPT .rawlog")
+    parser.add_argument("--map", required=True, type=Path, help="map_server .yaml, or MRPT .gridmap[.gz]")
+    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for the results")
+    parser.add_argument("--ground-truth", metavar="TOPIC_OR_FILE",
+                        help="poses in the map: a PoseStamped, PoseWithCovarianceStamped or Odometry topic, a TUM "
+                             "file, or MRPT's _GT.txt; default: /ground_truth of a bag, LOG_GT.txt beside a "
+                             "rawlog; none: no ground truth")
+    parser.add_argument("--params", type=Path, metavar="FILE",
+                        help="yaml of parameters, names as for the node; default: the node's defaults")
+    parser.add_argument("--seed", type=int, default=0, help="of the filter's random numbers (default 0)")
+    start = parser.add_argument_group("start")
+    start.add_argument("--initial-pose", type=float, nargs=3, metavar=("X", "Y", "YAW"),
+                       help="m, m, rad; default: the ground truth's pose at the first scan, else initial_pose_* "
+                            "of the parameters")
+    start.add_argument("--initial-cov", type=float, nargs=3, metavar=("XX", "YY", "AA"),
+                       help="m^2, m^2, rad^2; default: initial_cov_* of the parameters")
+    start.add_argument("--global", dest="everywhere", action="store_true",
+                       help="start anywhere in the map instead of at a pose")
+    source = parser.add_argument_group("what to take from the log")
+    source.add_argument("--scan-topic", metavar="TOPIC",
+                        help="LaserScan (of a rawlog: the sensor's label); default: the only one, or /scan")
+    source.add_argument("--odom-topic", metavar="TOPIC", help="Odometry; default: tf odom <- base, else the only one")
+    source.add_argument("--odom-frame", metavar="FRAME", help="default: odom")
+    source.add_argument("--base-frame", metavar="FRAME", help="default: base_link, else base_footprint")
+    source.add_argument("--laser-pose", type=float, nargs=3, metavar=("X", "Y", "YAW"),
+                        help="of the laser on the robot, for logs without its tf; m, m, rad")
+    part = parser.add_argument_group("part of the log")
+    part.add_argument("--start", type=float, default=0.0, metavar="S", help="seconds after the first scan")
+    part.add_argument("--duration", type=float, metavar="S", help="seconds from there")
+    part.add_argument("--every", type=int, default=1, metavar="N", help="only each N-th scan")
+    part.add_argument("--max-scans", type=int, metavar="N")
+    parser.add_argument("--no-picture", action="store_true", help="do not draw trajectory.png")
+
+
+def usage_error(arguments: argparse.Namespace) -> Optional[str]:
+    """What is wrong with the options as such, before any file is opened."""
+    if arguments.seed < 0:
+        return f"--seed must be >= 0, got {arguments.seed}"
+    if arguments.everywhere and arguments.initial_pose is not None:
+        return "--global and --initial-pose exclude each other"
+    try:
+        _window(arguments)
+    except ValueError as err:
+        return str(err)
+    return None
+
+
+def main(arguments: argparse.Namespace) -> None:
+    """Open, run, write.
+
+    Raises:
+        RecordingError, MapError, ParamError, ValueError, OSError: bad input; one line.
+    """
+    settings, unused = (ReplayParams(), []) if arguments.params is None else replay_params.load(arguments.params)
+    grid_map = map_file.load(arguments.map)
+    recording = open_log(arguments.log, _log_options(arguments, settings.start))
+    notes = list(recording.notes)
+    if unused:
+        notes.append(f"parameters that only a node uses: {', '.join(unused)}")
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    mcl = GlassMcl(settings.mcl, grid_map, np.random.default_rng(arguments.seed))
+    start, origin = _start(mcl, recording, arguments, settings.start)
+    notes.append(f"start: {origin}")
+    for note in notes:
+        _say(note)
+    window = _window(arguments)
+    progress = Progress("replay", window.expected(len(recording)))
+    try:
+        result = replay_run.run(recording, mcl, start, arguments.seed, window, progress.step)
+    finally:
+        progress.finish()
+    about = {"log": str(arguments.log), "map": str(arguments.map), "start": origin, "notes": notes,
+             "params": params.as_mapping(settings.mcl), "versions": versions()}
+    replay_result.write(result, arguments.out, about)
+    if not arguments.no_picture:
+        image = pictures.MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid)
+        pictures.draw_trajectory(arguments.out / "trajectory.png", image, result, recording.name)
+    for reason, count in result.refusals.most_common():
+        _say(f"{count} scans refused: {reason}")
+    print(table(result))
+    print(f"written to {arguments.out}")
+
+
+def versions() -> Dict[str, str]:
+    """Of what the numbers depend on."""
+    import scipy
+
+    return {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__,
+            "machine": platform.machine()}
+
+
+def table(result: ReplayResult) -> str:
+    """The figures of a run for people."""
+    figures = result.metrics()
+    lines = [f"{figures['scans']} scans, {figures['updates']} updates, {figures['scans_refused']} refused; "
+             f"{figures['cpu_ms_per_scan']:.1f} ms CPU per scan, {figures['times_real_time']:.1f} times real time"]
+    if figures["position_mean_m"] is not None or result.errors.matched.any():
+        lines.append("position error  " + "  ".join(
+            f"{name} {_metres(figures[f'position_{name}_m'])}" for name in ("mean", "median", "rmse", "p95", "max")))
+        lines.append(f"yaw error       mean {figures['yaw_mean_deg']:.2f} deg  "
+                     f"median {figures['yaw_median_deg']:.2f} deg  p95 {figures['yaw_p95_deg']:.2f} deg")
+        lines.append(f"lost            {100 * figures['lost_share']:.1f} % of the scans more than 0.5 m off, "
+                     f"{100 * figures['lost_1m_share']:.1f} % more than 1 m")
+    names = ("uncertain", "diffuse", "specular", "first penetration", "second penetration")
+    lines.append("beam cases      " + "  ".join(
+        f"{name} {100 * figures['case_share'][str(case)]:.1f} %" for case, name in enumerate(names)))
+    return "\n".join(lines)
+
+
+def _metres(value: Optional[float]) -> str:
+    return "infinite" if value is None else f"{value:.3f} m"
+
+
+def _window(arguments: argparse.Namespace) -> Window:
+    return Window(arguments.start, arguments.duration, arguments.every, arguments.max_scans)
+
+
+def _log_options(arguments: argparse.Namespace, start: StartParams) -> LogOptions:
+    """The command first, then a frame that the parameters name and that is not just the default."""
+    default = StartParams()
+    odom_frame = start.odom_frame_id if start.odom_frame_id != default.odom_frame_id else None
+    base_frame = start.base_frame_id if start.base_frame_id != default.base_frame_id else None
+    pose = arguments.laser_pose
+    return LogOptions(arguments.scan_topic, arguments.odom_topic, arguments.base_frame or base_frame,
+                      arguments.odom_frame or odom_frame, None if pose is None else (pose[0], pose[1], pose[2]),
+                      arguments.ground_truth)
+
+
+def _start(mcl: GlassMcl, recording: Recording, arguments: argparse.Namespace,
+           defaults: StartParams) -> Tuple[Callable[[int], None], str]:
+    """What places the particles at the first scan, and a text that says where."""
+    covariance = defaults.covariance if arguments.initial_cov is None else np.diag(arguments.initial_cov)
+    truth = recording.ground_truth
+    if arguments.everywhere:
+        return lambda stamp_ns: mcl.scatter(), "anywhere in the map"
+    if arguments.initial_pose is not None:
+        return lambda stamp_ns: mcl.set_pose(np.array(arguments.initial_pose), covariance), "--initial-pose"
+    if truth is not None and len(truth):
+        return lambda stamp_ns: mcl.set_pose(truth.at(np.int64(stamp_ns)), covariance), "the ground truth's first pose"
+    return lambda stamp_ns: mcl.set_pose(defaults.pose, covariance), "initial_pose_* of the parameters"
+
+
+def _say(text: str) -> None:
+    print(f"glass_nav replay: {text}", file=sys.stderr)

@@ -1,0 +1,138 @@
+"""A recording through the filter, scan by scan: the loop of the replay. Drops nothing, knows no clock."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from dataclasses import dataclass
+from typing import Callable, Iterable, Iterator, List, Optional
+
+import numpy as np
+
+from glass_nav.evaluation.replay_result import NO_BEAM, ReplayResult
+from glass_nav.localization.glass_mcl import Estimate, GlassMcl
+from glass_nav.recording.recording import Entry, Recording, RecordingError, Refusal, Step
+from glass_nav.sensing.scan import ScanError
+
+
+@dataclass(frozen=True)
+class Window:
+    """Which part of a log to replay."""
+    start_s: float = 0.0                # from the first scan on
+    duration_s: Optional[float] = None  # to the end
+    every: int = 1                      # 2: each second scan
+    max_scans: Optional[int] = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.start_s < float("inf"):
+            raise ValueError(f"--start must be >= 0 s, got {self.start_s}")
+        if self.duration_s is not None and not self.duration_s > 0.0:
+            raise ValueError(f"--duration must be > 0 s, got {self.duration_s}")
+        if self.every < 1:
+            raise ValueError(f"--every must be >= 1, got {self.every}")
+        if self.max_scans is not None and self.max_scans < 1:
+            raise ValueError(f"--max-scans must be >= 1, got {self.max_scans}")
+
+    def expected(self, scan_count: int) -> int:
+        """About how many of so many scans: for a progress bar."""
+        count = -(-scan_count // self.every)
+        return count if self.max_scans is None else min(count, self.max_scans)
+
+    def of(self, entries: Iterable[Entry]) -> Iterator[Entry]:
+        """The entries of that part; refused scans within it are kept, to be counted."""
+        first_ns: Optional[int] = None
+        seen = taken = 0
+        for entry in entries:
+            stamp_ns = entry.scan.stamp_ns if isinstance(entry, Step) else entry.stamp_ns
+            if first_ns is None and isinstance(entry, Step):
+                first_ns = stamp_ns
+            since_s = 0.0 if first_ns is None else (stamp_ns - first_ns) * 1e-9
+            if isinstance(entry, Refusal):
+                if since_s >= self.start_s:
+                    yield entry
+                continue
+            if self.duration_s is not None and since_s > self.start_s + self.duration_s:
+                return
+            if since_s < self.start_s:
+                continue
+            seen += 1
+            if (seen - 1) % self.every:
+                continue
+            taken += 1
+            yield entry
+            if taken == self.max_scans:
+                return
+
+
+def run(recording: Recording, mcl: GlassMcl, start: Callable[[int], None], seed: int,
+        window: Optional[Window] = None, step_done: Callable[[], None] = lambda: None) -> ReplayResult:
+    """Replay a recording.
+
+    Args:
+        recording: the log.
+        mcl: a fresh filter.
+        start: called once with the stamp [ns] of the first scan, before it is used: places the particles.
+        seed: what the filter's random numbers were seeded with; for the result.
+        window: the part of the log, all of it when not given.
+        step_done: called after each scan.
+
+    Raises:
+        RecordingError: not one scan of the log can be used.
+    """
+    began = time.perf_counter()
+    rows: List[_Row] = []
+    refusals: "Counter[str]" = Counter()
+    for entry in (Window() if window is None else window).of(recording):
+        if isinstance(entry, Refusal):
+            refusals[entry.reason] += 1
+        else:
+            try:
+                if not rows:
+                    start(entry.scan.stamp_ns)
+                before = time.process_time()
+                estimate = mcl.update(entry.scan, entry.odom_from_base)
+                rows.append(_Row(entry.odom_from_base, estimate, 1e3 * (time.process_time() - before)))
+            except ScanError as err:
+                refusals[str(err).partition(": ")[2]] += 1
+        step_done()
+    if not rows:
+        raise RecordingError(f"{recording.name}: {_nothing_usable(refusals)}")
+    return _result(rows, refusals, recording, time.perf_counter() - began, seed)
+
+
+class _Row:
+    """What is kept of one scan: not the particles themselves, a long log would not fit."""
+
+    def __init__(self, odom_from_base: np.ndarray, estimate: Estimate, cpu_ms: float) -> None:
+        self.odom_from_base, self.cpu_ms = odom_from_base, cpu_ms
+        self.stamp_ns, self.map_from_base = estimate.stamp_ns, estimate.map_from_base
+        self.deviation = np.sqrt(np.maximum(np.diag(estimate.covariance), 0.0))
+        self.state, self.reason = estimate.state, estimate.reason
+        self.used_share, self.updated = estimate.used_share, estimate.updated
+        self.particles, self.case = len(estimate.particles), estimate.cases.case
+
+
+def _nothing_usable(refusals: "Counter[str]") -> str:
+    if not refusals:
+        return "no scan in the part to be replayed"
+    most = "; ".join(f"{count} times: {reason}" for reason, count in refusals.most_common(3))
+    return f"none of its {sum(refusals.values())} scans can be used; {most}"
+
+
+def _result(rows: List[_Row], refusals: "Counter[str]", recording: Recording, wall_s: float,
+            seed: int) -> ReplayResult:
+    cases = np.full((len(rows), max(len(row.case) for row in rows)), NO_BEAM, np.uint8)
+    for to, row in zip(cases, rows):
+        to[:len(row.case)] = row.case
+    return ReplayResult(
+        stamps_ns=np.array([row.stamp_ns for row in rows], np.int64),
+        map_from_base=np.array([row.map_from_base for row in rows], float),
+        odom_from_base=np.array([row.odom_from_base for row in rows], float),
+        deviation=np.array([row.deviation for row in rows], float),
+        states=[row.state for row in rows],
+        reasons=[row.reason for row in rows],
+        used_share=np.array([row.used_share for row in rows], float),
+        updated=np.array([row.updated for row in rows], bool),
+        particles=np.array([row.particles for row in rows], int),
+        cpu_ms=np.array([row.cpu_ms for row in rows], float),
+        cases=cases, refusals=refusals, reference=recording.ground_truth, wall_s=wall_s, seed=seed)
