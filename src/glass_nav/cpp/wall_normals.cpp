@@ -27,77 +27,105 @@ std::vector<std::uint8_t> boundary_of(const std::vector<std::uint8_t>& occupied,
   return boundary;
 }
 
-/// Sums of the cell centres of one patch of wall, relative to its middle cell.
+/// Weighted sums of the cell centres of one patch of wall, relative to its middle cell.
 struct Moments {
-  double count = 0.0, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0, yy = 0.0;
+  double weight = 0.0, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0, yy = 0.0;
 
-  void add(double px, double py) {
-    count += 1.0;
-    x += px;
-    y += py;
-    xx += px * px;
-    xy += px * py;
-    yy += py * py;
+  void add(double w, double px, double py) {
+    weight += w;
+    x += w * px;
+    y += w * py;
+    xx += w * px * px;
+    xy += w * px * py;
+    yy += w * py * py;
   }
 };
 
-/// Collects the cells connected with one cell, within the radius around it.
+/// A straight line through the cells of a patch: principal axes of their centres.
+struct Line {
+  double mean_x = 0.0, mean_y = 0.0;
+  double along_rad = 0.0;  // (-pi/2, pi/2]
+  double linearity = 0.0;  // 0: the cells give no direction
+
+  explicit Line(const Moments& m) : mean_x(m.x / m.weight), mean_y(m.y / m.weight) {
+    const double xx = m.xx / m.weight - mean_x * mean_x;
+    const double xy = m.xy / m.weight - mean_x * mean_y;
+    const double yy = m.yy / m.weight - mean_y * mean_y;
+    const double middle = 0.5 * (xx + yy), spread = std::hypot(0.5 * (xx - yy), xy);
+    if (spread <= 1e-9) return;  // one cell, or a patch as wide as long
+    along_rad = 0.5 * std::atan2(2.0 * xy, xx - yy);
+    linearity = 2.0 * spread / (middle + spread);
+  }
+
+  double distance(double x, double y) const {
+    return std::abs((y - mean_y) * std::cos(along_rad) - (x - mean_x) * std::sin(along_rad));
+  }
+};
+
+/// Collects the boundary cells around one cell that are connected with it.
 class Patch {
  public:
   Patch(const std::vector<std::uint8_t>& boundary, int width, int height)
       : boundary_(boundary), width_(width), height_(height) {}
 
-  Moments around(int x, int y) {
-    seen_.fill(false);
+  /// All cells within the radius. Each counts the same: this fit is to see corners and posts.
+  Line shape_at(int x, int y) {
     Moments moments;
-    std::size_t filled = 0;
-    visit(0, 0, filled);
-    for (std::size_t i = 0; i < filled; ++i) {
-      const auto [dx, dy] = found_[i];
-      moments.add(dx, dy);
-      for (int ny = dy - 1; ny <= dy + 1; ++ny) {
-        for (int nx = dx - 1; nx <= dx + 1; ++nx) {
-          if (belongs(x, y, nx, ny)) visit(nx, ny, filled);
-        }
-      }
-    }
-    return moments;
+    collect(x, y, WallNormals::kRadiusCells, [](int, int) { return true; });
+    for (const auto& [dx, dy] : found_) moments.add(1.0, dx, dy);
+    return Line(moments);
+  }
+
+  /// The same wall over a longer stretch. Twice the length makes the staircase of cells a third as steep; the weight
+  /// falls off towards the ends, so that no step there tilts the line.
+  Line refined(int x, int y, const Line& shape) {
+    Moments moments;
+    const int radius = WallNormals::kStretchCells;
+    collect(x, y, radius, [&](int dx, int dy) { return shape.distance(dx, dy) <= kBesideLine; });
+    for (const auto& [dx, dy] : found_) moments.add(1.0 - (dx * dx + dy * dy) / (radius * radius + 1.0), dx, dy);
+    return Line(moments);
   }
 
  private:
-  static constexpr int kRadius = WallNormals::kRadiusCells;
-  static constexpr int kSide = 2 * kRadius + 1;
+  static constexpr int kBridge = 2;           // cells; a gap of one missing cell does not part a wall
+  static constexpr double kBesideLine = 2.5;  // cells from the line: both faces of a wall three cells thick
+  static constexpr int kReach = WallNormals::kStretchCells;
+  static constexpr int kSide = 2 * kReach + 1;
 
-  static std::size_t slot(int dx, int dy) { return (dy + kRadius) * kSide + (dx + kRadius); }
-
-  bool belongs(int x, int y, int dx, int dy) const {
-    if (dx * dx + dy * dy > kRadius * kRadius || seen_[slot(dx, dy)]) return false;
-    const int cx = x + dx, cy = y + dy;
-    return cx >= 0 && cy >= 0 && cx < width_ && cy < height_ &&
-           boundary_[cx + static_cast<std::size_t>(cy) * width_] != 0;
-  }
-
-  void visit(int dx, int dy, std::size_t& filled) {
-    seen_[slot(dx, dy)] = true;
-    found_[filled++] = {dx, dy};
+  template <class Wanted>
+  void collect(int x, int y, int radius, const Wanted& wanted) {
+    seen_.fill(false);
+    found_.clear();
+    const auto visit = [&](int dx, int dy) {
+      const int cx = x + dx, cy = y + dy;
+      if (dx * dx + dy * dy > radius * radius || cx < 0 || cy < 0 || cx >= width_ || cy >= height_) return;
+      bool& seen = seen_[(dy + kReach) * kSide + (dx + kReach)];
+      if (seen || boundary_[cx + static_cast<std::size_t>(cy) * width_] == 0) return;
+      seen = true;
+      if (wanted(dx, dy) || (dx == 0 && dy == 0)) found_.push_back({dx, dy});
+    };
+    visit(0, 0);
+    for (std::size_t i = 0; i < found_.size(); ++i) {
+      const auto [dx, dy] = found_[i];
+      for (int ny = dy - kBridge; ny <= dy + kBridge; ++ny) {
+        for (int nx = dx - kBridge; nx <= dx + kBridge; ++nx) visit(nx, ny);
+      }
+    }
   }
 
   const std::vector<std::uint8_t>& boundary_;
   int width_, height_;
   std::array<bool, kSide * kSide> seen_{};
-  std::array<std::array<int, 2>, kSide * kSide> found_{};
+  std::vector<std::array<int, 2>> found_;
 };
 
-WallNormals::Normal normal_of(const Moments& m) {
-  const double mean_x = m.x / m.count, mean_y = m.y / m.count;
-  const double xx = m.xx / m.count - mean_x * mean_x;
-  const double xy = m.xy / m.count - mean_x * mean_y;
-  const double yy = m.yy / m.count - mean_y * mean_y;
-  const double middle = 0.5 * (xx + yy), spread = std::hypot(0.5 * (xx - yy), xy);
-  if (spread <= 1e-9) return kNone;  // one cell, or as wide as long
-  const double along = 0.5 * std::atan2(2.0 * xy, xx - yy);  // (-pi/2, pi/2]
+WallNormals::Normal normal_at(int x, int y, Patch& patch) {
+  constexpr double kWorthRefining = 0.7;  // below it there is no line to be beside
+  const Line shape = patch.shape_at(x, y);
+  if (shape.linearity == 0.0) return kNone;
+  const double along = shape.linearity < kWorthRefining ? shape.along_rad : patch.refined(x, y, shape).along_rad;
   const double across = along > 0.0 ? along - 0.5 * kPi : along + 0.5 * kPi;
-  return {static_cast<float>(across), static_cast<float>(2.0 * spread / (middle + spread))};
+  return {static_cast<float>(across), static_cast<float>(shape.linearity)};
 }
 
 }  // namespace
@@ -112,7 +140,7 @@ WallNormals::WallNormals(const std::vector<std::uint8_t>& occupied, int width, i
       const std::int32_t cell = y * width + x;
       if (boundary[cell] == 0) continue;
       cells_.push_back(cell);
-      normals_.push_back(normal_of(patch.around(x, y)));
+      normals_.push_back(normal_at(x, y, patch));
     }
   }
   row_begin_.push_back(static_cast<std::int32_t>(cells_.size()));

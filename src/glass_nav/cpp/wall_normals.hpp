@@ -8,11 +8,13 @@ namespace glass_nav {
 
 /// Normals of all occupied cells that a ray may meet first: those with a side towards a cell that is not occupied.
 ///
-/// The normal of a cell is that of the straight line through the boundary cells that are connected with it within
-/// kRadiusCells (principal axes of their centres). Connected, so that the pane behind does not bend this one.
+/// The line through the boundary cells connected with a cell within kRadiusCells tells whether there is a straight wall
+/// (connected, so that the pane behind does not bend this one); where there is, the direction comes from the cells
+/// along that line within kStretchCells, which is twice as precise.
 class WallNormals {
  public:
   static constexpr int kRadiusCells = 8;
+  static constexpr int kStretchCells = 16;
 
   struct Normal {
     float angle_rad;  // in (-pi/2, pi/2]: the sign is the ray's business; NaN where there is none
