@@ -32,6 +32,7 @@ from glass_nav.localization.glass_mcl import Estimate, GlassMcl
 from glass_nav.msg import BeamCases, LocalizationStatus
 from glass_nav.ros import conversions, params
 from glass_nav.ros.diagnostics import Diagnostics
+from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Errand, Mailbox, WaitingScans
 from glass_nav.sensing.scan import ScanError
 from glass_nav.world.grid_map import GridMap
@@ -41,6 +42,7 @@ STALE_SCANS = 20        # that many older scans in a row: the lidar's clock was 
 GUESS_WAIT_S = 1.0      # how long an initialpose waits for a scan at or after its stamp
 NO_SCAN_WARNING_S = 15.0  # as AMCL
 SILENCE_S = 2.0         # without a used scan for that long, ~status says why
+SETTLING_S = 5.0        # map server and player of a launch file need some seconds: no warning before
 ERRAND_TIMEOUT_S = 30.0
 
 
@@ -64,11 +66,13 @@ class LocalizationNode:
         self._start: Optional[_Start] = None  # waits for its scan
         self._restart_pose = (p.node.initial_pose, p.node.initial_covariance)  # where a bag starts over
         self._publish_pose = True
+        self._log = LogThrottle()
         self._inbox = Mailbox(scans=100, commands=100)
         self._waiting: WaitingScans[LaserScan] = WaitingScans(100, p.node.transform_wait_s)
         self._now_s = rospy.get_time()
         self._last_scan_s = self._last_estimate_s = self._now_s
         self._stale_scans = 0
+        self._started_s = time.monotonic()
         self._next_report_s = self._next_map_request_s = 0.0  # by the monotonic clock
         self._last_save_s = self._last_cloud_s = self._last_particles_s = 0.0  # by ROS time
         self._trouble = "no scan used yet"
@@ -125,7 +129,7 @@ class LocalizationNode:
             for name, index in (("xx", 0), ("yy", 1), ("aa", 2)):
                 rospy.set_param(f"~initial_cov_{name}", float(covariance[index, index]))
         except OSError as err:
-            rospy.logwarn_throttle(60.0, f"the pose is not saved: no parameter server ({err})")
+            self._log.warn(f"the pose is not saved: no parameter server ({err})", period_s=60.0)
 
     # -- callbacks of other threads: they store, services also wait for the outcome
 
@@ -179,10 +183,11 @@ class LocalizationNode:
             self._use_map(conversions.map_from_msg(msg), msg.header.frame_id, f"service {name}")
         except (rospy.ROSException, rospy.ServiceException) as err:
             self._trouble = f"no map: service {name} does not answer"
-            rospy.logwarn_throttle(5.0, f"{self._trouble} ({err})")
+            if self._settled():
+                self._log.warn(f"{self._trouble} ({err})")
         except ValueError as err:
             self._trouble = f"no map: the one of service {name} is refused: {err}"
-            rospy.logerr_throttle(5.0, self._trouble)
+            self._log.error(self._trouble)
 
     def _take_map_topic(self, msg: OccupancyGrid) -> None:
         if self._map is not None and self._p.first_map_only:
@@ -294,7 +299,7 @@ class LocalizationNode:
     def _refuse(self, why: str) -> None:
         self._waiting.counts.refused += 1
         self._trouble = f"scan refused: {why}"
-        rospy.logwarn_throttle(5.0, self._trouble)
+        self._log.warn(self._trouble)
 
     def _transform_pairs(self, msg: LaserScan) -> "List[tuple[str, str]]":
         return [(self._p.odom_frame_id, self._p.base_frame_id),
@@ -312,9 +317,9 @@ class LocalizationNode:
                 self._tf.lookup_transform(target, source, msg.header.stamp)
             except tf2_ros.TransformException as err:
                 self._trouble = f"no transform {target} <- {source} at the scan's stamp: {err}"
-                rospy.logwarn_throttle(5.0, f"scan dropped after {wait}: {self._trouble}")
+                self._log.warn(f"scan dropped after {wait}: {self._trouble}")
                 return
-        rospy.logwarn_throttle(5.0, f"scan dropped: its transform came later than {wait}")
+        self._log.warn(f"scan dropped: its transform came later than {wait}")
 
     def _step(self, msg: LaserScan) -> None:
         """One scan through the filter."""
@@ -349,7 +354,7 @@ class LocalizationNode:
         self._diagnostics.add_update(time.process_time() - started)
         if not conversions.is_finite(estimate):
             self._waiting.counts.refused += 1
-            rospy.logerr_throttle(5.0, "the filter's pose is not finite: nothing is published")
+            self._log.error("the filter's pose is not finite: nothing is published")
             return
         self._waiting.counts.used += 1
         self._estimate, self._last_estimate_s = estimate, self._now_s
@@ -429,11 +434,15 @@ class LocalizationNode:
                 trouble, float("nan")))
         self._diagnostics.publish(self._estimate, trouble)
 
+    def _settled(self) -> bool:
+        return time.monotonic() - self._started_s > SETTLING_S
+
     def _missing(self) -> Optional[str]:
         """Why no scan is being used; None while all is well."""
         if self._now_s == 0.0:
             trouble = "time stands still: /use_sim_time is set and nothing publishes /clock"
-            rospy.logwarn_throttle_identical(NO_SCAN_WARNING_S, trouble)
+            if self._settled():
+                self._log.warn(trouble, NO_SCAN_WARNING_S)
             return trouble
         without_scan_s = self._now_s - self._last_scan_s
         topic = rospy.resolve_name("scan")
@@ -441,7 +450,7 @@ class LocalizationNode:
                    + ("its publisher is silent" if self._scan_input.get_num_connections()
                       else "nobody publishes it"))
         if without_scan_s > NO_SCAN_WARNING_S:
-            rospy.logwarn_throttle(NO_SCAN_WARNING_S, silence)
+            self._log.warn(silence, NO_SCAN_WARNING_S)
         if self._mcl is None:
             return self._trouble if self._trouble.startswith("no map") else "no map yet"
         if without_scan_s > SILENCE_S:

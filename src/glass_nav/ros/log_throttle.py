@@ -1,0 +1,42 @@
+"""One line of a kind now and then: a warning at scan rate would bury the others."""
+
+from __future__ import annotations
+
+import re
+import time
+from typing import Dict
+
+import rospy
+
+_NUMBER = re.compile(r"\d+(\.\d+)?")
+_MAX_KINDS = 200
+
+
+class LogThrottle:
+    """Says a line unless one that differs from it in its numbers only was said a moment ago.
+
+    rospy's own throttles go by the place in the code, where two reasons hide each other, or by the
+    exact text, which a stamp makes new each time. Periods are of the wall clock: ROS time may stand still.
+    """
+
+    def __init__(self) -> None:
+        self._said_s: Dict[str, float] = {}  # kind of line -> when last [s]
+
+    def is_due(self, text: str, period_s: float) -> bool:
+        """Whether a line of that kind may be said; it is noted as said then."""
+        kind = _NUMBER.sub("#", text)
+        now_s = time.monotonic()
+        if now_s - self._said_s.get(kind, -period_s) < period_s:
+            return False
+        if len(self._said_s) >= _MAX_KINDS:
+            self._said_s.clear()
+        self._said_s[kind] = now_s
+        return True
+
+    def warn(self, text: str, period_s: float = 5.0) -> None:
+        if self.is_due(text, period_s):
+            rospy.logwarn(text)
+
+    def error(self, text: str, period_s: float = 5.0) -> None:
+        if self.is_due(text, period_s):
+            rospy.logerr(text)
