@@ -7,13 +7,19 @@ for scans) with one line for the log. B beams, P particles.
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 
-import rospy
 import numpy as np
-from geometry_msgs.msg import (Pose, PoseArray, PoseWithCovarianceStamped, Quaternion, Transform,
-                               TransformStamped)
+import rospy
+from geometry_msgs.msg import (
+    Pose,
+    PoseArray,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    Transform,
+    TransformStamped,
+)
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
@@ -255,8 +261,9 @@ def beam_cloud(scan: Scan, cases: BeamCases, height_m: float, base_frame: str) -
     """
     answered = scan.answered
     red, green, blue = CASE_COLOURS[cases.case[answered]].T
-    points = np.empty((int(answered.sum()), len(_CLOUD_FIELDS)), dtype="<f4")
-    points[:, :2] = scan.points_in_base()[answered]
+    ends = replace(scan, ranges_m=scan.ranges_m[answered], angles_rad=scan.angles_rad[answered])
+    points = np.empty((len(ends), len(_CLOUD_FIELDS)), dtype="<f4")
+    points[:, :2] = ends.points_in_base()
     points[:, 2] = height_m
     points[:, 3] = (red << 16 | green << 8 | blue).astype("<u4").view("<f4")  # PCL's packing
     for column, values in enumerate((cases.case, scan.ranges_m, cases.expected_m, cases.residual_m,
