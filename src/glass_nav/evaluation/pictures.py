@@ -156,8 +156,10 @@ def _draw_errors(axes: Any, result: ReplayResult) -> None:
     present = sorted(set(result.states), key=lambda state: list(STATE_COLOURS).index(state)
                      if state in STATE_COLOURS else len(STATE_COLOURS))
     states = np.array(result.states)
-    for state in present:  # a ribbon along the time axis
-        axes.fill_between(seconds, -RIBBON * top, -0.25 * RIBBON * top, where=states == state, step="post",
+    for state in present:  # a ribbon along the time axis; each scan's state holds until the next scan
+        holds = states == state
+        holds[1:] |= states[:-1] == state
+        axes.fill_between(seconds, -RIBBON * top, -0.25 * RIBBON * top, where=holds, step="post",
                           color=STATE_COLOURS.get(state, "#000000"), linewidth=0)
     axes.legend(handles=[Patch(color=STATE_COLOURS.get(state, "#000000"), label=state) for state in present],
                 loc="upper right", fontsize=8, ncol=len(present), framealpha=0.9)

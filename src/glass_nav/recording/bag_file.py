@@ -36,13 +36,18 @@ def open_log(path: Path, options: LogOptions) -> Recording:
     """
     notes: List[str] = []
     with _Bag(path) as bag:
-        scan_topic = _scan_topic(bag, options.scan_topic, notes)
-        tree = _frame_tree(bag)
-        odometry = _odometry(bag, tree, options, notes)
-        base_frame = _base_frame(bag, tree, odometry, options)
-        _check_laser(bag, scan_topic, tree, base_frame, options)
-        truth = _ground_truth(bag, options.ground_truth, notes)
-        scan_count = bag.count(scan_topic)
+        try:
+            scan_topic = _scan_topic(bag, options.scan_topic, notes)
+            tree = _frame_tree(bag)
+            odometry = _odometry(bag, tree, options, notes)
+            base_frame = _base_frame(bag, tree, odometry, options)
+            _check_laser(bag, scan_topic, tree, base_frame, options)
+            truth = _ground_truth(bag, options.ground_truth, notes)
+            scan_count = bag.count(scan_topic)
+        except RecordingError as err:  # it may be missing because of the damage
+            raise (RecordingError(f"{err}; {bag.damage}") if bag.damage else err) from err
+        if bag.damage:
+            notes.append(bag.damage)
     entries = _Entries(path, scan_topic, tree, odometry, base_frame, options.laser_pose)
     return Recording(path.name, scan_count, entries, truth, notes)
 
@@ -52,6 +57,7 @@ class _Bag:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.damage = ""  # where reading had to stop, in words
         self._reader: Any = None
 
     def __enter__(self) -> "_Bag":
@@ -65,7 +71,7 @@ class _Bag:
         try:
             self._reader = AnyReader([self.path])
             self._reader.open()
-        except Exception as err:  # rosbags lets struct, assertion and decompression errors through
+        except Exception as err:  # rosbags lets errors of struct, asserts and codecs through
             raise RecordingError(f"{self.path}: {_why_unreadable(self.path, err)}") from err
         return self
 
@@ -86,15 +92,24 @@ class _Bag:
         return [topic for topic, kind in self.topics.items() if kind in kinds]
 
     def messages(self, *topics: str) -> "Iterator[Tuple[str, Any]]":
-        """Topic and message in the order they were recorded; RecordingError where the bag is damaged."""
+        """Topic and message in the order they were recorded; ends where the bag is damaged, see `damage`."""
         connections = [connection for connection in self._reader.connections if connection.topic in topics]
         if not connections:
             return
-        try:
-            for connection, _, raw in self._reader.messages(connections=connections):
-                yield connection.topic, self._reader.deserialize(raw, connection.msgtype)
-        except Exception as err:
-            raise RecordingError(f"{self.path}: damaged: {_first_line(err)}") from err
+        count = 0
+        messages = self._reader.messages(connections=connections)
+        while True:
+            try:
+                connection, _, raw = next(messages)
+                message = self._reader.deserialize(raw, connection.msgtype)
+            except StopIteration:
+                return
+            except Exception as err:  # noqa: BLE001  rosbags lets errors of struct, asserts and codecs through
+                self.damage = (f"the bag is damaged, {' and '.join(topics)} cannot be read after {count} messages"
+                               f" ({_first_line(err)})")
+                return
+            count += 1
+            yield connection.topic, message
 
     def check_topic(self, topic: str, *kinds: str) -> str:
         """The topic as the bag spells it, if it is there with one of these types."""
@@ -255,6 +270,8 @@ class _Entries:
                 if isinstance(entry, Step):
                     latest_ns = stamp_ns
                 yield entry
+            if bag.damage:
+                yield Refusal(max(latest_ns, 0), bag.damage)
 
     def _entry(self, message: Any, stamp_ns: int, latest_ns: int) -> Entry:
         if stamp_ns < latest_ns:

@@ -33,7 +33,8 @@ def open_log(path: Path, options: LogOptions) -> Recording:
     except ValueError as err:
         raise RecordingError(f"{path}: {err}") from err
     notes = [f"reading stopped early: the file {log['broken']}"] if log["broken"] else []
-    holds = ", ".join(f"{count} {name.split('::')[-1]}" for name, count in sorted(log["objects"].items()))
+    objects = sorted((name.split("::")[-1], count) for name, count in log["objects"].items())
+    holds = ", ".join(f"{count} {name}" for name, count in objects)
     cut = f"; the file {log['broken']}" if log["broken"] else ""
     scans = _scans(path, log, options, holds + cut, notes)
     if not len(log["odometry"]):

@@ -135,17 +135,17 @@ def _channels(path: Path, path_image: Path) -> np.ndarray:
     if not path_image.is_file():
         raise MapError(f"{path}: its image {path_image} does not exist")
     Image = _image_module()
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # floors of 200 m are no attack
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # floors of 200 m are no attack
+        try:
             image = Image.open(path_image)
-            width, height = image.size
+        except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as err:
+            raise MapError(f"{path}: its image {path_image} cannot be read: {_reason(err)}") from err
+        try:
             image.load()
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as err:
-        if "truncated" in str(err) or "not enough" in str(err):
-            raise MapError(f"{path}: the data of its image {path_image} do not fit its "
-                           f"{width} x {height} pixels: the file is cut short") from err
-        raise MapError(f"{path}: its image {path_image} cannot be read: {_reason(err)}") from err
+        except (OSError, ValueError, SyntaxError, IndexError) as err:
+            raise MapError(f"{path}: the data of its image {path_image} do not fit its {image.width} x "
+                           f"{image.height} pixels: the file is cut short or damaged") from err
     if image.mode.startswith("I"):  # 16 bit: the high byte, as SDL shows it to map_server
         grey = np.asarray(image).astype(np.int64) >> 8
         return np.clip(grey, 0, 255).astype(np.uint8)[..., None]

@@ -1,0 +1,232 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from glass_nav.geometry import se2
+from glass_nav.recording.log_file import open_log
+from glass_nav.recording.recording import LogOptions, RecordingError, Refusal, Step
+
+
+def refusal(path, options=LogOptions()):
+    """The line with which a bag is refused, without the folder it lies in."""
+    with pytest.raises(RecordingError) as caught:
+        list(open_log(path, options))
+    text = str(caught.value)
+    assert "\n" not in text
+    return text.replace(f"{path.parent}/", "")
+
+
+def steps(recording):
+    entries = list(recording)
+    assert all(isinstance(entry, Step) for entry in entries), entries
+    return entries
+
+
+@pytest.mark.parametrize("odometry", ["tf", "topic"])
+@pytest.mark.parametrize("static_laser", [True, False])
+@pytest.mark.parametrize("frame_prefix", ["", "/"])
+def test_scans_come_with_the_odometry_at_their_stamps(room_bag, odometry, static_laser, frame_prefix):
+    bag = room_bag(odometry=odometry, static_laser=static_laser, frame_prefix=frame_prefix)
+    recording = open_log(bag.write())
+    taken = steps(recording)
+    true = bag.poses(bag.stamps_ns)
+    assert [step.scan.stamp_ns for step in taken] == bag.stamps_ns.tolist()
+    np.testing.assert_allclose([step.odom_from_base for step in taken], true - [*true[0, :2], 0.0], atol=1e-9)
+    np.testing.assert_allclose(taken[3].scan.base_from_laser, bag.laser, atol=1e-9)
+    assert len(recording) == bag.scans
+    assert recording.name == "room.bag"
+    assert recording.notes == ["scans from /scan",
+                               "odometry from tf odom <- base_link" if odometry == "tf" else "odometry from /odom",
+                               "ground truth from /ground_truth"]
+
+
+def test_odometry_is_interpolated_between_its_stamps(room_bag):
+    def late(index, fields):
+        return {**fields, "stamp_ns": fields["stamp_ns"] + 25_000_000}
+
+    bag = room_bag(scan_fields=late)
+    taken = steps(open_log(bag.write()))
+    true = bag.poses(bag.stamps_ns + 25_000_000)
+    np.testing.assert_allclose([step.odom_from_base for step in taken],
+                               true - [*bag.poses(bag.stamps_ns[:1])[0, :2], 0.0], atol=2e-4)
+
+
+def test_the_ground_truth_is_a_trajectory_in_the_map(room_bag):
+    bag = room_bag()
+    truth = open_log(bag.write()).ground_truth
+    np.testing.assert_array_equal(truth.stamps_ns, bag.stamps_ns)
+    np.testing.assert_allclose(truth.poses, bag.poses(bag.stamps_ns), atol=1e-9)
+
+
+@pytest.mark.parametrize("roll", [pytest.param(0.0, id="level"), pytest.param(np.pi, id="upside down")])
+def test_scan_points_lie_on_the_walls_however_the_laser_is_mounted(room_bag, roll):
+    bag = room_bag(laser=(0.1, -0.2, 0.7), laser_roll=roll)
+    for step, true in zip(steps(open_log(bag.write())), bag.poses(bag.stamps_ns)):
+        x, y = se2.transform_points(true, step.scan.points_in_base()).T
+        to_wall = np.minimum(np.minimum(np.abs(x), np.abs(x - 6.0)), np.minimum(np.abs(y), np.abs(y - 4.0)))
+        assert to_wall.max() < 1e-4
+
+
+def test_a_laser_on_its_side_is_refused_scan_by_scan(room_bag):
+    bag = room_bag(laser_roll=np.pi / 2)
+    assert {entry.reason for entry in open_log(bag.write())} == {"the laser is tilted by 90 degrees"}
+
+
+def test_a_given_laser_pose_replaces_tf(room_bag):
+    bag = room_bag(laser_tf=False)
+    taken = steps(open_log(bag.write(), LogOptions(laser_pose=(0.4, 0.5, 0.6))))
+    np.testing.assert_array_equal(taken[0].scan.base_from_laser, [0.4, 0.5, 0.6])
+
+
+def test_a_recording_can_be_read_again(room_bag):
+    recording = open_log(room_bag().write())
+    again = recording.in_memory()
+    assert len(list(recording)) == len(list(recording)) == len(list(again)) == len(again) == 20
+    assert again.ground_truth is recording.ground_truth
+
+
+def test_a_compressed_bag_reads_the_same(room_bag):
+    bag = room_bag(compressed=True)
+    assert len(steps(open_log(bag.write()))) == bag.scans
+
+
+@pytest.mark.parametrize("options, note", [
+    (LogOptions(scan_topic="/rear"), "ground truth from /ground_truth"),
+    (LogOptions(scan_topic="rear"), "ground truth from /ground_truth"),  # relative names, as in a launch file
+    (LogOptions(), "scans from /scan")])
+def test_of_several_lasers_one_is_chosen(room_bag, options, note):
+    recording = open_log(room_bag(scan_topics=("/scan", "/rear")).write(), options)
+    assert note in recording.notes
+    assert len(recording) == 20
+
+
+def test_no_ground_truth_is_looked_for_when_told_so(room_bag):
+    assert open_log(room_bag().write(), LogOptions(ground_truth="none")).ground_truth is None
+    bag = room_bag(ground_truth=False)
+    bag.path.unlink()
+    assert open_log(bag.write()).ground_truth is None
+
+
+def test_an_odometry_topic_can_be_the_ground_truth(room_bag):
+    bag = room_bag(odometry="topic")
+    assert len(open_log(bag.write(), LogOptions(odom_topic="/odom", ground_truth="/odom")).ground_truth) == 42
+
+
+def test_a_file_can_be_the_ground_truth(room_bag, tmp_path):
+    (tmp_path / "true.txt").write_text("1000.0 1 2 0 0 0 0 1\n1001.0 2 2 0 0 0 0 1\n")
+    recording = open_log(room_bag().write(), LogOptions(ground_truth=str(tmp_path / "true.txt")))
+    np.testing.assert_allclose(recording.ground_truth.at(np.int64(1_000_500_000_000)), [1.5, 2.0, 0.0])
+
+
+TOPICS = "/ground_truth (geometry_msgs/PoseStamped), /scan (sensor_msgs/LaserScan), /tf (tf2_msgs/TFMessage), " \
+         "/tf_static (tf2_msgs/TFMessage)"
+
+
+@pytest.mark.parametrize("fields, options, text", [
+    ({}, LogOptions(scan_topic="/front"), f"room.bag: no topic /front; it has {TOPICS}"),
+    ({}, LogOptions(scan_topic="/tf"), "room.bag: /tf is tf2_msgs/TFMessage, expected sensor_msgs/LaserScan"),
+    ({}, LogOptions(odom_topic="odom"), f"room.bag: no topic odom; it has {TOPICS}"),
+    ({}, LogOptions(ground_truth="/truth"), f"room.bag: no topic /truth; it has {TOPICS}"),
+    ({}, LogOptions(ground_truth="/scan"),
+     "room.bag: /scan is sensor_msgs/LaserScan, expected geometry_msgs/PoseStamped or "
+     "geometry_msgs/PoseWithCovarianceStamped or nav_msgs/Odometry"),
+    ({}, LogOptions(ground_truth="true.txt"), "true.txt: no such file of poses, and no topic of room.bag"),
+    ({"scan_topics": ("/front", "/rear")}, LogOptions(),
+     "room.bag: 2 topics of sensor_msgs/LaserScan (/front, /rear), choose one with --scan-topic"),
+    ({"scan_topics": ()}, LogOptions(), "room.bag: no topic of sensor_msgs/LaserScan; it has "
+     "/ground_truth (geometry_msgs/PoseStamped), /tf (tf2_msgs/TFMessage), /tf_static (tf2_msgs/TFMessage)"),
+    ({"odometry": "none", "ground_truth": False}, LogOptions(),
+     "room.bag: no odometry: no transform odom <- base_link or base_footprint in tf and no topic of "
+     "nav_msgs/Odometry; it has /scan (sensor_msgs/LaserScan), /tf_static (tf2_msgs/TFMessage)"),
+    ({}, LogOptions(odom_frame="wheels"),
+     "room.bag: no transform wheels <- base_link or base_footprint; frames in tf: base_link, laser, odom"),
+    ({"laser_tf": False}, LogOptions(),
+     "room.bag: no transform base_link <- laser for the laser on /scan; frames in tf: base_link, odom; "
+     "say where it is with --laser-pose X Y YAW"),
+    ({"scan_fields": lambda index, fields: {**fields, "frame": ""}}, LogOptions(),
+     "room.bag: the scans on /scan have no frame_id; say where the laser is with --laser-pose X Y YAW")])
+def test_a_bag_that_lacks_something_is_refused_in_one_line(room_bag, fields, options, text):
+    assert refusal(room_bag(**fields).write(), options) == text
+
+
+@pytest.mark.parametrize("keep, text", [
+    (0, "room.bag: is empty"),
+    (7, "room.bag: is no ROS 1 bag"),
+    (3000, "room.bag: cut short or never closed (its index is missing); `rosbag reindex` may save what it holds"),
+    (-1, "room.bag: cut short or never closed (its index is missing); `rosbag reindex` may save what it holds")])
+def test_a_bag_cut_short_is_refused_in_one_line(room_bag, keep, text):
+    path = room_bag().write()
+    path.write_bytes(path.read_bytes()[:keep])
+    assert refusal(path) == text
+
+
+def test_files_that_are_no_bags_are_refused_in_one_line(tmp_path):
+    (tmp_path / "notes.txt").write_text("not a bag")
+    assert refusal(tmp_path / "notes.txt").startswith("notes.txt: cannot be read: ")
+    assert refusal(tmp_path / "absent.bag") == "absent.bag: does not exist"
+    assert refusal(tmp_path).startswith(f"{tmp_path.name}: is a folder without a bag that can be read: ")
+
+
+def test_a_damaged_bag_gives_what_comes_before_the_damage(room_bag):
+    path = room_bag(scans=400, beams=720).write()
+    content = bytearray(path.read_bytes())
+    middle = len(content) // 2
+    content[middle:middle + 5000] = bytes(5000)
+    path.write_bytes(content)
+    entries = list(open_log(path))
+    assert sum(isinstance(entry, Step) for entry in entries) > 50
+    assert isinstance(entries[-1], Refusal)
+    assert entries[-1].reason.startswith("the bag is damaged, /scan cannot be read after ")
+
+
+def one_bad_scan(**changes):
+    return lambda index, fields: {**fields, **changes} if index == 3 else fields
+
+
+@pytest.mark.parametrize("changes, reason", [
+    ({"angle_increment": 0.0}, "angle_increment must be finite and not 0 rad, got 0.0"),
+    ({"angle_min": float("nan")}, "angle_min must be finite, got nan"),
+    ({"range_max": 0.0}, "range_max must be finite and > 0 m, got 0.0"),
+    ({"range_min": -1.0}, "range_min must be in [0, range_max = 10.0) m, got -1.0"),
+    ({"ranges": []}, "no ranges, a scan needs at least 1"),
+    ({"frame": "elsewhere"}, "no transform base_link <- elsewhere"),
+    ({"stamp_ns": 1_000_000_000_000 - 10**12}, "time runs backwards"),
+    ({"stamp_ns": 1_000_000_000_000 + 10**11}, "no transform odom <- base_link at that time")])
+def test_a_bad_scan_is_refused_and_the_rest_is_used(room_bag, changes, reason):
+    entries = list(open_log(room_bag(scan_fields=one_bad_scan(**changes)).write()))
+    assert [entry.reason for entry in entries if isinstance(entry, Refusal)] == [reason]
+    assert isinstance(entries[3], Refusal)
+    assert len(entries) == 20
+
+
+def test_no_odometry_at_the_time_of_a_scan_refuses_it(room_bag):
+    bag = room_bag(odometry="topic", scan_fields=one_bad_scan(stamp_ns=1_000_000_000_000 + 10**11))
+    assert [entry.reason for entry in open_log(bag.write()) if isinstance(entry, Refusal)] == [
+        "no odometry at that time"]
+
+
+def test_ranges_that_are_no_numbers_are_taken_as_rep_117_says(room_bag):
+    def odd(index, fields):
+        ranges = fields["ranges"].copy()
+        ranges[:4] = np.nan, np.inf, -np.inf, 0.0
+        return {**fields, "ranges": ranges}
+
+    ranges = steps(open_log(room_bag(scan_fields=odd).write()))[0].scan.ranges_m
+    np.testing.assert_array_equal(ranges[:4], [np.nan, np.inf, -np.inf, np.nan])
+    assert np.isfinite(ranges[4:]).all()
+
+
+def test_rosbags_missing_is_said_in_one_line(room_bag, monkeypatch):
+    path = room_bag().write()
+    monkeypatch.setitem(__import__("sys").modules, "rosbags.highlevel", None)
+    assert refusal(path).startswith(
+        "room.bag: reading bags needs the Python package rosbags (pip install rosbags): ")
+
+
+def test_a_real_bag_gives_every_scan(data_dir: Path):
+    recording = open_log(data_dir / "logs" / "olin_mac" / "olin_mac.bag")
+    assert len(steps(recording)) == 357
+    assert recording.ground_truth.covers(np.array([step.scan.stamp_ns for step in recording]), 10**6).all()
