@@ -8,17 +8,19 @@ sample votes with shares, and the more the better it explains the whole scan. N 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Tuple
 
 import numpy as np
 
+from glass_nav.localization.range_residuals import RangeResiduals
 from glass_nav.localization.reference_ranges import ReferenceRanges
 
 UNCERTAIN, DIFFUSE, SPECULAR, FIRST_PENETRATION, SECOND_PENETRATION = range(5)
 VOTE_MODES = ("soft", "paper")
 _TIE_ORDER = (DIFFUSE, FIRST_PENETRATION, SECOND_PENETRATION, SPECULAR)
 _LEAST_COS = 0.2          # a surface seen flatter than 78 degrees is no worse placed than at that
+_GATE_SIGMAS = 3.0
 _PANE_INDEX = 1.51        # of soda-lime glass
 
 
@@ -41,7 +43,6 @@ class CaseVote:
     """How beams are told apart."""
     vote_mode: str = "soft"
     case_gate_m: float = 0.15          # a reference farther from the measured range gets no vote
-    case_sigma_m: float = 0.04         # deviation of range and map together, across the surface
     case_min_share: float = 0.5        # of the vote; a case with less is uncertain
     glass_max_thickness_m: float = 0.2  # a thicker run of occupied cells ends the beam
     normal_min_linearity: float = 0.9
@@ -53,7 +54,7 @@ class CaseVote:
     def __post_init__(self) -> None:
         if self.vote_mode not in VOTE_MODES:
             raise ValueError(f"~vote_mode must be one of {', '.join(VOTE_MODES)}, got {self.vote_mode!r}")
-        for name in ("case_gate_m", "case_sigma_m", "glass_max_thickness_m"):
+        for name in ("case_gate_m", "glass_max_thickness_m"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"~{name} must be > 0 m, got {getattr(self, name)}")
         for name in ("case_min_share", "normal_min_linearity", "prior_specular", "prior_first_penetration",
@@ -71,17 +72,22 @@ class CaseVote:
                       + self.prior_second_penetration + self.prior_uncertain)
 
 
-def classify(measured_m: np.ndarray, references: ReferenceRanges, vote: CaseVote) -> BeamCases:
+def classify(measured_m: np.ndarray, references: ReferenceRanges, residuals: RangeResiduals,
+             vote: CaseVote) -> BeamCases:
     """Cases of the beams of one scan.
 
     Args:
         measured_m: (B,) ranges by REP 117; beams without an answer are uncertain.
         references: of the preliminary samples; sample 0 is the pose that expected_m is told for.
+        residuals: where in a wall beams end, and how widely.
         vote: mode, gate and priors.
     """
     answered = np.isfinite(measured_m)
     ballots = _paper_ballots if vote.vote_mode == "paper" else _soft_ballots
-    share = ballots(measured_m, references, vote)  # (5, B), column sums 1
+    cos = np.maximum(references.cos_incidence, _LEAST_COS)
+    depth = residuals.depth_share * references.thickness_m / cos
+    references = replace(references, range_m=references.range_m + depth)
+    share = ballots(measured_m, references, residuals.sigma_m, vote)  # (5, B), column sums 1
     share[:, ~answered] = np.array([1.0, 0.0, 0.0, 0.0, 0.0])[:, None]
     won = _winner(share)
     case = np.where(answered & (share[won, np.arange(len(won))] >= vote.case_min_share), won, UNCERTAIN)
@@ -105,26 +111,28 @@ def _winner(share: np.ndarray) -> np.ndarray:
     return order[np.argmax(share[order], axis=0)]
 
 
-def _paper_ballots(measured_m: np.ndarray, references: ReferenceRanges, vote: CaseVote) -> np.ndarray:
+def _paper_ballots(measured_m: np.ndarray, references: ReferenceRanges, sigma_m: float,
+                   vote: CaseVote) -> np.ndarray:
     """(5, B) share of the samples whose nearest reference is that case; equal votes."""
     with np.errstate(invalid="ignore"):
         off = np.abs(measured_m - references.range_m)  # (4, N, B)
     order = np.array(_TIE_ORDER) - 1
     nearest = order[np.argmin(np.where(np.isnan(off), np.inf, off)[order], axis=0)]  # first of equals
-    near = np.take_along_axis(off, nearest[None], axis=0)[0] <= vote.case_gate_m
+    near = np.take_along_axis(off, nearest[None], axis=0)[0] <= _gate(sigma_m, vote)
     voted = np.where(near, nearest + 1, UNCERTAIN)
     return np.stack([np.mean(voted == case, axis=0) for case in range(5)])
 
 
-def _soft_ballots(measured_m: np.ndarray, references: ReferenceRanges, vote: CaseVote) -> np.ndarray:
+def _soft_ballots(measured_m: np.ndarray, references: ReferenceRanges, sigma_m: float,
+                  vote: CaseVote) -> np.ndarray:
     """(5, B) posterior over the cases, averaged over the samples by how well each explains the scan."""
     answered = np.isfinite(measured_m)
     z = np.where(answered, measured_m, 0.0)
-    density, plausible = _density(z, references, vote)
+    density, plausible = _density(z, references, sigma_m, _gate(sigma_m, vote))
     prior = np.array([vote.prior_diffuse, vote.prior_specular, vote.prior_first_penetration,
                       vote.prior_second_penetration])
     joint = prior[:, None, None] * density * plausible  # (4, N, B)
-    nothing = vote.prior_uncertain * np.exp(-0.5 * (vote.case_gate_m / vote.case_sigma_m) ** 2 / 2.0)
+    nothing = vote.prior_uncertain * np.exp(-0.25 * (_gate(sigma_m, vote) / sigma_m) ** 2)
     total = joint.sum(axis=0) + nothing
     log_evidence = np.log(total) @ answered  # (N,)
     temper = 4.0 / np.sqrt(max(answered.sum(), 1))  # neighbouring beams err together
@@ -136,13 +144,18 @@ def _soft_ballots(measured_m: np.ndarray, references: ReferenceRanges, vote: Cas
     return share
 
 
-def _density(z: np.ndarray, references: ReferenceRanges,
-             vote: CaseVote) -> Tuple[np.ndarray, np.ndarray]:
+def _gate(sigma_m: float, vote: CaseVote) -> float:
+    """A map that fits badly everywhere needs a wider gate."""
+    return max(vote.case_gate_m, _GATE_SIGMAS * sigma_m)
+
+
+def _density(z: np.ndarray, references: ReferenceRanges, sigma_m: float,
+             gate_m: float) -> Tuple[np.ndarray, np.ndarray]:
     """(4, N, B) how near each reference is, relative to a perfect match, and how possible it is."""
     cos = np.maximum(references.cos_incidence, _LEAST_COS)
     across = (z - references.range_m) * cos
-    density = np.exp(-0.5 * np.minimum((across / vote.case_sigma_m) ** 2, 100.0))
-    density[~(np.abs(across) <= vote.case_gate_m)] = 0.0
+    density = np.exp(-0.5 * np.minimum((across / sigma_m) ** 2, 100.0))
+    density[~(np.abs(across) <= gate_m)] = 0.0
     plausible = np.ones_like(density)
     plausible[SPECULAR - 1] = _mirror_beats_what_is_behind(references)
     return density, plausible

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glass_nav.localization.beam_cases import DIFFUSE
+from glass_nav.localization.range_residuals import RangeResiduals
 from glass_nav.sensing.raycast import RayCaster
 
 _LEAST_COS = 0.2
@@ -27,7 +28,8 @@ class BeamMixture:
     laser_max_beams: int = 60
     laser_z_hit: float = 0.95
     laser_z_rand: float = 0.05
-    laser_sigma_hit: float = 0.05        # [m] across the surface: lidar and map together
+    laser_sigma_hit: float = 0.04        # [m] across the surface, lidar and map together; at least
+    laser_sigma_hit_max: float = 0.2     # [m] at most: the filter learns how well map and lidar agree
     laser_independent_beams: float = 20.0
 
     def __post_init__(self) -> None:
@@ -46,15 +48,17 @@ def choose(case: np.ndarray, count: int) -> np.ndarray:
     return usable[np.linspace(0, len(usable) - 1, count).round().astype(int)]
 
 
-def log_weights(caster: RayCaster, map_from_laser: np.ndarray, angles_rad: np.ndarray,
-                measured_m: np.ndarray, case: np.ndarray, mixture: BeamMixture,
-                max_range_m: float, max_thickness_m: float, min_linearity: float) -> np.ndarray:
+def log_weights(caster: RayCaster, thickness_m: np.ndarray, map_from_laser: np.ndarray, angles_rad: np.ndarray,
+                measured_m: np.ndarray, case: np.ndarray, residuals: RangeResiduals,
+                mixture: BeamMixture, max_range_m: float, max_thickness_m: float, min_linearity: float) -> np.ndarray:
     """Log likelihood of the chosen beams for every particle.
 
     Args:
         caster: of the map.
+        thickness_m: (H * W,) of the map's walls, sensing/wall_thickness.py.
         map_from_laser: (P, 3) the lidar's pose for every particle.
         angles_rad, measured_m, case: (B,) the beams to use, all of case > 0 with finite ranges.
+        residuals: where in a wall beams end, and how widely.
         mixture: how sharply.
         max_range_m: how far to look.
         max_thickness_m, min_linearity: as for the references of the cases.
@@ -82,6 +86,6 @@ def log_weights(caster: RayCaster, map_from_laser: np.ndarray, angles_rad: np.nd
         usable = (cell >= 0) & (linearity[cell] >= min_linearity)
         beam_rad = map_from_laser[:, 2:3] + angle
         cos = np.where(usable, np.maximum(np.abs(np.cos(beam_rad - normal_rad[cell])), _LEAST_COS), 1.0)
-        across = np.minimum(((z - expected) * cos / mixture.laser_sigma_hit) ** 2, 100.0)
+        across = np.minimum((((z - expected) * cos - residuals.depth_share * thickness_m[cell]) / residuals.sigma_m) ** 2, 100.0)
         log_w += np.log(mixture.laser_z_hit * np.exp(-0.5 * across) + mixture.laser_z_rand).sum(axis=1)
     return log_w * min(1.0, mixture.laser_independent_beams / len(case))

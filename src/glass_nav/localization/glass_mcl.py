@@ -8,7 +8,7 @@ the beams that are understood. GlassMcl.update() reads as the document does.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Optional
+from typing import Optional, Tuple
 
 import numpy as np
 
@@ -22,11 +22,14 @@ from glass_nav.localization.motion import OdometryNoise
 from glass_nav.localization.preliminary_samples import PreliminarySamples
 from glass_nav.localization.pose_quality import QualityLimits
 from glass_nav.localization.proposal import Proposal
+from glass_nav.localization.range_residuals import RangeResiduals
+from glass_nav.localization.reference_ranges import ReferenceRanges
 from glass_nav.localization.resampling import ParticleCount
 from glass_nav.localization.scan_anchor import ScanAnchor
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan, ScanError
+from glass_nav.sensing.wall_thickness import wall_thickness
 from glass_nav.world.grid_map import GridMap
 
 
@@ -103,7 +106,9 @@ class GlassMcl:
         self._grid_map = grid_map
         self._caster = RayCaster(grid_map, threads=self._params.schedule.raycast_threads)
         self._field = DistanceField(grid_map)
-        self._anchor = ScanAnchor(self._field, self._params.samples)
+        self._thickness_m = wall_thickness(grid_map)
+        self._anchor = ScanAnchor(self._field)
+        self._residuals = RangeResiduals(0.5, self._params.mixture.laser_sigma_hit)
         self._update_due = True
 
     def set_pose(self, map_from_base: np.ndarray, covariance: np.ndarray) -> None:
@@ -191,7 +196,8 @@ class GlassMcl:
         aligned = self._anchor.find(best.map_from_base, best.covariance, points)
         particles, log_ratio = proposal.draw(predicted, self._weights, aligned, len(beams),
                                              self._params.proposal, self._rng)
-        cases = self._classify(scan, aligned.poses[0], np.zeros((3, 3)))
+        cases, references = self._classify(scan, aligned.poses[0], np.zeros((3, 3)))
+        self._learn(scan, references)
         self._particles = particles
         self._weights = resampling.normalised(log_ratio + self._log_weights(scan, particles, cases))
 
@@ -224,18 +230,26 @@ class GlassMcl:
         """Indices of the answering beams that are aligned, spread evenly."""
         return beam_weights.choose(scan.answered, self._params.proposal.proposal_max_beams)
 
-    def _classify(self, scan: Scan, map_from_base: np.ndarray, covariance: np.ndarray) -> BeamCases:
+    def _classify(self, scan: Scan, map_from_base: np.ndarray, covariance: np.ndarray) -> Tuple[BeamCases, ReferenceRanges]:
         samples = preliminary_samples.around(map_from_base, covariance, self._params.samples)
         vote = self._params.vote
-        references = reference_ranges.of(self._caster, samples, scan, vote.glass_max_thickness_m,
+        references = reference_ranges.of(self._caster, self._thickness_m, samples, scan, vote.glass_max_thickness_m,
                                          vote.normal_min_linearity)
-        return beam_cases.classify(scan.ranges_m, references, vote)
+        return beam_cases.classify(scan.ranges_m, references, self._residuals, vote), references
+
+    def _learn(self, scan: Scan, references: ReferenceRanges) -> None:
+        mixture = self._params.mixture
+        with np.errstate(invalid="ignore"):
+            across = (scan.ranges_m - references.range_m[0, 0]) * references.cos_incidence[0, 0]
+        met = np.isfinite(across)
+        self._residuals = self._residuals.learn(across[met], references.thickness_m[0, 0][met],
+                                                mixture.laser_sigma_hit, mixture.laser_sigma_hit_max)
 
     def _log_weights(self, scan: Scan, particles: np.ndarray, cases: BeamCases) -> np.ndarray:
         chosen = beam_weights.choose(cases.case, self._params.mixture.laser_max_beams)
         return beam_weights.log_weights(
-            self._caster, se2.compose(particles, scan.base_from_laser), scan.angles_rad[chosen],
-            scan.ranges_m[chosen], cases.case[chosen], self._params.mixture, scan.range_max_m,
+            self._caster, self._thickness_m, se2.compose(particles, scan.base_from_laser), scan.angles_rad[chosen],
+            scan.ranges_m[chosen], cases.case[chosen], self._residuals, self._params.mixture, scan.range_max_m,
             self._params.vote.glass_max_thickness_m, self._params.vote.normal_min_linearity)
 
     def _resample(self) -> None:
@@ -252,7 +266,7 @@ class GlassMcl:
         """The pose of the best cluster, carried on by odometry since the last update."""
         map_from_odom = se2.compose(self._best.map_from_base, se2.inverse(self._odom_from_base))
         map_from_base = se2.compose(map_from_odom, odom_from_base)
-        cases = self._classify(scan, map_from_base, self._best.covariance)
+        cases, _ = self._classify(scan, map_from_base, self._best.covariance)
         answered = int(scan.answered.sum())
         used_share = float(np.count_nonzero(cases.case)) / answered if answered else float("nan")
         if updated:

@@ -22,15 +22,17 @@ class ReferenceRanges:
     """What the map offers to explain each beam, as seen from each sample."""
     range_m: np.ndarray          # (4, N, B) along the beam, inf where the map offers nothing
     cos_incidence: np.ndarray    # (4, N, B) |u . n| at the surface that answers; 1 where it has no normal
+    thickness_m: np.ndarray      # (4, N, B) of the wall that answers, as drawn
     pane_incidence: np.ndarray   # (N, B) angle to the normal of the first surface [rad], NaN without one
 
 
-def of(caster: RayCaster, samples: np.ndarray, scan: Scan, max_thickness_m: float,
-       min_linearity: float) -> ReferenceRanges:
+def of(caster: RayCaster, thickness_m: np.ndarray, samples: np.ndarray, scan: Scan,
+       max_thickness_m: float, min_linearity: float) -> ReferenceRanges:
     """References of every beam of the scan from every sample.
 
     Args:
         caster: of the map.
+        thickness_m: (H * W,) of the map's walls, sensing/wall_thickness.py.
         samples: (N, 3) robot poses in map.
         scan: its ranges are not looked at.
         max_thickness_m: a thicker run of occupied cells cannot be glass and ends the ray.
@@ -50,4 +52,5 @@ def of(caster: RayCaster, samples: np.ndarray, scan: Scan, max_thickness_m: floa
     return ReferenceRanges(
         np.stack([hits.first_m, hits.mirrored_m, hits.second_m, hits.third_m]),
         np.stack([first, first, cos_at(hits.second_cell), cos_at(hits.third_cell)]),
+        thickness_m[np.stack([hits.first_cell, hits.first_cell, hits.second_cell, hits.third_cell])],
         np.where(hits.linearity >= min_linearity, np.arccos(np.clip(first, 0.0, 1.0)), np.nan))

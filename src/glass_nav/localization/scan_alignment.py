@@ -60,6 +60,12 @@ def fit(field: DistanceField, points_m: np.ndarray, poses: np.ndarray) -> np.nda
     return np.mean(_FIT_SCALE_M**2 / (_FIT_SCALE_M**2 + distance**2), axis=1)
 
 
+def median_distance(field: DistanceField, points_m: np.ndarray, pose: np.ndarray) -> float:
+    """Median distance [m] of the beams' end points from the walls at one pose (3,)."""
+    distance, _ = _residuals(field, points_m[:, 0], points_m[:, 1], pose[None])
+    return float(np.median(distance))
+
+
 def _residuals(field: DistanceField, x: np.ndarray, y: np.ndarray,
                poses: np.ndarray) -> "tuple[np.ndarray, np.ndarray]":
     """Distances (K, B) and their derivatives (3, K, B) by the pose."""

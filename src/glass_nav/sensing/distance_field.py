@@ -15,8 +15,11 @@ from scipy import ndimage
 from glass_nav.world.grid_map import GridMap
 
 
+_DEEPEST_M = 0.4  # a wall that a mapper blurred is rarely thicker
+
+
 class DistanceField:
-    """Distance to the nearest occupied cell's centre, cut at max_distance_m, bilinear between cells."""
+    """Distance to the centre of the nearest wall cell beside free space, cut at max_distance_m, bilinear between cells."""
 
     def __init__(self, grid_map: GridMap, max_distance_m: float = 2.0) -> None:
         """Args:
@@ -25,7 +28,7 @@ class DistanceField:
         """
         occupied = grid_map.occupied
         if occupied.any():
-            cells = ndimage.distance_transform_edt(~occupied)
+            cells = ndimage.distance_transform_edt(~_surface(grid_map))
             distance = np.minimum(cells * grid_map.resolution_m, max_distance_m)
         else:
             distance = np.full(occupied.shape, max_distance_m)
@@ -62,3 +65,11 @@ class DistanceField:
         return (lower + (upper - lower) * up_share,
                 self._cos * along_column - self._sin * along_row,
                 self._sin * along_column + self._cos * along_row)
+
+
+def _surface(grid_map: GridMap) -> np.ndarray:
+    """(H, W) bool: occupied cells in which a beam may end, those not deep inside what is drawn solid."""
+    reach = max(1, int(round(_DEEPEST_M / grid_map.resolution_m)))
+    near_free = ndimage.distance_transform_cdt(~grid_map.free, metric="chessboard") <= reach
+    surface = grid_map.occupied & near_free
+    return surface if surface.any() else grid_map.occupied

@@ -1,0 +1,42 @@
+"""GridMap -> how thick is each wall drawn?
+
+A mapper draws a wall as thick as its scans disagree: one or two cells, or half a metre. The wall itself
+is somewhere inside. Where the map is solid the question has no answer, and the thickness is one cell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+from glass_nav.world.grid_map import GridMap
+
+
+def wall_thickness(grid_map: GridMap, solid_m: float = 0.8) -> np.ndarray:
+    """(H * W,) float32 [m] for occupied cells, one cell's edge where the map is thicker than solid_m.
+
+    Twice the largest distance to the outside near the cell; 0 for cells that are not occupied.
+    """
+    occupied = grid_map.occupied
+    if not occupied.any():
+        return np.zeros(occupied.size, np.float32)
+    resolution = grid_map.resolution_m
+    inside = ndimage.distance_transform_edt(np.pad(occupied, 1))[1:-1, 1:-1].astype(np.float32)
+    reach = max(1, int(round(0.5 * solid_m / resolution)))
+    rows, columns = np.nonzero(occupied)
+    ridge = ndimage.maximum_filter(inside, size=3) if reach == 1 else _largest_uphill(inside, reach)
+    half = ridge[rows, columns]
+    thickness = np.zeros(occupied.shape, np.float32)
+    thickness[rows, columns] = np.where((2.0 * half - 1.0) * resolution > solid_m, 1.0, 2.0 * half - 1.0)
+    return (thickness * resolution).ravel()
+
+
+def _largest_uphill(inside: np.ndarray, reach: int) -> np.ndarray:
+    """Largest value that a climb from cell to higher neighbour reaches within that many steps.
+
+    A climb stays inside its wall, where a plain maximum over a window would take the neighbouring wall's.
+    """
+    height = inside
+    for _ in range(reach):
+        height = np.where(inside > 0.0, ndimage.maximum_filter(height, size=3), 0.0)
+    return height
