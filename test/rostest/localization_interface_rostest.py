@@ -22,6 +22,7 @@ import rospy
 import rostest
 import tf2_ros
 from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped, Quaternion
+from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap, GetMapResponse, SetMap, SetMapRequest
 from rostest_support import Heard, LogLines, Process, wait_until
 from sensor_msgs.msg import LaserScan
@@ -228,6 +229,39 @@ class LocalizationInterface(unittest.TestCase):
                 self.assertFalse(self.set_map(SetMapRequest(msg, pose)).success)
                 self.expect_line("set_map refused", words)
         self.expect_right_pose()
+
+    def test_maps_without_walls_or_without_room_do_no_harm(self) -> None:
+        for value in (0, -1, 100):
+            with self.subTest(value):
+                msg = changed(conversions.msg_from_map(self.grid_map, rospy.Time.now(), "map"), data=[value] * 31500)
+                self.set_map(SetMapRequest(msg, pose_message(self.robot.map_from_base())))
+                self.transforms.clear()
+                self.assertTrue(wait_until(lambda: len(self.transforms) > 3, 10.0), "no map -> odom any more")
+                locate = rospy.ServiceProxy("global_localization", Empty)
+                if value == 0:
+                    locate()
+                else:
+                    with self.assertRaisesRegex(rospy.ServiceException, "no free cell"):
+                        locate()
+                self.assertTrue(wait_until(lambda: len(self.transforms) > 6, 10.0), "no map -> odom any more")
+                self.assertTrue(self.set_map(SetMapRequest(self.map_msg,
+                                                           pose_message(self.robot.map_from_base()))).success)
+                self.expect_right_pose()
+
+    def test_the_map_may_come_by_topic_and_a_bad_one_is_skipped(self) -> None:
+        maps = rospy.Publisher("other_map", OccupancyGrid, queue_size=2)
+        poses = Heard("/by_topic/pose", PoseWithCovarianceStamped)
+        x, y, yaw = self.robot.map_from_base()
+        node = self.start("by_topic", "_use_map_topic:=true", "map:=/other_map", f"_initial_pose_x:={x}",
+                          f"_initial_pose_y:={y}", f"_initial_pose_a:={yaw}")
+        connected = wait_until(maps.get_num_connections, 30.0)
+        maps.publish(changed(conversions.msg_from_map(self.grid_map, rospy.Time.now(), "map"), data=[0]))
+        refused = wait_until(lambda: self.lines.having("the map of topic /other_map is refused", "got 1"), 15.0)
+        maps.publish(self.map_msg)
+        heard = wait_until(lambda: len(poses), 15.0)
+        code, printed = node.end()
+        self.assertTrue(connected and refused and heard, (connected, refused, heard, printed))
+        self.assertEqual(code, 0, printed)
 
     # -- initialpose
 

@@ -41,7 +41,7 @@ TIME_JUMP_S = 0.5       # a clock that goes back by less is noise between machin
 STALE_SCANS = 20        # that many older scans in a row: the lidar's clock was set back
 GUESS_WAIT_S = 1.0      # how long an initialpose waits for a scan at or after its stamp
 NO_SCAN_WARNING_S = 15.0  # as AMCL
-SILENCE_S = 2.0         # without a used scan for that long, ~status says why
+SILENCE_S = 3.0         # without a used scan for that long, ~status says why
 SETTLING_S = 5.0        # map server and player of a launch file need some seconds: no warning before
 ERRAND_TIMEOUT_S = 30.0
 
@@ -73,6 +73,7 @@ class LocalizationNode:
         self._last_scan_s = self._last_estimate_s = self._now_s
         self._stale_scans = 0
         self._started_s = time.monotonic()
+        self._simulated = bool(rospy.get_param("/use_sim_time", False))
         self._next_report_s = self._next_map_request_s = 0.0  # by the monotonic clock
         self._last_save_s = self._last_cloud_s = self._last_particles_s = 0.0  # by ROS time
         self._trouble = "no scan used yet"
@@ -90,7 +91,7 @@ class LocalizationNode:
         rospy.Service("request_nomotion_update", Empty, self._serve_nomotion_update)
         rospy.Service("set_map", SetMap, self._serve_set_map)
         # Subscribers last: they may fire at once. Nagle's algorithm would hold small messages for 40 ms.
-        tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
+        self._listener = tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
         self._scan_input = rospy.Subscriber("scan", LaserScan, lambda msg: self._inbox.put("scans", msg),
                                             queue_size=100, buff_size=2 ** 22, tcp_nodelay=True)
         rospy.Subscriber("initialpose", PoseWithCovarianceStamped, self._command(self._take_guess),
@@ -410,13 +411,13 @@ class LocalizationNode:
         self._tf.clear()
         self._stale_scans, self._start = 0, None
         self._last_scan_s = self._last_estimate_s = self._now_s
-        simulated = bool(rospy.get_param("/use_sim_time", False))
-        if not simulated and self._estimate is not None:
+        if not self._simulated and self._estimate is not None:
             self._restart_pose = (self._estimate.map_from_base, self._estimate.covariance)
+        self._rng = self._p.rng  # a bag that starts over gives the same poses again
         if self._map is not None:
             self._mcl = self._new_core(self._map, *self._restart_pose)
         x, y, yaw = self._restart_pose[0]
-        where = "the last pose it was given" if simulated else "its last pose"
+        where = "the last pose it was given" if self._simulated else "its last pose"
         rospy.logwarn(f"{why}: the filter starts over at {where}, x {x:.3f} m, y {y:.3f} m, "
                       f"yaw {yaw:.3f} rad")
         self._estimate = None
