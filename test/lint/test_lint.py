@@ -19,7 +19,8 @@ def run(command: List[str]) -> None:
     done = subprocess.run(command, cwd=REPO, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                           text=True, env={**os.environ, "NO_COLOR": "1"})
     if done.returncode:
-        pytest.fail(f"{' '.join(command)}\n{done.stdout}", pytrace=False)
+        print(done.stdout)
+        pytest.fail(f"exit code {done.returncode}: {' '.join(command)}", pytrace=False)
 
 
 def test_ruff() -> None:

@@ -19,12 +19,12 @@ PYTHON = OLD / "venv" / "bin" / "python"
 def test_unit_tests_pass_on_python_38(tmp_path: Path) -> None:
     command = [str(PYTHON), "-m", "pytest", "test/unit", "--ignore=test/unit/ros", "-q", "-p", "no:cacheprovider",
                f"--basetemp={tmp_path / 'py38'}"]
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    environment = {name: value for name, value in os.environ.items()
+                   if name != "PYTHONPATH" and not name.startswith("COV_CORE")}
     environment["PYTHONPATH"] = str(OLD / "site")
     done = subprocess.run(command, cwd=REPO, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                           stderr=subprocess.STDOUT, text=True)
-    if done.returncode:
-        pytest.fail(f"{' '.join(command)}\n{done.stdout[-20000:]}", pytrace=False)
+    print(done.stdout[-20000:])
     closing_line = done.stdout.strip().splitlines()[-1]
-    print(f"Python 3.8: {closing_line}")
-    assert "passed" in closing_line
+    if done.returncode or "passed" not in closing_line:
+        pytest.fail(f"on Python 3.8: {closing_line}", pytrace=False)
