@@ -11,7 +11,7 @@ import numpy as np
 
 from glass_nav.evaluation.replay_result import NO_BEAM, ReplayResult
 from glass_nav.localization.glass_mcl import Estimate, GlassMcl
-from glass_nav.recording.recording import Entry, Recording, RecordingError, Refusal, Step
+from glass_nav.recording.recording import Entry, Recording, RecordingError, Refusal
 from glass_nav.sensing.scan import ScanError
 
 
@@ -41,16 +41,15 @@ class Window:
     def of(self, entries: Iterable[Entry]) -> Iterator[Entry]:
         """The entries of that part; refused scans within it are kept, to be counted."""
         first_ns: Optional[int] = None
+        since_s = 0.0  # of the last scan that could be read: the stamp of a refused one may be its fault
         seen = taken = 0
         for entry in entries:
-            stamp_ns = entry.scan.stamp_ns if isinstance(entry, Step) else entry.stamp_ns
-            if first_ns is None and isinstance(entry, Step):
-                first_ns = stamp_ns
-            since_s = 0.0 if first_ns is None else (stamp_ns - first_ns) * 1e-9
             if isinstance(entry, Refusal):
                 if since_s >= self.start_s:
                     yield entry
                 continue
+            first_ns = entry.scan.stamp_ns if first_ns is None else first_ns
+            since_s = (entry.scan.stamp_ns - first_ns) * 1e-9
             if self.duration_s is not None and since_s > self.start_s + self.duration_s:
                 return
             if since_s < self.start_s:

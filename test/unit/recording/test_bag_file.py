@@ -121,8 +121,8 @@ def test_a_file_can_be_the_ground_truth(room_bag, tmp_path):
     np.testing.assert_allclose(recording.ground_truth.at(np.int64(1_000_500_000_000)), [1.5, 2.0, 0.0])
 
 
-TOPICS = "/ground_truth (geometry_msgs/PoseStamped), /scan (sensor_msgs/LaserScan), /tf (tf2_msgs/TFMessage), " \
-         "/tf_static (tf2_msgs/TFMessage)"
+TOPICS = ("/ground_truth (geometry_msgs/PoseStamped), /scan (sensor_msgs/LaserScan), /tf (tf2_msgs/TFMessage), "
+          "/tf_static (tf2_msgs/TFMessage)")
 
 
 @pytest.mark.parametrize("fields, options, text", [

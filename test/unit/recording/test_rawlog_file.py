@@ -97,7 +97,8 @@ def test_bytes_that_make_no_text_do_no_harm(tmp_path):
     raw = gzip.decompress((RAWLOGS / "paired.rawlog").read_bytes())
     (tmp_path / "bad.rawlog").write_bytes(raw.replace(b"CActionCollection", b"CActionColle\xfftion"))
     assert refusal(tmp_path / "bad.rawlog").startswith(
-        "bad.rawlog: holds no odometry; it holds 1 CObservation2DRangeScan, 1 CSensoryFrame; the file has object 2 damaged (")
+        "bad.rawlog: holds no odometry; it holds 1 CObservation2DRangeScan, 1 CSensoryFrame; "
+        "the file has object 2 damaged (")
 
 
 @pytest.mark.parametrize("name, options, text", [
@@ -132,7 +133,7 @@ def test_nothing_goes_to_stderr(tmp_path):
                "    try: open_log(path)\n"
                "    except ValueError as err: print(err)\n")
     done = subprocess.run([sys.executable, "-c", program, str(tmp_path / "cut.rawlog"), str(tmp_path)],
-                          stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                          capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
 
 

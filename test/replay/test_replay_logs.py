@@ -1,0 +1,76 @@
+"""Real logs through `glass_nav replay`, each held to a line of the table. The whole of it takes about two minutes.
+
+The reference of the bags is another estimator's, see INDEX.md beside the data; AMCL's figures there are the
+measure for rmse and for the share of scans more than 1 m off. All logs and seeds: test/benchmark/replay_logs.py.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Callable, Dict, NamedTuple
+
+import numpy as np
+import pytest
+
+from glass_nav.cli.main import main
+
+MRPT_DATASETS = Path("/usr/share/mrpt/datasets")  # apt: mrpt-common
+
+
+class Limits(NamedTuple):
+    """Not more than this."""
+    scans: int           # of the log: every one is used
+    median_m: float
+    rmse_m: float
+    p95_m: float
+    yaw_mean_deg: float
+    lost_1m_share: float
+
+
+TABLE = {  # AMCL's figures, on Wean 1.3 times its rmse
+    "uob_trace0": Limits(958, 0.069, 0.085, 0.158, 3.0, 0.0),
+    "olin_mac": Limits(357, 0.058, 0.059, 0.090, 3.0, 0.0),
+    "mit_racecar2": Limits(348, 0.055, 0.097, 0.194, 3.0, 0.0),
+    "seattle": Limits(240, 0.116, 0.611, 1.528, 3.0, 0.066),
+    "aces": Limits(440, 0.116, 0.147, 0.256, 3.0, 0.0),
+    "wean4": Limits(600, 0.23 * 1.3, 0.229 * 1.3, 0.305 * 1.3, 3.0, 0.0),
+}
+UWB = Limits(343, 0.120, 0.150, 0.250, 1.5, 0.0)
+
+
+@pytest.fixture
+def replay(tmp_path: Path) -> Callable[..., Dict[str, Any]]:
+    """replay(log, map): metrics.json of a run with seed 0."""
+    def run(log: Path, grid: Path) -> Dict[str, Any]:
+        assert main(["replay", str(log), "--map", str(grid), "--out", str(tmp_path)]) == 0
+        figures: Dict[str, Any] = json.loads((tmp_path / "metrics.json").read_text())
+        return figures
+
+    return run
+
+
+def check(figures: Dict[str, Any], limits: Limits, out: Path) -> None:
+    print({name: figures[name] for name in ("position_median_m", "position_rmse_m", "position_p95_m", "yaw_mean_deg",
+                                            "lost_1m_share", "cpu_ms_per_scan")})
+    assert (figures["scans"], figures["scans_refused"]) == (limits.scans, 0)
+    assert figures["lost_1m_share"] <= limits.lost_1m_share
+    assert figures["position_rmse_m"] <= limits.rmse_m
+    assert figures["position_median_m"] <= limits.median_m
+    assert figures["position_p95_m"] <= limits.p95_m
+    assert figures["yaw_mean_deg"] <= limits.yaw_mean_deg
+    with np.load(out / "beam_cases.npz") as cases:
+        assert cases["cases"].shape[0] == limits.scans
+    assert (out / "trajectory.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("log", list(TABLE))
+def test_a_real_bag_is_tracked(data_dir: Path, replay: Callable[..., Dict[str, Any]], tmp_path: Path, log: str) -> None:
+    folder = data_dir / "logs" / log
+    check(replay(folder / f"{log}.bag", folder / "map.yaml"), TABLE[log], tmp_path)
+
+
+@pytest.mark.skipif(not MRPT_DATASETS.is_dir(), reason="apt's mrpt-common is not installed")
+def test_the_rawlog_of_mrpt_is_tracked(replay: Callable[..., Dict[str, Any]], tmp_path: Path) -> None:
+    stem = MRPT_DATASETS / "uwb_ro-localization_demo"
+    check(replay(stem.with_suffix(".rawlog"), stem.with_name(f"{stem.name}_map.gridmap.gz")), UWB, tmp_path)

@@ -1,0 +1,309 @@
+"""The subcommand as a user calls it, on small bags of a robot in a room; and the texts of what it refuses."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from glass_nav.cli import main as cli
+from glass_nav.cli import replay, replay_params, replay_run
+from glass_nav.cli.replay_run import Window
+from glass_nav.params import ParamError
+from glass_nav.recording.recording import Recording, Refusal, Step
+from glass_nav.sensing.scan import Scan
+
+REPO = Path(__file__).resolve().parents[3]
+RAWLOGS = REPO / "test" / "data" / "mrpt"
+
+
+@pytest.fixture
+def run(room_map, tmp_path, capsys):
+    """run(log, option, ...): exit code, stdout, stderr; the results are in tmp_path/out."""
+    def command(log, *options, grid=room_map):
+        code = cli.main(["replay", str(log), "--map", str(grid), "--out", str(tmp_path / "out"),
+                         *(str(option) for option in options)])
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err.replace(f"{tmp_path}/", "")
+
+    return command
+
+
+def figures(tmp_path):
+    return json.loads((tmp_path / "out" / "metrics.json").read_text())
+
+
+def test_a_replay_follows_the_robot_and_writes_everything(run, room_bag, tmp_path):
+    code, out, err = run(room_bag().write())
+    assert code == 0
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "metrics.json", "trajectory.tum", "per_scan.csv", "beam_cases.npz", "trajectory.png"}
+    result = figures(tmp_path)
+    assert result["scans"] == 20
+    assert result["scans_refused"] == 0
+    assert result["position_max_m"] < 0.2
+    assert result["yaw_mean_deg"] < 3.0
+    assert result["seed"] == 0
+    assert result["start"] == "the ground truth's first pose"
+    assert result["params"]["max_particles"] > 0
+    assert result["versions"].keys() == {"python", "numpy", "scipy", "machine"}
+    assert "position error  mean 0." in out
+    assert out.endswith(f"written to {tmp_path / 'out'}\n")
+    assert err == ("glass_nav replay: scans from /scan\nglass_nav replay: odometry from tf odom <- base_link\n"
+                   "glass_nav replay: ground truth from /ground_truth\n"
+                   "glass_nav replay: start: the ground truth's first pose\n")
+
+
+def test_the_same_seed_gives_the_same_answer_and_another_one_another(run, room_bag, tmp_path):
+    path = room_bag().write()
+    ways = []
+    for seed in (1, 1, 2):
+        assert run(path, "--seed", seed, "--no-picture")[0] == 0
+        ways.append((tmp_path / "out" / "trajectory.tum").read_text())
+    assert ways[0] == ways[1] != ways[2]
+    assert not (tmp_path / "out" / "trajectory.png").exists()
+
+
+def test_a_start_given_by_hand_is_used_and_said(run, room_bag, tmp_path):
+    path = room_bag(ground_truth=False).write()
+    x, y, yaw = room_bag().poses(np.array([room_bag().start_ns]))[0]
+    code, out, err = run(path, "--initial-pose", x, y, yaw, "--initial-cov", 0.01, 0.01, 0.01)
+    assert code == 0
+    assert "glass_nav replay: start: --initial-pose\n" in err
+    assert "position error" not in out
+    result = figures(tmp_path)
+    assert result["position_rmse_m"] is None
+    way = np.loadtxt(tmp_path / "out" / "trajectory.tum")
+    assert np.hypot(*(way[-1, 1:3] - room_bag().poses(room_bag().stamps_ns)[-1, :2])) < 0.2
+
+
+def test_without_anything_else_the_start_is_that_of_the_parameters(run, room_bag, tmp_path):
+    (tmp_path / "p.yaml").write_text("initial_pose_x: 2.0\ninitial_pose_y: 1.2\nmax_particles: 1234\n"
+                                     "global_frame_id: map\nlaser_model_type: beam\n")
+    code, _, err = run(room_bag(ground_truth=False).write(), "--params", tmp_path / "p.yaml", "--max-scans", 3)
+    assert code == 0
+    assert "glass_nav replay: start: initial_pose_* of the parameters\n" in err
+    assert "glass_nav replay: parameters that only a node uses: global_frame_id, laser_model_type\n" in err
+    assert figures(tmp_path)["params"]["max_particles"] == 1234
+    assert figures(tmp_path)["scans"] == 3
+
+
+def test_frames_named_in_the_parameters_are_looked_for(run, room_bag, tmp_path):
+    (tmp_path / "p.yaml").write_text("odom_frame_id: wheels\n")
+    code, _, err = run(room_bag().write(), "--params", tmp_path / "p.yaml")
+    assert code == 3
+    assert err == ("glass_nav replay: room.bag: no transform wheels <- base_link or base_footprint; frames in tf: "
+                   "base_link, laser, odom\n")
+
+
+def test_a_search_anywhere_in_the_map_starts(run, room_bag, tmp_path):
+    assert run(room_bag().write(), "--global", "--max-scans", 2)[0] == 0
+    assert figures(tmp_path)["start"] == "anywhere in the map"
+
+
+def test_a_rawlog_and_a_grid_map_of_mrpt_replay_too(run, tmp_path):
+    code, _, _ = run(RAWLOGS / "observations.rawlog", "--scan-topic", "front", grid=RAWLOGS / "small.gridmap.gz")
+    assert code == 0
+    assert figures(tmp_path)["scans"] == 4
+
+
+def one_bad_scan(**changes):
+    return lambda index, fields: {**fields, **changes} if index == 3 else fields
+
+
+@pytest.mark.parametrize("changes, reason", [
+    ({"angle_increment": 0.0}, "angle_increment must be finite and not 0 rad, got 0.0"),
+    ({"stamp_ns": 10**12 - 10**11}, "time runs backwards")])
+def test_a_bad_scan_is_counted_and_said(run, room_bag, tmp_path, changes, reason):
+    code, _, err = run(room_bag(scan_fields=one_bad_scan(**changes)).write())
+    assert code == 0
+    assert figures(tmp_path)["scans"] == 19
+    assert figures(tmp_path)["scans_refused"] == 1
+    assert figures(tmp_path)["refusals"] == {reason: 1}
+    assert f"glass_nav replay: 1 scans refused: {reason}\n" in err
+
+
+@pytest.mark.parametrize("ranges", [
+    pytest.param(np.full(60, np.nan), id="all NaN"), pytest.param(np.full(60, np.inf), id="all inf"),
+    pytest.param(np.r_[np.nan, np.inf, -np.inf, 0.0, np.full(56, 1.0)], id="some of each"),
+    pytest.param(np.full(5, 1.0), id="fewer than the beams asked for"), pytest.param(np.ones(1), id="one")])
+def test_odd_ranges_neither_stop_nor_derail_a_replay(run, room_bag, tmp_path, ranges):
+    code, _, _ = run(room_bag(scan_fields=one_bad_scan(ranges=ranges)).write())
+    assert code == 0
+    assert figures(tmp_path)["scans"] == 20
+    assert figures(tmp_path)["position_p95_m"] < 0.3
+    with np.load(tmp_path / "out" / "beam_cases.npz") as cases:
+        assert (cases["cases"][3, len(ranges):] == 255).all()
+        assert (cases["cases"][3, :len(ranges)] <= 4).all()
+        assert cases["cases"].shape == (20, 60)
+
+
+@pytest.mark.parametrize("fields, text", [
+    ({"angle_increment": 0.0}, "room.bag: none of its 20 scans can be used; 20 times: angle_increment must be finite "
+                               "and not 0 rad, got 0.0"),
+    ({"ranges": []}, "room.bag: none of its 20 scans can be used; 20 times: no ranges, a scan needs at least 1")])
+def test_a_log_without_one_good_scan_is_refused(run, room_bag, fields, text):
+    code, _, err = run(room_bag(scan_fields=lambda index, given: {**given, **fields}).write())
+    assert code == 3
+    assert err.splitlines()[-1] == f"glass_nav replay: {text}"
+
+
+def last_line(run, log, *options, **more):
+    code, out, err = run(log, *options, **more)
+    assert (code, out) == (3, "")
+    assert "Traceback" not in err
+    assert len(err.splitlines()) == 1
+    return err.strip()
+
+
+def test_bad_input_is_one_line_and_exit_code_3(run, room_bag, room_map, tmp_path):
+    path = room_bag().write()
+    assert last_line(run, path, "--scan-topic", "/lidar") == (
+        "glass_nav replay: room.bag: no topic /lidar; it has /ground_truth (geometry_msgs/PoseStamped), "
+        "/scan (sensor_msgs/LaserScan), /tf (tf2_msgs/TFMessage), /tf_static (tf2_msgs/TFMessage)")
+    (tmp_path / "cut.bag").write_bytes(path.read_bytes()[:-1])
+    assert last_line(run, tmp_path / "cut.bag") == (
+        "glass_nav replay: cut.bag: cut short or never closed (its index is missing); "
+        "`rosbag reindex` may save what it holds")
+    assert last_line(run, path, grid=tmp_path / "no.yaml") == (
+        "glass_nav replay: no.yaml: cannot be read: No such file or directory")
+    shutil.copy(room_map, tmp_path / "map.yaml")
+    assert last_line(run, path, grid=tmp_path / "map.yaml") == (
+        "glass_nav replay: map.yaml: its image map.pgm does not exist")
+    (tmp_path / "map.pgm").write_bytes((room_map.parent / "map.pgm").read_bytes()[:-99])
+    assert last_line(run, path, grid=tmp_path / "map.yaml") == (
+        "glass_nav replay: map.yaml: the data of its image map.pgm do not fit its 122 x 82 pixels: "
+        "the file is cut short or damaged")
+    (tmp_path / "p.yaml").write_text("max_particle: 10\n")
+    assert last_line(run, path, "--params", tmp_path / "p.yaml") == (
+        "glass_nav replay: p.yaml: unknown parameter ~max_particle; did you mean ~max_particles?")
+    (tmp_path / "taken").write_text("")
+    assert cli.main(["replay", str(path), "--map", str(room_map), "--out", str(tmp_path / "taken")]) == 3
+
+
+def test_a_start_that_is_no_pose_is_refused(run, room_bag):
+    code, _, err = run(room_bag().write(), "--initial-pose", "nan", 0, 0)
+    assert code == 3
+    assert err.splitlines()[-1].startswith("glass_nav replay: a pose needs finite x, y, yaw, got ")
+
+
+@pytest.mark.parametrize("options, text", [
+    (["--seed", "-1"], "glass_nav replay: --seed must be >= 0, got -1"),
+    (["--every", "0"], "glass_nav replay: --every must be >= 1, got 0"),
+    (["--max-scans", "0"], "glass_nav replay: --max-scans must be >= 1, got 0"),
+    (["--start", "-2"], "glass_nav replay: --start must be >= 0 s, got -2.0"),
+    (["--duration", "0"], "glass_nav replay: --duration must be > 0 s, got 0.0"),
+    (["--global", "--initial-pose", "0", "0", "0"],
+     "glass_nav replay: --global and --initial-pose exclude each other"),
+    (["--seed", "x"], "glass_nav replay: error: argument --seed: invalid int value: 'x'")])
+def test_wrong_usage_is_exit_code_2(run, options, text):
+    code, _, err = run("absent.bag", *options)
+    assert code == 2
+    assert err.splitlines()[-1] == text
+
+
+def test_help_and_no_command(capsys):
+    assert cli.main(["--help"]) == 0
+    assert "replay" in capsys.readouterr().out
+    assert cli.main([]) == 2
+
+
+def test_an_interrupted_replay_says_so(run, room_bag, monkeypatch):
+    def interrupt(*_args, **_kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(replay_run, "run", interrupt)
+    code, _, err = run(room_bag().write())
+    assert code == 130
+    assert err.splitlines()[-1] == "glass_nav replay: interrupted, nothing written"
+
+
+def test_a_package_that_is_not_built_is_said_in_one_line(capsys, monkeypatch):
+    monkeypatch.delitem(sys.modules, "glass_nav.cli.replay")
+    monkeypatch.delattr("glass_nav.cli.replay")
+    monkeypatch.setitem(sys.modules, "glass_nav.localization.glass_mcl", None)
+    assert cli.main(["replay"]) == 3
+    assert capsys.readouterr().err == ("glass_nav: glass_nav.localization.glass_mcl is not there: build the package "
+                                       "and source its setup.bash\n")
+
+
+def test_the_script_runs_by_itself(room_bag, room_map, tmp_path):
+    done = subprocess.run([sys.executable, str(REPO / "scripts" / "glass_nav"), "replay", str(room_bag().write()),
+                           "--map", str(room_map), "--out", str(tmp_path / "out"), "--max-scans", "2"],
+                          capture_output=True, text=True, env=os.environ)
+    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
+    assert figures(tmp_path)["scans"] == 2
+
+
+@pytest.mark.parametrize("text, reason", [
+    ("- 1\n", "must hold names and values, got list"), ("a: [\n", "is no yaml: "),
+    ("max_particles: many\n", "~max_particles must be int, got 'many'")])
+def test_parameter_files_that_are_none_are_refused(tmp_path, text, reason):
+    (tmp_path / "p.yaml").write_text(text)
+    with pytest.raises(ParamError) as caught:
+        replay_params.load(tmp_path / "p.yaml")
+    assert str(caught.value).startswith(f"{tmp_path}/p.yaml: {reason}")
+
+
+def test_a_missing_or_empty_parameter_file(tmp_path):
+    with pytest.raises(ParamError, match="p.yaml: cannot be read: No such file or directory$"):
+        replay_params.load(tmp_path / "p.yaml")
+    (tmp_path / "p.yaml").write_bytes(b"\xff")
+    with pytest.raises(ParamError, match="p.yaml: cannot be read: 'utf-8'"):
+        replay_params.load(tmp_path / "p.yaml")
+    (tmp_path / "p.yaml").write_text("")
+    assert replay_params.load(tmp_path / "p.yaml") == (replay_params.ReplayParams(), [])
+
+
+def test_the_parameters_of_the_node_serve_the_replay():
+    settings, unused = replay_params.load(REPO / "config" / "localization.yaml")
+    assert settings.start == replay_params.StartParams()
+    assert "transform_tolerance" in unused
+
+
+def entry(second, reason=None):
+    stamp_ns = 10**12 + int(second * 10**9)
+    if reason is not None:
+        return Refusal(stamp_ns, reason)
+    return Step(Scan(stamp_ns, np.ones(1), np.zeros(1), 0.0, 9.0, np.zeros(3)), np.zeros(3))
+
+
+@pytest.mark.parametrize("window, seconds", [
+    (Window(), [0, 1, 2, 3, 4]), (Window(start_s=1.5), [2, 3, 4]), (Window(duration_s=2.0), [0, 1, 2]),
+    (Window(start_s=1.0, duration_s=1.0), [1, 2]), (Window(every=2), [0, 2, 4]), (Window(max_scans=2), [0, 1]),
+    (Window(start_s=1.0, every=2, max_scans=1), [1])])
+def test_a_window_takes_its_part(window, seconds):
+    taken = [round(step.scan.stamp_ns * 1e-9 - 1000) for step in window.of(map(entry, range(5)))]
+    assert taken == seconds
+    assert window.expected(5) >= len(seconds)
+
+
+def test_refused_scans_within_the_window_stay_in_it():
+    entries = [entry(0), entry(1, "bad"), entry(2), entry(3, "worse"), entry(4)]
+    assert [each.reason for each in Window(start_s=2.0).of(entries) if isinstance(each, Refusal)] == ["worse"]
+    assert len(list(Window().of(entries))) == 5
+
+
+def test_a_scan_that_the_filter_refuses_is_counted():
+    from glass_nav.sensing.scan import ScanError
+
+    class Filter:
+        def update(self, scan, odom_from_base):
+            raise ScanError("scan at 1.000 s: no good")
+
+    from glass_nav.recording.recording import RecordingError
+
+    with pytest.raises(RecordingError, match="^log: none of its 2 scans can be used; 2 times: no good$"):
+        replay_run.run(Recording("log", 2, [entry(0), entry(1)]), Filter(), lambda stamp_ns: None, 0)
+    with pytest.raises(RecordingError, match="^log: no scan in the part to be replayed$"):
+        replay_run.run(Recording("log", 0, []), Filter(), lambda stamp_ns: None, 0)
+
+
+def test_an_infinite_error_is_no_number_in_the_table():
+    assert replay._metres(None) == "infinite"

@@ -1,0 +1,132 @@
+from __future__ import annotations
+
+import csv
+import json
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from glass_nav.evaluation import pictures, replay_result
+from glass_nav.evaluation.pictures import MapImage
+from glass_nav.evaluation.replay_result import NO_BEAM, ReplayResult
+from glass_nav.geometry.trajectory import Trajectory
+
+
+def a_result(**changes):
+    """Four scans a second apart along x, 0.1 m beside the reference; two beams, one in the last scan."""
+    stamps = 10**18 + 10**9 * np.arange(4)
+    fields = {
+        "stamps_ns": stamps, "map_from_base": np.array([[i, 0.1, 0.0] for i in range(4)], float),
+        "odom_from_base": np.zeros((4, 3)), "deviation": np.full((4, 3), 0.05),
+        "states": ["UNKNOWN", "LOCALIZED", "LOCALIZED", "LOCALIZED"], "reasons": ["none", "a, b", "c", "d"],
+        "used_share": np.array([0.5, 1.0, 1.0, np.nan]), "updated": np.array([True, False, True, False]),
+        "particles": np.full(4, 100), "cpu_ms": np.array([10.0, 2.0, 20.0, 4.0]),
+        "cases": np.array([[1, 1], [3, 0], [1, 2], [1, NO_BEAM]], np.uint8),
+        "refusals": Counter({"time runs backwards": 2}),
+        "reference": Trajectory(stamps[:3], np.array([[i, 0.0, 0.0] for i in range(3)], float)),
+        "wall_s": 0.5, "seed": 7}
+    return ReplayResult(**{**fields, **changes})
+
+
+def test_the_metrics_have_the_promised_names_and_values():
+    figures = a_result().metrics()
+    assert figures["scans"] == 4
+    assert figures["scans_refused"] == 2
+    assert figures["refusals"] == {"time runs backwards": 2}
+    assert figures["updates"] == 2
+    assert figures["scans_without_ground_truth"] == 1
+    assert figures["position_mean_m"] == pytest.approx(0.1)
+    assert {"position_median_m", "position_rmse_m", "position_p95_m", "position_max_m", "yaw_mean_deg", "lost_share",
+            "lost_1m_share"} <= figures.keys()
+    assert figures["case_share"] == {"0": 1 / 7, "1": 4 / 7, "2": 1 / 7, "3": 1 / 7, "4": 0.0}
+    assert figures["state_share"] == {"LOCALIZED": 0.75, "UNKNOWN": 0.25}
+    assert figures["cpu_ms_per_scan"] == 9.0
+    assert figures["cpu_ms_per_update"] == 15.0
+    assert figures["log_duration_s"] == pytest.approx(3.0)
+    assert figures["times_real_time"] == pytest.approx(6.0)
+    assert figures["seed"] == 7
+
+
+def test_without_ground_truth_the_errors_are_null(tmp_path):
+    replay_result.write(a_result(reference=None), tmp_path, {"log": "x"})
+    figures = json.loads((tmp_path / "metrics.json").read_text())
+    assert figures["position_mean_m"] is figures["yaw_mean_deg"] is figures["lost_share"] is None
+    assert figures["scans_without_ground_truth"] is None
+    assert figures["log"] == "x"
+
+
+def test_json_never_holds_nan(tmp_path):
+    replay_result.write_json(tmp_path / "x.json", {"a": float("nan"), "b": [np.float64("inf"), np.int64(3)],
+                                                   "c": {"d": (1.5, True, None)}})
+    text = (tmp_path / "x.json").read_text()
+    assert "NaN" not in text
+    assert json.loads(text) == {"a": None, "b": [None, 3], "c": {"d": [1.5, True, None]}}
+
+
+def test_the_files_hold_every_scan(tmp_path):
+    result = a_result()
+    replay_result.write(result, tmp_path, {})
+    tum = np.loadtxt(tmp_path / "trajectory.tum")
+    assert tum.shape == (4, 8)
+    assert (tmp_path / "trajectory.tum").read_text().startswith("1000000000.000000000 0.000000 0.100000 0 0 0 ")
+    with np.load(tmp_path / "beam_cases.npz") as cases:
+        assert cases["stamps_ns"].dtype == np.int64
+        assert cases["cases"].dtype == np.uint8
+        np.testing.assert_array_equal(cases["stamps_ns"], result.stamps_ns)
+        np.testing.assert_array_equal(cases["cases"], result.cases)
+    with (tmp_path / "per_scan.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["stamp_ns"] for row in rows] == [str(stamp) for stamp in result.stamps_ns]
+    assert float(rows[1]["position_error_m"]) == pytest.approx(0.1)
+    assert rows[3]["position_error_m"] == rows[3]["true_x_m"] == rows[3]["used_share"] == ""
+    assert rows[1]["reason"] == "a, b"
+    assert [rows[2][f"beams_case_{case}"] for case in range(5)] == ["0", "1", "1", "0", "0"]
+
+
+GRID = MapImage(np.where(np.indices((80, 60)).sum(axis=0) % 17 == 0, 100, 0).astype(np.int8), 0.1,
+                np.array([-1.0, -2.0, 0.3]))
+
+
+@pytest.mark.parametrize("changes", [
+    pytest.param({}, id="with a reference"),
+    pytest.param({"reference": None}, id="without"),
+    pytest.param({"map_from_base": np.full((4, 3), 1e6)}, id="far off the map"),
+    pytest.param({"map_from_base": np.full((4, 3), np.nan)}, id="no pose at all"),
+    pytest.param({"states": ["NEW"] * 4, "map_from_base": np.array([[0, y, 0] for y in range(0, 40, 10)], float)},
+                 id="tall, a state of tomorrow")])
+def test_a_picture_is_drawn_whatever_came_out(tmp_path, changes, recwarn):
+    from PIL import Image
+
+    pictures.draw_trajectory(tmp_path / "way.png", GRID, a_result(**changes), "a log")
+    with Image.open(tmp_path / "way.png") as image:
+        assert image.width > 800
+        assert image.height > 500
+    assert not [str(warning.message) for warning in recwarn if "glass_nav" in str(warning.filename)]
+
+
+def test_a_single_scan_has_a_picture_and_figures(tmp_path):
+    result = a_result()
+    one = ReplayResult(**{name: (value[:1] if name not in ("refusals", "reference", "wall_s", "seed") else value)
+                          for name, value in vars(result).items()})
+    pictures.draw_trajectory(tmp_path / "way.png", GRID, one, "a log")
+    assert one.metrics()["log_duration_s"] == 0.0
+
+
+def test_the_wall_in_the_picture_is_where_the_map_has_it(tmp_path):
+    """A free map with one wall, dark in the picture above the robot's way and nowhere else."""
+    from PIL import Image
+
+    occupancy = np.zeros((100, 100), np.int8)
+    occupancy[70:73, :] = 100  # y = 2.0 .. 2.3 m
+    flat = MapImage(occupancy, 0.1, np.array([-5.0, -5.0, 0.0]))
+    way = np.array([[x, 0.0, 0.0] for x in (-3.0, -1.0, 1.0, 3.0)])
+    pictures.draw_trajectory(tmp_path / "way.png", flat, a_result(map_from_base=way, reference=None), "a log")
+    with Image.open(tmp_path / "way.png") as image:
+        grey = np.asarray(image.convert("L")).astype(int)
+    width = grey.shape[1]
+    dark = (grey[:, width // 4: width // 3] < 90).mean(axis=1) > 0.9  # rows that are a wall all along
+    rows = np.nonzero(dark)[0]
+    assert 0 < len(rows)
+    thick = np.split(rows, np.nonzero(np.diff(rows) > 1)[0] + 1)
+    assert len([part for part in thick if len(part) > 5]) == 1
