@@ -14,7 +14,8 @@ import numpy as np
 import rospy
 import rostest
 from geometry_msgs.msg import PoseArray, PoseStamped, PoseWithCovarianceStamped
-from nav_msgs.msg import OccupancyGrid
+from nav_msgs.msg import MapMetaData, OccupancyGrid
+from nav_msgs.srv import GetMap
 from rostest_support import BagPlayer, Heard, LogLines, Process, data_dir, wait_until
 from sensor_msgs.msg import LaserScan, PointCloud2
 from tf2_msgs.msg import TFMessage
@@ -130,6 +131,15 @@ class LocalizationOnARealRobot(unittest.TestCase):
             said = conversions.planar_from_pose(msg.pose.pose)
             self.assertLess(np.hypot(*(said - true)[:2]), 0.4, f"at {msg.header.stamp}: {said}, true {true}")
             self.assertLess(abs(float(angles.wrap(said[2] - true[2]))), 0.2)
+
+    def test_0_the_map_is_served_in_three_ways(self) -> None:
+        maps, metadata = Heard("map", OccupancyGrid), Heard("map_metadata", MapMetaData)
+        self.assertTrue(wait_until(lambda: len(maps) and len(metadata), 10.0), "map and map_metadata are not latched")
+        answer = rospy.ServiceProxy("static_map", GetMap)().map
+        self.assertEqual(answer, maps.last)
+        self.assertEqual(answer.info, metadata.last)
+        self.assertEqual((answer.info.width, answer.info.height, len(answer.data)), (487, 403, 487 * 403))
+        self.assertEqual(set(answer.data), {-1, 0, 100})
 
     def test_1_a_recorded_robot_is_localized(self) -> None:
         self.play()

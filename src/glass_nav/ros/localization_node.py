@@ -180,12 +180,17 @@ class LocalizationNode:
         name = rospy.resolve_name("static_map")
         try:
             rospy.wait_for_service(name, timeout=0.1)
+        except rospy.ROSException:
+            self._trouble = f"no map: there is no service {name}"
+            if self._settled() and not rospy.is_shutdown():
+                self._log.warn(self._trouble)
+            return
+        try:
             msg = rospy.ServiceProxy(name, GetMap)().map
             self._use_map(conversions.map_from_msg(msg), msg.header.frame_id, f"service {name}")
-        except (rospy.ROSException, rospy.ServiceException) as err:
-            self._trouble = f"no map: service {name} does not answer"
-            if self._settled():
-                self._log.warn(f"{self._trouble} ({err})")
+        except rospy.ServiceException as err:
+            self._trouble = f"no map: service {name} fails: {err}"
+            self._log.warn(self._trouble)
         except ValueError as err:
             self._trouble = f"no map: the one of service {name} is refused: {err}"
             self._log.error(self._trouble)
