@@ -291,6 +291,7 @@ class LocalizationInterface(unittest.TestCase):
         time.sleep(2.0 / RATE_HZ)
         before = self.robot.map_from_base()
         msg = pose_message(before)
+        time.sleep(2.0 / RATE_HZ)  # the odometry at its stamp is that of the standing robot
         self.robot.moving = True
         time.sleep(3.0)
         self.robot.moving = False
