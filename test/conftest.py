@@ -71,6 +71,9 @@ class RoomBag:
     laser: Tuple[float, float, float] = (0.1, 0.0, 0.3)  # x, y, yaw on the robot
     laser_roll: float = 0.0
     odometry: str = "tf"          # "tf", "topic" or "none"
+    odom_topics: Tuple[str, ...] = ("/odom",)
+    odom_child: str = "base_link"
+    truth_type: str = "PoseStamped"  # or PoseWithCovarianceStamped
     ground_truth: bool = True
     static_laser: bool = True     # on /tf_static rather than on /tf
     laser_tf: bool = True
@@ -157,10 +160,12 @@ class RoomBag:
                     covariance = np.zeros(36)
                     twist = types["geometry_msgs/msg/Twist"](linear=vector("Vector3", 0, 0),
                                                              angular=vector("Vector3", 0, 0))
-                    send("/odom", "nav_msgs/msg/Odometry", stamp_ns, types["nav_msgs/msg/Odometry"](
-                        header=header(stamp_ns, "odom"), child_frame_id="base_link",
+                    message = types["nav_msgs/msg/Odometry"](
+                        header=header(stamp_ns, "odom"), child_frame_id=self.odom_child,
                         pose=types["geometry_msgs/msg/PoseWithCovariance"](pose=pose(odom), covariance=covariance),
-                        twist=types["geometry_msgs/msg/TwistWithCovariance"](twist=twist, covariance=covariance)))
+                        twist=types["geometry_msgs/msg/TwistWithCovariance"](twist=twist, covariance=covariance))
+                    for topic in self.odom_topics:
+                        send(topic, "nav_msgs/msg/Odometry", stamp_ns, message)
             for index, (stamp_ns, true) in enumerate(zip(self.stamps_ns.tolist(), self.poses(self.stamps_ns))):
                 x, y, yaw = self.laser
                 cos, sin = np.cos(true[2]), np.sin(true[2])
@@ -183,8 +188,11 @@ class RoomBag:
                 for topic in self.scan_topics:
                     send(topic, "sensor_msgs/msg/LaserScan", stamp_ns, message)
                 if self.ground_truth:
-                    send("/ground_truth", "geometry_msgs/msg/PoseStamped", stamp_ns,
-                         types["geometry_msgs/msg/PoseStamped"](header=header(stamp_ns, "map"), pose=pose(true)))
+                    there = pose(true)
+                    if self.truth_type == "PoseWithCovarianceStamped":
+                        there = types["geometry_msgs/msg/PoseWithCovariance"](pose=there, covariance=np.zeros(36))
+                    kind = f"geometry_msgs/msg/{self.truth_type}"
+                    send("/ground_truth", kind, stamp_ns, types[kind](header=header(stamp_ns, "map"), pose=there))
         return self.path
 
 

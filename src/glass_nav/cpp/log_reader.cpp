@@ -28,7 +28,8 @@ class CountingStream : public mrpt::io::CStream {
  public:
   explicit CountingStream(mrpt::io::CStream& source) : source_(source) {}
   std::size_t Read(void* buffer, std::size_t count) override {
-    const std::size_t got = source_.Read(buffer, count);
+    std::size_t got = source_.Read(buffer, count);
+    if (got > count) got = 0;  // zlib's -1 for damaged data, by way of an unsigned number
     total_ += got;
     ran_out_ = ran_out_ || got < count;
     return got;

@@ -54,8 +54,9 @@ def test_odometry_is_interpolated_between_its_stamps(room_bag):
                                true - [*bag.poses(bag.stamps_ns[:1])[0, :2], 0.0], atol=2e-4)
 
 
-def test_the_ground_truth_is_a_trajectory_in_the_map(room_bag):
-    bag = room_bag()
+@pytest.mark.parametrize("truth_type", ["PoseStamped", "PoseWithCovarianceStamped"])
+def test_the_ground_truth_is_a_trajectory_in_the_map(room_bag, truth_type):
+    bag = room_bag(truth_type=truth_type)
     truth = open_log(bag.write()).ground_truth
     np.testing.assert_array_equal(truth.stamps_ns, bag.stamps_ns)
     np.testing.assert_allclose(truth.poses, bag.poses(bag.stamps_ns), atol=1e-9)
@@ -73,6 +74,26 @@ def test_scan_points_lie_on_the_walls_however_the_laser_is_mounted(room_bag, rol
 def test_a_laser_on_its_side_is_refused_scan_by_scan(room_bag):
     bag = room_bag(laser_roll=np.pi / 2)
     assert {entry.reason for entry in open_log(bag.write())} == {"the laser is tilted by 90 degrees"}
+
+
+@pytest.mark.parametrize("odom_child", ["base_link", "/base_link", ""])
+def test_the_base_is_the_frame_that_odometry_places(room_bag, odom_child):
+    bag = room_bag(odometry="topic", odom_child=odom_child)
+    np.testing.assert_allclose(steps(open_log(bag.write()))[0].scan.base_from_laser, bag.laser)
+    taken = steps(open_log(bag.path, LogOptions(base_frame="base_link", odom_topic="odom")))
+    np.testing.assert_allclose(taken[0].scan.base_from_laser, bag.laser)
+
+
+def test_of_two_odometries_the_usual_name_wins(room_bag):
+    assert "odometry from /odom" in open_log(room_bag(odometry="topic", odom_topics=("/odom", "/vo")).write()).notes
+
+
+def test_an_odometry_without_one_pose_is_refused(room_bag, monkeypatch):
+    from glass_nav.recording import frames
+
+    path = room_bag(odometry="topic", laser_tf=False).write()
+    monkeypatch.setattr(frames, "normalised", lambda quaternion: None)
+    assert refusal(path) == "room.bag: /odom holds no pose that can be used"
 
 
 def test_a_given_laser_pose_replaces_tf(room_bag):
@@ -141,6 +162,15 @@ TOPICS = ("/ground_truth (geometry_msgs/PoseStamped), /scan (sensor_msgs/LaserSc
     ({"odometry": "none", "ground_truth": False}, LogOptions(),
      "room.bag: no odometry: no transform odom <- base_link or base_footprint in tf and no topic of "
      "nav_msgs/Odometry; it has /scan (sensor_msgs/LaserScan), /tf_static (tf2_msgs/TFMessage)"),
+    ({"odometry": "topic", "odom_topics": ("/left", "/right")}, LogOptions(),
+     "room.bag: 2 topics of nav_msgs/Odometry (/left, /right), choose one with --odom-topic"),
+    ({"odometry": "topic", "odom_topics": ("/true",)}, LogOptions(ground_truth="/true"),
+     "room.bag: no odometry: no transform odom <- base_link or base_footprint in tf and no topic of "
+     "nav_msgs/Odometry; it has /ground_truth (geometry_msgs/PoseStamped), /scan (sensor_msgs/LaserScan), "
+     "/tf_static (tf2_msgs/TFMessage), /true (nav_msgs/Odometry)"),
+    ({"laser": (float("nan"), 0.0, 0.0)}, LogOptions(),
+     "room.bag: no transform base_link <- laser for the laser on /scan; frames in tf: base_link, odom; "
+     "say where it is with --laser-pose X Y YAW"),
     ({}, LogOptions(odom_frame="wheels"),
      "room.bag: no transform wheels <- base_link or base_footprint; frames in tf: base_link, laser, odom"),
     ({"laser_tf": False}, LogOptions(),
@@ -180,6 +210,19 @@ def test_a_damaged_bag_gives_what_comes_before_the_damage(room_bag):
     assert sum(isinstance(entry, Step) for entry in entries) > 50
     assert isinstance(entries[-1], Refusal)
     assert entries[-1].reason.startswith("the bag is damaged, /scan cannot be read after ")
+
+
+def test_what_is_missing_because_of_damage_is_said_with_the_damage(room_bag):
+    path = room_bag(static_laser=False, scans=400).write()
+    content = bytearray(path.read_bytes())
+    chunk = content.index(b"/tf")  # from the first message of tf on
+    content[chunk + 3000:chunk + 6000] = bytes(3000)
+    path.write_bytes(content)
+    entries = list(open_log(path))
+    assert any(isinstance(entry, Refusal) for entry in entries)
+    assert any(note.startswith("the bag is damaged, /tf cannot be read after ") for note in open_log(path).notes)
+    assert ": no topic /nothing; it has " in refusal(path, LogOptions(ground_truth="/nothing"))
+    assert "; the bag is damaged, /tf cannot be read after " in refusal(path, LogOptions(ground_truth="/nothing"))
 
 
 def one_bad_scan(**changes):

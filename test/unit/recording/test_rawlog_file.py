@@ -93,6 +93,17 @@ def test_a_rawlog_cut_short_gives_what_it_holds_and_says_so(tmp_path):
     assert recording.notes[0].startswith("reading stopped early: the file ends within object ")
 
 
+def test_damage_within_the_compressed_file_ends_the_reading(tmp_path):
+    raw = b"".join((RAWLOGS / f"{name}.rawlog").read_bytes() for name in ("paired", "observations"))
+    raw = gzip.decompress(raw)
+    packed = bytearray(gzip.compress(raw * 50 + np.random.default_rng(0).bytes(10_000)))
+    packed[2000:2400] = bytes(400)
+    (tmp_path / "bad.rawlog").write_bytes(packed)
+    recording = open_log(tmp_path / "bad.rawlog", LogOptions(scan_topic="laser"))
+    assert 0 < len(list(recording)) < 50 * 4
+    assert recording.notes[0].startswith("reading stopped early: the file ")
+
+
 def test_bytes_that_make_no_text_do_no_harm(tmp_path):
     raw = gzip.decompress((RAWLOGS / "paired.rawlog").read_bytes())
     (tmp_path / "bad.rawlog").write_bytes(raw.replace(b"CActionCollection", b"CActionColle\xfftion"))
