@@ -1,5 +1,6 @@
 /// The Python module _mrpt_grid. Private: docstrings, checks and defaults are in sensing/raycast.py.
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <stdexcept>
@@ -119,7 +120,7 @@ py::tuple normals(const GridRaycaster& grid) {
   std::fill(linearity_to, linearity_to + count, 0.0F);
   for (const std::int32_t cell : walls->cells()) {
     const WallNormals::Normal normal = walls->at(cell);
-    angle_to[cell] = normal.angle_rad;
+    angle_to[cell] = std::atan2(normal.y, normal.x);
     linearity_to[cell] = normal.linearity;
   }
   return py::make_tuple(normal_rad, linearity);

@@ -1,37 +1,82 @@
 #include "grid_raycaster.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
-#include "distance_field.hpp"
-#include "seekers.hpp"
 #include "surfaces.hpp"
 
 namespace glass_nav {
 namespace {
 
+/// Unit vectors of the beams: one sine and cosine for each beam and each pose; their sums come by rotation.
+class Beams {
+ public:
+  explicit Beams(const RayBatch& batch) : x_(batch.angle_count), y_(batch.angle_count) {
+    for (std::size_t b = 0; b < batch.angle_count; ++b) {
+      x_[b] = std::cos(batch.angles[b]);
+      y_[b] = std::sin(batch.angles[b]);
+    }
+  }
+
+  std::size_t count() const { return x_.size(); }
+  double x(std::size_t b) const { return x_[b]; }
+  double y(std::size_t b) const { return y_[b]; }
+
+ private:
+  std::vector<double> x_, y_;
+};
+
+/// The rays of consecutive poses, one after the other.
+class RayStream {
+ public:
+  RayStream(const double* first_pose, const Beams& beams, double resolution_m)
+      : pose_(first_pose), beams_(beams), resolution_m_(resolution_m) {}
+
+  Ray next() {
+    if (beam_ == 0) {
+      ray_.x = pose_[0] / resolution_m_;
+      ray_.y = pose_[1] / resolution_m_;
+      cos_yaw_ = std::cos(pose_[2]);
+      sin_yaw_ = std::sin(pose_[2]);
+      pose_ += 3;
+    }
+    ray_.dx = cos_yaw_ * beams_.x(beam_) - sin_yaw_ * beams_.y(beam_);
+    ray_.dy = sin_yaw_ * beams_.x(beam_) + cos_yaw_ * beams_.y(beam_);
+    if (++beam_ == beams_.count()) beam_ = 0;
+    return ray_;
+  }
+
+ private:
+  const double* pose_;
+  const Beams& beams_;
+  double resolution_m_;
+  std::size_t beam_ = 0;
+  double cos_yaw_ = 1.0, sin_yaw_ = 0.0;
+  Ray ray_{};
+};
+
+/// Deals the batch out in chunks: work(index of the first ray, how many, stream of them).
+template <class Work>
+void for_each_chunk(const RayBatch& batch, double resolution_m, const Work& work) {
+  constexpr std::ptrdiff_t kPoses = 16;
+  const Beams beams(batch);
+  const auto pose_count = static_cast<std::ptrdiff_t>(batch.angle_count > 0 ? batch.pose_count : 0);
+#pragma omp parallel for num_threads(batch.threads) if (batch.threads > 1) schedule(dynamic)
+  for (std::ptrdiff_t first = 0; first < pose_count; first += kPoses) {
+    const std::ptrdiff_t poses = std::min(kPoses, pose_count - first);
+    RayStream rays(batch.poses + 3 * first, beams, resolution_m);
+    work(static_cast<std::size_t>(first) * beams.count(), static_cast<std::size_t>(poses) * beams.count(), rays);
+  }
+}
+
 /// Calls work(index, ray) for every ray of the batch, index in the order of the result arrays.
 template <class Work>
 void for_each_ray(const RayBatch& batch, double resolution_m, const Work& work) {
-  // One sine and cosine for each pose and each beam; their sums come by rotation.
-  std::vector<double> beam_x(batch.angle_count), beam_y(batch.angle_count);
-  for (std::size_t b = 0; b < batch.angle_count; ++b) {
-    beam_x[b] = std::cos(batch.angles[b]);
-    beam_y[b] = std::sin(batch.angles[b]);
-  }
-  const auto pose_count = static_cast<std::ptrdiff_t>(batch.pose_count);
-#pragma omp parallel for num_threads(batch.threads) if (batch.threads > 1) schedule(dynamic, 8)
-  for (std::ptrdiff_t p = 0; p < pose_count; ++p) {
-    const double* pose = batch.poses + 3 * p;
-    const double cos_yaw = std::cos(pose[2]), sin_yaw = std::sin(pose[2]);
-    Ray ray{pose[0] / resolution_m, pose[1] / resolution_m, 0.0, 0.0};
-    for (std::size_t b = 0; b < batch.angle_count; ++b) {
-      ray.dx = cos_yaw * beam_x[b] - sin_yaw * beam_y[b];
-      ray.dy = sin_yaw * beam_x[b] + cos_yaw * beam_y[b];
-      work(static_cast<std::size_t>(p) * batch.angle_count + b, ray);
-    }
-  }
+  for_each_chunk(batch, resolution_m, [&](std::size_t first, std::size_t count, RayStream& rays) {
+    for (std::size_t i = 0; i < count; ++i) work(first + i, rays.next());
+  });
 }
 
 constexpr float kFree = 1.0F, kUnknown = 0.5F, kOccupied = 0.0F;  // MRPT keeps the probability of being free
@@ -59,73 +104,78 @@ GridRaycaster::GridRaycaster(const std::int8_t* occupancy, int height, int width
                                 std::to_string(map_.getSizeY()) + " cells of a grid of " + std::to_string(width) +
                                 " x " + std::to_string(height));
   }
-  occupied_.resize(count);
   std::vector<std::uint8_t> blocked(count);
   for (std::int64_t cell = 0; cell < count; ++cell) {
     const bool unknown = occupancy[cell] < 0;
-    occupied_[cell] = !unknown && occupancy[cell] >= occupied_percent ? 1 : 0;
-    blocked[cell] = occupied_[cell] != 0 || (unknown && unknown_stops) ? 1 : 0;
+    const bool occupied = !unknown && occupancy[cell] >= occupied_percent;
+    blocked[cell] = occupied || (unknown && unknown_stops) ? 1 : 0;
     map_.setCell(static_cast<int>(cell % width), static_cast<int>(cell / width),
-                 occupied_[cell] != 0 ? kOccupied : (unknown ? kUnknown : kFree));
+                 occupied ? kOccupied : (unknown ? kUnknown : kFree));
   }
-  distance_ = chessboard_distance(blocked, width, height);
+  free_squares_ = std::make_unique<const FreeSquares>(blocked, width, height);
 }
 
 const WallNormals& GridRaycaster::normals() const {
-  std::call_once(normals_once_,
-                 [this] { normals_ = std::make_unique<const WallNormals>(occupied_, width_, height_); });
+  std::call_once(normals_once_, [this] {
+    const GridCells grid = cells();
+    std::vector<std::uint8_t> occupied(map_.getRawMap().size());
+    for (std::size_t i = 0; i < occupied.size(); ++i) occupied[i] = grid.occupied(static_cast<std::int32_t>(i)) ? 1 : 0;
+    normals_ = std::make_unique<const WallNormals>(occupied, width_, height_);
+  });
   return *normals_;
 }
 
+GridCells GridRaycaster::cells() const { return {width_, height_, map_.getRawMap().data(), free_squares_.get()}; }
+
 template <class Use>
 void GridRaycaster::with_seeker(const Use& use) const {
-  const GridCells cells{width_, height_, distance_.data(), occupied_.data()};
+  const GridCells grid = cells();
   if (backend_ == Backend::exact) {
-    use(cells, ExactSeeker(cells));
+    use(grid, ExactSeeker(grid));
   } else {
-    use(cells, MrptSeeker(cells, map_, resolution_m_));
+    use(grid, MrptSeeker(grid, map_, resolution_m_));
   }
 }
 
-void GridRaycaster::cast_first(const RayBatch& rays, double* range_m, std::int32_t* cell) const {
-  const double t_max = rays.max_range_m / resolution_m_;
-  with_seeker([&](const GridCells& cells, const auto& seeker) {
-    for_each_ray(rays, resolution_m_, [&](std::size_t i, const Ray& ray) {
-      GridWalk walk(ray, cells.width, cells.height, t_max);
-      const std::int32_t met = seeker.seek(ray, walk, NothingIgnored{});
-      range_m[i] = met < 0 ? kInfinity : walk.t() * resolution_m_;
-      if (cell != nullptr) cell[i] = met;
+void GridRaycaster::cast_first(const RayBatch& batch, double* range_m, std::int32_t* cell) const {
+  const double t_max = batch.max_range_m / resolution_m_;
+  with_seeker([&](const GridCells&, const auto& seeker) {
+    for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
+      seeker.seek_all(count, t_max, [&] { return rays.next(); },
+                      [&](std::size_t i, const GridWalk& walk, std::int32_t met) {
+                        range_m[first + i] = met < 0 ? kInfinity : walk.t() * resolution_m_;
+                        if (cell != nullptr) cell[first + i] = met;
+                      });
     });
   });
 }
 
-void GridRaycaster::cast_surfaces(const RayBatch& rays, const SurfaceLimits& limits,
+void GridRaycaster::cast_surfaces(const RayBatch& batch, const SurfaceLimits& limits,
                                   const SurfaceArrays& out) const {
-  const double t_max = rays.max_range_m / resolution_m_;
+  const double t_max = batch.max_range_m / resolution_m_;
   const SurfaceRules rules{limits.max_thickness_m / resolution_m_, limits.min_linearity,
                            limits.min_gap_m / resolution_m_};
   const WallNormals& wall_normals = normals();  // before the threads start
-  with_seeker([&](const GridCells& cells, const auto& seeker) {
-    const SurfaceFinder finder(cells, seeker, wall_normals, rules);
-    for_each_ray(rays, resolution_m_, [&](std::size_t i, const Ray& ray) {
+  with_seeker([&](const GridCells& grid, const auto& seeker) {
+    const SurfaceFinder finder(grid, seeker, wall_normals, rules);
+    for_each_ray(batch, resolution_m_, [&](std::size_t i, const Ray& ray) {
       const Surfaces found = finder.along(ray, t_max);
       for (std::size_t k = 0; k < 3; ++k) {
         out.range_m[k][i] = found.range[k] * resolution_m_;
         out.cell[k][i] = found.cell[k];
       }
       for (std::size_t k = 0; k < 2; ++k) out.thickness_m[k][i] = found.thickness[k] * resolution_m_;
-      out.normal_rad[i] = found.normal.angle_rad;
+      out.normal_rad[i] = std::atan2(found.normal.y, found.normal.x);
       out.linearity[i] = found.normal.linearity;
       out.mirrored_m[i] = found.mirrored * resolution_m_;
     });
   });
 }
 
-void GridRaycaster::simulate_scan_ray_raw(const RayBatch& rays, double* range_m) const {
-  const GridCells cells{width_, height_, distance_.data(), occupied_.data()};
-  const MrptSeeker seeker(cells, map_, resolution_m_);
-  const double t_max = rays.max_range_m / resolution_m_;
-  for_each_ray(rays, resolution_m_, [&](std::size_t i, const Ray& ray) {
+void GridRaycaster::simulate_scan_ray_raw(const RayBatch& batch, double* range_m) const {
+  const MrptSeeker seeker(cells(), map_, resolution_m_);
+  const double t_max = batch.max_range_m / resolution_m_;
+  for_each_ray(batch, resolution_m_, [&](std::size_t i, const Ray& ray) {
     range_m[i] = seeker.free_cells(ray, 0.0, t_max) * resolution_m_;
   });
 }

@@ -10,12 +10,14 @@
 
 #include <mrpt/maps/COccupancyGridMap2D.h>
 
+#include "free_squares.hpp"
+#include "seekers.hpp"
 #include "wall_normals.hpp"
 
 namespace glass_nav {
 
 enum class Backend {
-  exact,  // leaps by the chessboard distance, exact to the cell boundary
+  exact,  // leaps from free square to free square, exact to the cell boundary
   mrpt,   // COccupancyGridMap2D::simulateScanRay says where to look; see MrptSeeker
 };
 
@@ -62,18 +64,19 @@ class GridRaycaster {
   int height() const { return height_; }
 
   /// First occupied cell along every ray: range_m inf and cell -1 where there is none. `cell` may be null.
-  void cast_first(const RayBatch& rays, double* range_m, std::int32_t* cell) const;
+  void cast_first(const RayBatch& batch, double* range_m, std::int32_t* cell) const;
 
   /// First, second and third surface along every ray, with what lies between.
-  void cast_surfaces(const RayBatch& rays, const SurfaceLimits& limits, const SurfaceArrays& out) const;
+  void cast_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const SurfaceArrays& out) const;
 
   /// What simulateScanRay itself answers, faults included, asked to look to max_range_m: for comparison only.
-  void simulate_scan_ray_raw(const RayBatch& rays, double* range_m) const;
+  void simulate_scan_ray_raw(const RayBatch& batch, double* range_m) const;
 
   /// Computed when first asked for; any thread may ask.
   const WallNormals& normals() const;
 
  private:
+  GridCells cells() const;
   template <class Use>
   void with_seeker(const Use& use) const;  // use(GridCells, seeker of the backend)
 
@@ -81,8 +84,7 @@ class GridRaycaster {
   double resolution_m_;
   Backend backend_;
   mrpt::maps::COccupancyGridMap2D map_;
-  std::vector<std::uint8_t> distance_;  // chessboard distance to the nearest cell where a ray may end
-  std::vector<std::uint8_t> occupied_;
+  std::unique_ptr<const FreeSquares> free_squares_;  // between the cells where a ray may end
   mutable std::once_flag normals_once_;
   mutable std::unique_ptr<const WallNormals> normals_;
 };

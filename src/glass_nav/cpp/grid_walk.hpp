@@ -25,6 +25,8 @@ class GridWalk {
   // (1e-12), far below what a map or a sensor resolves.
   static constexpr double kCorner = 1e-9;
 
+  GridWalk() : GridWalk({0.0, 0.0, 1.0, 0.0}, 1, 1, 0.0) {}  // to be assigned to
+
   /// Stands in the cell of the origin, or, if that is outside the grid, in the first cell that the ray enters.
   GridWalk(const Ray& ray, int width, int height, double t_max)
       : x_axis_(ray.x, ray.dx, width), y_axis_(ray.y, ray.dy, height), t_max_(t_max) {
@@ -48,31 +50,35 @@ class GridWalk {
   /// Flat index (row * width + column) of the present cell.
   std::int32_t cell() const { return index(x_axis_.cell, y_axis_.cell); }
 
-  /// Goes on to the first cell whose chessboard distance from the present one is `cells`.
+  bool minus_x() const { return x_axis_.turned; }
+  bool minus_y() const { return y_axis_.turned; }
+
+  /// Goes on to the first cell beyond the square of `cells` that starts in the present one and lies ahead.
   ///
-  /// All cells nearer than that must be of no interest; 1 steps into the very next cell.
+  /// What is in the square must be of no interest; 1 steps into the very next cell.
   void leap(int cells) {
     const double tx = x_axis_.crossing(x_axis_.cell + cells);
     const double ty = y_axis_.crossing(y_axis_.cell + cells);
+    // Which axis is crossed first is as good as random: a branch on it would be guessed wrong every other time, so
+    // both coordinates go the same way and only their bounds differ.
+    t_ = std::min(tx, ty);
     crossed_x_ = tx < ty;
-    if (crossed_x_) {
-      t_ = tx;
-      y_axis_.follow(t_, cells);
-      x_axis_.cell += cells;
-    } else {
-      t_ = ty;
-      x_axis_.follow(t_, cells);
-      y_axis_.cell += cells;
-    }
+    const double past_x = x_axis_.follow(t_, cells, crossed_x_);
+    const double past_y = y_axis_.follow(t_, cells, !crossed_x_);
+    past_boundary_ = std::min(past_x, past_y);  // on the axis that was crossed it is 1
   }
 
   /// The other cell at a corner: a ray that goes exactly through a corner touches both cells beside it, the walk
   /// itself visits at most one of them before it stands behind the corner. -1 if there is no such corner here.
   std::int32_t cell_beside_corner() const {
-    if (crossed_x_) {
-      return y_axis_.just_entered(t_) ? index(x_axis_.cell, y_axis_.cell - 1) : -1;
-    }
-    return x_axis_.just_entered(t_) ? index(x_axis_.cell - 1, y_axis_.cell) : -1;
+    if (!at_corner()) return -1;
+    return crossed_x_ ? index(x_axis_.cell, y_axis_.cell - 1) : index(x_axis_.cell - 1, y_axis_.cell);
+  }
+
+  /// True if the present cell was entered through its corner.
+  bool at_corner() const {
+    if (past_boundary_ > kCorner) return false;  // nearly always; what follows would be a branch guessed wrong
+    return crossed_x_ ? y_axis_.just_entered(t_) : x_axis_.just_entered(t_);
   }
 
  private:
@@ -83,8 +89,7 @@ class GridWalk {
     Axis(double origin, double direction, int cells) : size(cells) {
       if (std::abs(direction) < kAxisParallel) direction = 0.0;
       turned = direction < 0.0;
-      const double floor_cell = std::clamp(std::floor(origin), -1.0, static_cast<double>(cells));
-      const int start_cell = static_cast<int>(floor_cell);
+      const int start_cell = origin < 0.0 ? -1 : origin < cells ? static_cast<int>(origin) : cells;
       start = turned ? size - origin : origin;
       speed = std::abs(direction);
       per_speed = speed > 0.0 ? 1.0 / speed : std::numeric_limits<double>::infinity();
@@ -97,9 +102,14 @@ class GridWalk {
     /// t at which the ray crosses the lower boundary of a cell ahead.
     double crossing(int ahead) const { return (ahead - start) * per_speed; }
 
-    /// The cell at t, which rounding must not move back nor to where the other axis has to be crossed first.
-    void follow(double t, int cells) {
-      cell = std::clamp(static_cast<int>(start + t * speed), cell, cell + cells - 1);
+    /// Goes to the cell at t, which is `cells` ahead if that boundary is the one crossed, and nearer otherwise: rounding
+    /// has no say in it. Returns how far the coordinate is past the last boundary it may have crossed [cells].
+    double follow(double t, int cells, int crossed) {
+      const double coordinate = start + t * speed;
+      const int before = static_cast<int>(coordinate);
+      const int reached = std::min(std::max(before, cell), cell + cells - 1);
+      cell = std::max(reached, cell + (cells & -crossed));
+      return coordinate - reached;
     }
 
     /// The cell at t, where the ray enters the grid; `size` if it passes by.
@@ -125,6 +135,7 @@ class GridWalk {
     const double ty = y_axis_.cell < 0 ? y_axis_.crossing(0) : 0.0;
     t_ = std::max(tx, ty);
     crossed_x_ = tx >= ty;
+    past_boundary_ = 0.0;
     if (t_ > t_max_) return;
     x_axis_.enter(t_);
     y_axis_.enter(t_);
@@ -135,6 +146,7 @@ class GridWalk {
   Axis x_axis_, y_axis_;
   double t_max_;
   double t_ = 0.0;
+  double past_boundary_ = 1.0;  // of the cell, along the axis that was not crossed
   std::int32_t cell_;  // flat index of the cell that is (0, 0) after turning over
   std::int32_t step_x_, step_y_;
   bool crossed_x_ = false;

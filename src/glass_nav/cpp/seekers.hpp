@@ -2,12 +2,15 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 
 #include <mrpt/maps/COccupancyGridMap2D.h>
 
+#include "free_squares.hpp"
 #include "grid_walk.hpp"
 
 namespace glass_nav {
@@ -15,19 +18,22 @@ namespace glass_nav {
 /// The cells as rays see them; all arrays are row-major and belong to the raycaster.
 struct GridCells {
   int width, height;
-  const std::uint8_t* distance;  // chessboard distance to the nearest cell where a ray may end, see distance_field.hpp
-  const std::uint8_t* occupied;  // not 0: a surface
+  const mrpt::maps::COccupancyGridMap2D::cellType* log_odds;  // of being free
+  const FreeSquares* free_squares;
+
+  /// A surface.
+  bool occupied(std::int32_t cell) const { return log_odds[cell] < 0; }
 
   /// A cell that ends a ray without being a surface (unknown, if those are to stop a ray).
-  bool stops(std::int32_t cell) const { return distance[cell] == 0 && occupied[cell] == 0; }
+  bool stops(std::int32_t cell) const { return free_squares->towards(false, false)[cell] == 0 && !occupied(cell); }
 
   /// The occupied cell that the ray meets where the walk stands: its own or one beside the corner; -1 none.
   template <class Ignored>
   std::int32_t met(const GridWalk& walk, const Ignored& ignored) const {
     const std::int32_t cell = walk.cell();
-    if (occupied[cell] != 0 && !ignored(cell)) return cell;
+    if (occupied(cell) && !ignored(cell)) return cell;
     const std::int32_t beside = walk.cell_beside_corner();
-    return beside >= 0 && occupied[beside] != 0 && !ignored(beside) ? beside : -1;
+    return beside >= 0 && occupied(beside) && !ignored(beside) ? beside : -1;
   }
 };
 
@@ -36,7 +42,7 @@ struct NothingIgnored {
   bool operator()(std::int32_t) const { return false; }
 };
 
-/// Leaps over free space by the chessboard distance; exact.
+/// Leaps from free square to free square; exact.
 class ExactSeeker {
  public:
   explicit ExactSeeker(const GridCells& cells) : cells_(cells) {}
@@ -44,19 +50,67 @@ class ExactSeeker {
   /// Walks on to the next occupied cell that is not ignored. Returns it, or -1 where the ray ends before.
   template <class Ignored>
   std::int32_t seek(const Ray&, GridWalk& walk, const Ignored& ignored) const {
-    while (walk.inside()) {
-      const int distance = cells_.distance[walk.cell()];
-      if (distance <= 1) {  // only here can a cell beside a corner be occupied: it would touch the present one
-        const std::int32_t met = cells_.met(walk, ignored);
-        if (met >= 0) return met;
-        if (cells_.stops(walk.cell())) return -1;
+    const std::uint8_t* free_square = cells_.free_squares->towards(walk.minus_x(), walk.minus_y());
+    std::int32_t met = kOnTheWay;
+    while (met == kOnTheWay) met = step(walk, free_square, ignored);
+    return met;
+  }
+
+  /// Seeks along many rays from their origins, several at a time: while one waits for the cell it leapt to to come from
+  /// memory, the others go on. Half as long for scattered poses as one ray after the other.
+  ///
+  /// @param next_ray  called count times
+  /// @param found     found(i, walk, cell): where the walk of the ray number i ended, and what seek() returns
+  template <class NextRay, class Found>
+  void seek_all(std::size_t count, double t_max, const NextRay& next_ray, const Found& found) const {
+    std::array<Lane, kLanes> lanes;
+    std::size_t next = 0, busy = 0;
+    const auto start = [&](Lane& lane) {
+      lane.walk = GridWalk(next_ray(), cells_.width, cells_.height, t_max);
+      lane.free_square = cells_.free_squares->towards(lane.walk.minus_x(), lane.walk.minus_y());
+      lane.ray = next++;
+    };
+    while (busy < kLanes && next < count) start(lanes[busy++]);
+    while (busy > 0) {
+      for (std::size_t i = 0; i < busy; ++i) {
+        Lane& lane = lanes[i];
+        const std::int32_t met = step(lane.walk, lane.free_square, NothingIgnored{});
+        if (met == kOnTheWay) continue;
+        found(lane.ray, lane.walk, met);
+        if (next < count) {
+          start(lane);
+        } else {
+          lane = lanes[--busy];  // its turn comes in the next round
+        }
       }
-      walk.leap(std::max(distance, 1));
     }
-    return -1;
   }
 
  private:
+  static constexpr std::int32_t kOnTheWay = -2;
+  static constexpr std::size_t kLanes = 16;
+
+  struct Lane {
+    GridWalk walk;
+    const std::uint8_t* free_square = nullptr;
+    std::size_t ray = 0;
+  };
+
+  /// Looks at the present cell and leaps on. Returns what seek() is to return, or kOnTheWay.
+  template <class Ignored>
+  std::int32_t step(GridWalk& walk, const std::uint8_t* free_square, const Ignored& ignored) const {
+    if (!walk.inside()) return -1;
+    const int edge = free_square[walk.cell()];
+    if (edge == 0 || walk.at_corner()) {
+      const std::int32_t met = cells_.met(walk, ignored);
+      if (met >= 0) return met;
+      if (cells_.stops(walk.cell())) return -1;
+    }
+    walk.leap(std::max(edge, 1));
+    __builtin_prefetch(free_square + walk.cell());  // may lie outside: a prefetch does not fault
+    return kOnTheWay;
+  }
+
   GridCells cells_;
 };
 
@@ -87,6 +141,17 @@ class MrptSeeker {
       }
     }
     return -1;
+  }
+
+  /// As ExactSeeker::seek_all, one ray after the other.
+  template <class NextRay, class Found>
+  void seek_all(std::size_t count, double t_max, const NextRay& next_ray, const Found& found) const {
+    for (std::size_t i = 0; i < count; ++i) {
+      const Ray ray = next_ray();
+      GridWalk walk(ray, cells_.width, cells_.height, t_max);
+      const std::int32_t met = seek(ray, walk, NothingIgnored{});
+      found(i, walk, met);
+    }
   }
 
   /// simulateScanRay as it is, looking from ray length t to t_max [cells]; inf if it finds nothing.

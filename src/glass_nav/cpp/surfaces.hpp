@@ -26,7 +26,8 @@ struct Surfaces {
   std::array<double, 3> range{kInfinity, kInfinity, kInfinity};
   std::array<std::int32_t, 3> cell{-1, -1, -1};
   std::array<double, 2> thickness{kInfinity, kInfinity};
-  WallNormals::Normal normal{std::numeric_limits<float>::quiet_NaN(), 0.0F};  // of the first, towards the origin
+  WallNormals::Normal normal{std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::quiet_NaN(),
+                             0.0F};  // of the first, towards the origin
   double mirrored = kInfinity;
 };
 
@@ -78,13 +79,12 @@ class SurfaceFinder {
   }
 
   static double projection(const WallNormals::Normal& normal, const Ray& ray) {
-    return std::cos(normal.angle_rad) * ray.dx + std::sin(normal.angle_rad) * ray.dy;
+    return normal.x * ray.dx + normal.y * ray.dy;
   }
 
   static WallNormals::Normal facing(WallNormals::Normal normal, const Ray& ray) {
-    constexpr double kPi = 3.14159265358979323846;
-    if (projection(normal, ray) > 0.0) normal.angle_rad += static_cast<float>(normal.angle_rad > 0.0F ? -kPi : kPi);
-    return normal;
+    if (projection(normal, ray) <= 0.0) return normal;  // also if it is NaN
+    return {-normal.x, -normal.y, normal.linearity};
   }
 
   /// Leaves the run of occupied cells in which the walk stands, gaps too short to count included.
@@ -95,7 +95,7 @@ class SurfaceFinder {
     const double t_in = walk.t();
     double t_out = t_in;
     for (;;) {
-      const bool occupied = cells_.occupied[walk.cell()] != 0;
+      const bool occupied = cells_.occupied(walk.cell());
       walk.leap(1);
       if (occupied) t_out = walk.t();
       if (t_out - t_in > max_length || t_out > walk.t_max()) return kInfinity;
@@ -112,8 +112,8 @@ class SurfaceFinder {
   double mirrored(const Ray& ray, double t, std::int32_t cell, const WallNormals::Normal& normal,
                   double t_max) const {
     if (!usable(normal)) return kInfinity;
-    const double nx = std::cos(normal.angle_rad), ny = std::sin(normal.angle_rad);
-    const double into = ray.dx * nx + ray.dy * ny;
+    const double nx = normal.x, ny = normal.y;
+    const double into = projection(normal, ray);
     const Ray reflected{ray.x + t * ray.dx, ray.y + t * ray.dy, ray.dx - 2.0 * into * nx, ray.dy - 2.0 * into * ny};
     GridWalk walk(reflected, cells_.width, cells_.height, t_max - t);
     const MirrorItself mirror{cells_.width, cell, nx, ny};

@@ -8,8 +8,7 @@
 namespace glass_nav {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr WallNormals::Normal kNone{std::numeric_limits<float>::quiet_NaN(), 0.0F};
+constexpr WallNormals::Normal kNone{std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::quiet_NaN(), 0.0F};
 
 /// The occupied cells with a side towards a cell that is not occupied; outside the grid nothing is.
 std::vector<std::uint8_t> boundary_of(const std::vector<std::uint8_t>& occupied, int width, int height) {
@@ -124,8 +123,9 @@ WallNormals::Normal normal_at(int x, int y, Patch& patch) {
   const Line shape = patch.shape_at(x, y);
   if (shape.linearity == 0.0) return kNone;
   const double along = shape.linearity < kWorthRefining ? shape.along_rad : patch.refined(x, y, shape).along_rad;
-  const double across = along > 0.0 ? along - 0.5 * kPi : along + 0.5 * kPi;
-  return {static_cast<float>(across), static_cast<float>(shape.linearity)};
+  const double sign = along > 0.0 ? 1.0 : -1.0;
+  return {static_cast<float>(sign * std::sin(along)), static_cast<float>(-sign * std::cos(along)),
+          static_cast<float>(shape.linearity)};
 }
 
 }  // namespace

@@ -17,13 +17,13 @@ class WallNormals {
   static constexpr int kStretchCells = 16;
 
   struct Normal {
-    float angle_rad;  // in (-pi/2, pi/2]: the sign is the ray's business; NaN where there is none
+    float x, y;       // unit vector, x >= 0: the sign is the ray's business; NaN where there is none
     float linearity;  // 1 - smaller / larger principal variance: 1 straight wall, 0 no direction at all
   };
 
   WallNormals(const std::vector<std::uint8_t>& occupied, int width, int height);
 
-  /// Normal of one cell; {NaN, 0} for a cell inside a wall or without neighbours.
+  /// Normal of one cell; {NaN, NaN, 0} for a cell inside a wall or without neighbours.
   Normal at(std::int32_t cell) const;
 
   /// Flat indices of the boundary cells, ascending.
