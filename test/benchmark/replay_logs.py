@@ -4,6 +4,7 @@
     python test/benchmark/replay_logs.py                         5 seeds, one process
     python test/benchmark/replay_logs.py --jobs 2 --seeds 3 --logs uob_trace0 olin_mac --out figures.json
     python test/benchmark/replay_logs.py --set laser_max_beams=90 --set vote_mode=paper
+    python test/benchmark/replay_logs.py --even                  maps of the even scans, errors of the odd ones
 
 Starts as AMCL did for its figures: at the first reference pose. The logs are in GLASS_NAV_DATA (default
 ../shared/data beside the repository), the rawlog comes with apt's mrpt-common. A log is read once a process.
@@ -29,6 +30,7 @@ import yaml
 
 from glass_nav import params
 from glass_nav.cli import replay_run
+from glass_nav.evaluation import pose_errors
 from glass_nav.localization.glass_mcl import GlassMcl, GlassMclParams
 from glass_nav.recording.log_file import open_log
 from glass_nav.recording.recording import LogOptions, Recording
@@ -53,29 +55,33 @@ PEERS = {  # AMCL 1.17.3, the better of two parameter sets; on the uwb log MRPT'
     "olin_mac": Peer(0.059, 0.0), "mit_racecar2": Peer(0.097, 0.0), "uwb": Peer(0.149, 0.0)}
 
 
-def files(name: str) -> Tuple[Path, Path]:
-    """The log and its map."""
+def files(name: str, even: bool) -> Tuple[Path, Path]:
+    """The log and its map, or the map that only the even scans of the log have drawn."""
     if name == "uwb":
         stem = "uwb_ro-localization_demo"
         return MRPT_DATA / f"{stem}.rawlog", MRPT_DATA / f"{stem}_map.gridmap.gz"
-    return DATA / "logs" / name / f"{name}.bag", DATA / "logs" / name / "map.yaml"
+    return DATA / "logs" / name / f"{name}.bag", DATA / "logs" / name / ("map_even.yaml" if even else "map.yaml")
 
 
 @lru_cache(maxsize=None)
-def load(name: str) -> Tuple[Recording, GridMap]:
-    log, grid = files(name)
+def load(name: str, even: bool) -> Tuple[Recording, GridMap]:
+    log, grid = files(name, even)
     return open_log(log, LogOptions()).in_memory(), map_file.load(grid)
 
 
-def run(job: Tuple[str, int, GlassMclParams]) -> Dict[str, Any]:
+def run(job: Tuple[str, int, GlassMclParams, bool]) -> Dict[str, Any]:
     """One log, one seed."""
-    name, seed, settings = job
-    recording, grid_map = load(name)
+    name, seed, settings, even = job
+    recording, grid_map = load(name, even)
     truth = recording.ground_truth
     assert truth is not None
     mcl = GlassMcl(settings, grid_map, np.random.default_rng(seed))
     result = replay_run.run(recording, mcl, lambda stamp: mcl.set_pose(truth.at(np.int64(stamp)), COVARIANCE), seed)
-    return {"log": name, **result.metrics()}
+    figures = {"log": name, **result.metrics()}
+    if even:
+        errors = result.errors
+        figures.update(pose_errors.summary(pose_errors.PoseErrors(errors.position_m[1::2], errors.yaw_rad[1::2])))
+    return figures
 
 
 def row(name: str, runs: List[Dict[str, Any]]) -> str:
@@ -117,13 +123,16 @@ def main() -> int:
                         help=" ".join(PEERS))
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--even", action="store_true", help="only the logs that have a map_even.yaml, with it")
     parser.add_argument("--params", type=Path, help="yaml of parameters")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="one parameter")
     parser.add_argument("--out", type=Path, help="JSON with all figures of all runs")
     arguments = parser.parse_args()
     settings = settings_from(arguments.params, arguments.set)
-    jobs = [(name, seed, settings) for name in arguments.logs for seed in range(arguments.seeds)]
-    runs: Dict[str, List[Dict[str, Any]]] = {name: [] for name in arguments.logs}
+    logs = [name for name in arguments.logs if not arguments.even or files(name, True)[1].name == "map_even.yaml"
+            and files(name, True)[1].is_file()]
+    jobs = [(name, seed, settings, arguments.even) for name in logs for seed in range(arguments.seeds)]
+    runs: Dict[str, List[Dict[str, Any]]] = {name: [] for name in logs}
     began = time.monotonic()
     print(HEADER, flush=True)
     with multiprocessing.Pool(arguments.jobs) as pool:  # imap keeps the order: a row is printed when complete
