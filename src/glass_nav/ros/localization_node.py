@@ -347,7 +347,7 @@ class LocalizationNode:
             return
         started = time.process_time()
         try:
-            scan = conversions.scan_from_msg(msg, mounting)
+            scan = conversions.scan_from_msg(msg, mounting, self._p.laser_min_range, self._p.laser_max_range)
             if self._start is not None:
                 self._apply_start(scan.stamp_ns, odom_from_base)
             estimate = self._mcl.update(scan, odom_from_base)
@@ -486,7 +486,7 @@ def main(name: str = "glass_localization") -> None:
         rospy.logfatal(str(err))
         sys.exit(2)
     if unused:
-        rospy.loginfo(f"parameters of amcl that have no meaning here, not used: ~{', ~'.join(unused)}")
+        rospy.loginfo(f"parameters of amcl that this filter does not use: ~{', ~'.join(unused)}")
     node = LocalizationNode(p)
     try:
         node.run()

@@ -52,6 +52,8 @@ class LocalizationNodeParams:
     initial_cov_xx: float = 0.25           # [m^2]
     initial_cov_yy: float = 0.25           # [m^2]
     initial_cov_aa: float = (math.pi / 12.0) ** 2  # [rad^2]
+    laser_min_range: float = -1.0          # [m] nearer ranges are no answers; < 0: as the scan says
+    laser_max_range: float = -1.0          # [m] farther ones neither; < 0: as the scan says
     force_update_after_initialpose: bool = False
     force_update_after_set_map: bool = False
     gui_publish_rate: float = -1.0         # [Hz] of particlecloud and ~beam_cloud; <= 0: no limit
@@ -78,6 +80,10 @@ class LocalizationNodeParams:
                      "initial_cov_aa", "std_warn_level_x", "std_warn_level_y", "std_warn_level_yaw"):
             if not getattr(self, name) >= 0.0:
                 raise ValueError(f"~{name} must be >= 0, got {getattr(self, name)}")
+
+        if 0.0 <= self.laser_max_range <= max(self.laser_min_range, 0.0):
+            raise ValueError("~laser_max_range must be above 0 and ~laser_min_range, or < 0 for the scan's own, "
+                             f"got {self.laser_max_range}")
 
     @property
     def initial_pose(self) -> np.ndarray:

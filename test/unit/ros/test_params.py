@@ -20,7 +20,8 @@ AMCL_DEFAULTS = {
     "transform_tolerance": 0.1, "use_map_topic": False, "first_map_only": False, "initial_pose_x": 0.0,
     "initial_pose_y": 0.0, "initial_pose_a": 0.0, "initial_cov_xx": 0.25, "initial_cov_yy": 0.25,
     "initial_cov_aa": (math.pi / 12) ** 2, "gui_publish_rate": -1.0, "save_pose_rate": 0.5,
-    "force_update_after_initialpose": False, "force_update_after_set_map": False,
+    "laser_min_range": -1.0, "laser_max_range": -1.0, "force_update_after_initialpose": False,
+    "force_update_after_set_map": False,
     "std_warn_level_x": 0.2, "std_warn_level_y": 0.2, "std_warn_level_yaw": 0.1}
 
 
@@ -63,6 +64,8 @@ def test_all_of_amcls_parameters_are_known_at_once():
     ({"initial_pose_x": math.nan}, "/n: ~initial_pose_x must be finite, got nan"),
     ({"initial_cov_aa": -0.1}, "/n: ~initial_cov_aa must be >= 0, got -0.1"),
     ({"transform_tolerance": -1}, "/n: ~transform_tolerance must be >= 0, got -1.0"),
+    ({"laser_max_range": 0}, "/n: ~laser_max_range must be above 0 and ~laser_min_range"),
+    ({"laser_max_range": 2.0, "laser_min_range": 2.0}, "or < 0 for the scan's own, got 2.0"),
     ({"base_frame_id": ""}, "/n: ~base_frame_id must name a frame, got ''"),
     ({"odom_frame_id": "/map"}, "must differ, got 'map', 'base_link', 'map'")])
 def test_what_cannot_be_used_is_refused_in_one_line(given, text):
