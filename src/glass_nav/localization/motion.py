@@ -23,11 +23,11 @@ _ON_THE_SPOT_M = 0.01  # below this way the direction of travel is noise
 class OdometryNoise:
     """How wrong odometry is; the names and meanings are AMCL's."""
     odom_model_type: str = "diff-corrected"
-    odom_alpha1: float = 0.05  # turn from turn (variance [rad2/rad2] in the corrected models)
-    odom_alpha2: float = 0.02  # turn from way [rad2/m2]
-    odom_alpha3: float = 0.05  # way from way [m2/m2]
-    odom_alpha4: float = 0.02  # way from turn [m2/rad2]
-    odom_alpha5: float = 0.05  # sideways from way, omni only [m2/m2]
+    odom_alpha1: float = 0.02  # turn from turn (variance [rad2/rad2] in the corrected models)
+    odom_alpha2: float = 0.01  # turn from way [rad2/m2]
+    odom_alpha3: float = 0.02  # way from way [m2/m2]
+    odom_alpha4: float = 0.01  # way from turn [m2/rad2]
+    odom_alpha5: float = 0.02  # sideways from way, omni only [m2/m2]
 
     def __post_init__(self) -> None:
         if self.odom_model_type not in MODELS:

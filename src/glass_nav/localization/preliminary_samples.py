@@ -14,7 +14,8 @@ import numpy as np
 from glass_nav.geometry import angles
 
 _RINGS = (1.0, 2.0)                # of the standard deviation
-_HEADINGS = (0.0, -1.0, 1.0)       # of the standard deviation, taken in turn
+_WIDEST = 2.0                      # headings reach as far, in standard deviations
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)  # multiples of it fill an interval evenly, however many there are
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,6 @@ def around(map_from_base: np.ndarray, covariance: np.ndarray, shape: Preliminary
     on_circle = np.stack([np.cos(bearing), np.sin(bearing)], axis=-1) * ring[:, None]
     samples = np.tile(np.asarray(map_from_base, float), (shape.sample_count, 1))
     samples[1:, :2] += (on_circle * radii) @ axes.T
-    samples[1:, 2] += np.resize(_HEADINGS, count) * np.resize(np.repeat(_RINGS, len(_HEADINGS)), count) * heading
+    samples[1:, 2] += _WIDEST * (2.0 * np.mod(_GOLDEN * np.arange(1, count + 1), 1.0) - 1.0) * heading
     samples[:, 2] = angles.wrap(samples[:, 2])
     return samples

@@ -8,7 +8,7 @@ much worse than it did lately.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,13 +18,21 @@ from glass_nav.localization.preliminary_samples import PreliminarySamples
 from glass_nav.localization.scan_alignment import Alignment
 from glass_nav.sensing.distance_field import DistanceField
 
-_START_SHAPE = PreliminarySamples(sample_count=37, sample_min_radius_m=0.12, sample_min_heading_rad=0.05,
-                                  sample_max_radius_m=0.5, sample_max_heading_rad=0.35)
+_LEAST_STARTS, _MOST_STARTS = 37, 360
+_START_GRID = np.array([0.12, 0.12, 0.05])  # [m, m, rad] of spread that the least starts cover
+_ALIGNED_STARTS = 60          # the best of more starts
+_LEVELS = (  # limits of the starts' spread: as predicted, a bad step of odometry, a spin that went unnoticed
+    PreliminarySamples(sample_min_radius_m=0.12, sample_min_heading_rad=0.05,
+                       sample_max_radius_m=0.5, sample_max_heading_rad=0.35),
+    PreliminarySamples(sample_min_radius_m=0.25, sample_min_heading_rad=0.4,
+                       sample_max_radius_m=0.5, sample_max_heading_rad=0.4),
+    PreliminarySamples(sample_min_radius_m=0.4, sample_min_heading_rad=0.5 * np.pi,
+                       sample_max_radius_m=0.5, sample_max_heading_rad=0.5 * np.pi))
 _KEEP = 4                     # alignments that are different places
+_AS_GOOD = 0.9                # of the best fit: worth particles
 _SAME_M, _SAME_RAD = 0.05, np.radians(1.5)
 _POOR_FIT = 0.75              # of the usual fit: odometry is not believed
-_WIDE_M, _WIDE_RAD = 0.8, np.pi
-_WIDE_COUNT = 360
+_CONVINCING_FIT = 0.9         # of the usual fit: a place that odometry did not lead to
 _MEMORY = 0.9
 _LEAST_SCALE_M, _MOST_SCALE_M = 0.06, 0.3  # of the kernel; follows how well the map fits
 _SCALE_MEDIANS = 2.0
@@ -45,19 +53,13 @@ class ScanAnchor:
             mean, covariance: (3,), (3, 3) of the predicted cluster.
             points_m: (B, 2) finite end points of beams in the robot's frame, B >= 1.
         """
-        starts = preliminary_samples.around(mean, covariance, _START_SHAPE)
-        found = _distinct(scan_alignment.align(self._field, points_m, starts, last_scale_m=self._scale_m))
-        if found.fit[0] < _POOR_FIT * self._usual_fit:
-            wide = preliminary_samples.around(
-                mean, np.diag([_WIDE_M, _WIDE_M, _WIDE_RAD]) ** 2 / 4.0,
-                PreliminarySamples(sample_count=_WIDE_COUNT, sample_max_radius_m=_WIDE_M,
-                                   sample_max_heading_rad=_WIDE_RAD))
-            coarse = scan_alignment.fit(self._field, points_m, wide)
-            wide = wide[np.argsort(-coarse)[:_WIDE_COUNT // 4]]
-            wider = _distinct(scan_alignment.align(self._field, points_m, wide, iterations=10,
-                                                     last_scale_m=self._scale_m))
-            if wider.fit[0] > found.fit[0] + 0.25 * (self._usual_fit - found.fit[0]):
-                found = wider
+        found = self._align_around(mean, covariance, _LEVELS[0], points_m)
+        for level in _LEVELS[1:]:
+            if not found.fit[0] < _POOR_FIT * self._usual_fit:
+                break
+            farther = self._align_around(mean, covariance, level, points_m)
+            if farther.fit[0] > _CONVINCING_FIT * self._usual_fit:
+                found = _distinct(found, farther)
         past = found.fit[0] if np.isnan(self._usual_fit) else self._usual_fit
         self._usual_fit = _MEMORY * past + (1.0 - _MEMORY) * float(found.fit[0])
         scale = _SCALE_MEDIANS * scan_alignment.median_distance(self._field, points_m, found.poses[0])
@@ -65,15 +67,29 @@ class ScanAnchor:
                                       _LEAST_SCALE_M, _MOST_SCALE_M))
         return found
 
+    def _align_around(self, mean: np.ndarray, covariance: np.ndarray, shape: PreliminarySamples,
+                      points_m: np.ndarray) -> Alignment:
+        spread = np.clip(np.sqrt(np.diag(covariance)),
+                         [shape.sample_min_radius_m] * 2 + [shape.sample_min_heading_rad],
+                         [shape.sample_max_radius_m] * 2 + [shape.sample_max_heading_rad])
+        count = int(np.clip(_LEAST_STARTS * np.prod(spread / _START_GRID), _LEAST_STARTS, _MOST_STARTS))
+        starts = preliminary_samples.around(mean, covariance, replace(shape, sample_count=count))
+        if count > _ALIGNED_STARTS:
+            fit = scan_alignment.fit(self._field, points_m, starts)
+            starts = starts[np.argsort(-fit)[:_ALIGNED_STARTS]]
+        return _distinct(scan_alignment.align(self._field, points_m, starts, last_scale_m=self._scale_m))
 
-def _distinct(aligned: Alignment) -> Alignment:
+
+def _distinct(*alignments: Alignment) -> Alignment:
     """The best of each place, best first."""
+    poses, information, fit = (np.concatenate([getattr(one, name) for one in alignments])
+                               for name in ("poses", "information", "fit"))
     chosen: "list[int]" = []
-    for index in np.argsort(-aligned.fit):
-        off = aligned.poses[chosen] - aligned.poses[index]
+    for index in np.argsort(-fit):
+        off = poses[chosen] - poses[index]
         same = (np.hypot(off[:, 0], off[:, 1]) < _SAME_M) & (np.abs(angles.wrap(off[:, 2])) < _SAME_RAD)
-        if not same.any() and aligned.fit[index] > 0.9 * aligned.fit.max():
+        if not same.any() and fit[index] > _AS_GOOD * fit.max():
             chosen.append(int(index))
         if len(chosen) == _KEEP:
             break
-    return Alignment(aligned.poses[chosen], aligned.information[chosen], aligned.fit[chosen])
+    return Alignment(poses[chosen], information[chosen], fit[chosen])
