@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 REPO = Path(__file__).resolve().parents[1]
-ROOM_M = (6.0, 4.0)  # the room of RoomBag: its walls are the cells around this rectangle
 CELL_M = 0.05
+# The room of RoomBag: 6 x 4 m without its upper right corner, so that it looks the same from no two places.
+CORNERS_M = np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 2.8], [4.6, 2.8], [4.6, 4.0], [0.0, 4.0]])
 
 
 @pytest.fixture(scope="session")
@@ -31,10 +32,12 @@ def data_dir() -> Path:
 def room_map(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """map.yaml of the room, its lower left inner corner at (0, 0)."""
     folder = tmp_path_factory.mktemp("room")
-    columns, rows = (int(round(side / CELL_M)) + 2 for side in ROOM_M)
-    grey = np.full((rows, columns), 254, np.uint8)
+    columns, rows = np.rint(CORNERS_M.max(axis=0) / CELL_M).astype(int) + 2
+    grey = np.full((rows, columns), 254, np.uint8)  # the lowest row first
     grey[0, :] = grey[-1, :] = grey[:, 0] = grey[:, -1] = 0
-    write_pgm(folder / "map.pgm", grey)
+    left, bottom = np.rint(CORNERS_M[3] / CELL_M).astype(int) + 1
+    grey[bottom:, left:] = 0
+    write_pgm(folder / "map.pgm", grey[::-1])
     path = folder / "map.yaml"
     path.write_text(f"image: map.pgm\nresolution: {CELL_M}\norigin: [{-CELL_M}, {-CELL_M}, 0.0]\nnegate: 0\n"
                     "occupied_thresh: 0.65\nfree_thresh: 0.196\n")
@@ -46,11 +49,16 @@ def write_pgm(path: Path, grey: np.ndarray) -> None:
 
 
 def room_ranges(pose: np.ndarray, angles_rad: np.ndarray) -> np.ndarray:
-    """Ranges (B,) from a pose (3,) inside the room to its walls."""
-    direction = np.stack([np.cos(angles_rad + pose[2]), np.sin(angles_rad + pose[2])])
-    with np.errstate(divide="ignore"):
-        to_walls = np.where(direction > 0.0, (np.array(ROOM_M) - pose[:2])[:, None], -pose[:2, None]) / direction
-    return np.where(np.isfinite(to_walls), to_walls, np.inf).min(axis=0)
+    """Ranges (B,) from a pose (3,) inside the room to its walls: each ray cut with each wall."""
+    ray = np.stack([np.cos(angles_rad + pose[2]), np.sin(angles_rad + pose[2])], axis=-1)[:, None]  # (B, 1, 2)
+    wall = np.roll(CORNERS_M, -1, axis=0) - CORNERS_M
+    to_corner = CORNERS_M - pose[:2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cross = ray[..., 0] * wall[:, 1] - ray[..., 1] * wall[:, 0]  # (B, W)
+        along_ray = (to_corner[:, 0] * wall[:, 1] - to_corner[:, 1] * wall[:, 0]) / cross
+        along_wall = (to_corner[:, 0] * ray[..., 1] - to_corner[:, 1] * ray[..., 0]) / cross
+        met = (along_ray > 0.0) & (along_wall >= -1e-9) & (along_wall <= 1.0 + 1e-9)
+    return np.where(met, along_ray, np.inf).min(axis=1)
 
 
 def quaternion(roll: float, yaw: float) -> Tuple[float, float, float, float]:
@@ -93,6 +101,14 @@ class RoomBag:
         seconds = (stamps_ns - self.start_ns) * 1e-9
         yaw = 0.4 * seconds
         return np.stack([2.0 + 0.5 / 0.4 * np.sin(yaw), 1.2 + 0.5 / 0.4 * (1.0 - np.cos(yaw)), yaw], axis=-1)
+
+    @staticmethod
+    def distance_to_wall(points_m: np.ndarray) -> np.ndarray:
+        """(N,) of points (N, 2) of the map, to the nearest wall."""
+        wall = np.roll(CORNERS_M, -1, axis=0) - CORNERS_M
+        offset = points_m[:, None] - CORNERS_M
+        share = np.clip((offset * wall).sum(axis=-1) / (wall * wall).sum(axis=-1), 0.0, 1.0)
+        return np.linalg.norm(offset - share[..., None] * wall, axis=-1).min(axis=1)
 
     def write(self) -> Path:
         """The bag; odometry starts at (0, 0, 0) and has no error."""
