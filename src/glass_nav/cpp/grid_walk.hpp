@@ -63,22 +63,23 @@ class GridWalk {
     // both coordinates go the same way and only their bounds differ.
     t_ = std::min(tx, ty);
     crossed_x_ = tx < ty;
-    const double past_x = x_axis_.follow(t_, cells, crossed_x_);
-    const double past_y = y_axis_.follow(t_, cells, !crossed_x_);
-    past_boundary_ = std::min(past_x, past_y);  // on the axis that was crossed it is 1
+    const double off_x = x_axis_.follow(t_, cells, crossed_x_);
+    const double off_y = y_axis_.follow(t_, cells, !crossed_x_);
+    off_boundary_ = std::min(off_x, off_y);
   }
 
-  /// The other cell at a corner: a ray that goes exactly through a corner touches both cells beside it, the walk
-  /// itself visits at most one of them before it stands behind the corner. -1 if there is no such corner here.
+  /// False if the ray certainly did not enter the present cell at a corner.
+  bool near_corner() const { return off_boundary_ <= kCorner; }
+
+  /// The other cell at a corner. A ray that goes exactly through a corner touches both cells beside it; the walk visits
+  /// one of them before the corner is behind it, or none. -1 if there is no corner or nothing beside it.
   std::int32_t cell_beside_corner() const {
-    if (!at_corner()) return -1;
-    return crossed_x_ ? index(x_axis_.cell, y_axis_.cell - 1) : index(x_axis_.cell - 1, y_axis_.cell);
-  }
-
-  /// True if the present cell was entered through its corner.
-  bool at_corner() const {
-    if (past_boundary_ > kCorner) return false;  // nearly always; what follows would be a branch guessed wrong
-    return crossed_x_ ? y_axis_.just_entered(t_) : x_axis_.just_entered(t_);
+    if (!near_corner()) return -1;
+    const Axis& other = crossed_x_ ? y_axis_ : x_axis_;
+    const int back_x = crossed_x_ ? 1 : 0, back_y = 1 - back_x;  // where the walk came from
+    if (other.just_entered(t_)) return index_or_none(x_axis_.cell - back_y, y_axis_.cell - back_x);
+    if (other.about_to_leave(t_)) return index_or_none(x_axis_.cell + back_y - back_x, y_axis_.cell + back_x - back_y);
+    return -1;
   }
 
  private:
@@ -103,13 +104,14 @@ class GridWalk {
     double crossing(int ahead) const { return (ahead - start) * per_speed; }
 
     /// Goes to the cell at t, which is `cells` ahead if that boundary is the one crossed, and nearer otherwise: rounding
-    /// has no say in it. Returns how far the coordinate is past the last boundary it may have crossed [cells].
+    /// has no say in it. Returns how far the coordinate is from the nearest boundary [cells]; 1 and more if crossed.
     double follow(double t, int cells, int crossed) {
       const double coordinate = start + t * speed;
       const int before = static_cast<int>(coordinate);
       const int reached = std::min(std::max(before, cell), cell + cells - 1);
       cell = std::max(reached, cell + (cells & -crossed));
-      return coordinate - reached;
+      const double past = coordinate - reached;
+      return std::min(past, 1.0 - past) + crossed;
     }
 
     /// The cell at t, where the ray enters the grid; `size` if it passes by.
@@ -118,8 +120,11 @@ class GridWalk {
                                          static_cast<double>(size)));
     }
 
-    /// True if t is a corner: the lower boundary of the cell was crossed at this very t.
+    /// True if the lower boundary of the cell was crossed at this very t.
     bool just_entered(double t) const { return cell > first_legal && t - crossing(cell) <= kCorner; }
+
+    /// True if the next cell is entered at this very t.
+    bool about_to_leave(double t) const { return crossing(cell + 1) - t <= kCorner; }
 
     double start;      // coordinate of the origin
     double speed;      // cells per unit of t, >= 0
@@ -134,11 +139,15 @@ class GridWalk {
     const double tx = x_axis_.cell < 0 ? x_axis_.crossing(0) : 0.0;
     const double ty = y_axis_.cell < 0 ? y_axis_.crossing(0) : 0.0;
     t_ = std::max(tx, ty);
-    crossed_x_ = tx >= ty;
-    past_boundary_ = 0.0;
+    crossed_x_ = x_axis_.cell < 0 && tx >= ty;
+    off_boundary_ = 0.0;
     if (t_ > t_max_) return;
     x_axis_.enter(t_);
     y_axis_.enter(t_);
+  }
+
+  std::int32_t index_or_none(int x, int y) const {
+    return x >= 0 && y >= 0 && x < x_axis_.size && y < y_axis_.size ? index(x, y) : -1;
   }
 
   std::int32_t index(int x, int y) const { return cell_ + x * step_x_ + y * step_y_; }
@@ -146,7 +155,7 @@ class GridWalk {
   Axis x_axis_, y_axis_;
   double t_max_;
   double t_ = 0.0;
-  double past_boundary_ = 1.0;  // of the cell, along the axis that was not crossed
+  double off_boundary_ = 1.0;  // distance from the nearest corner of the cell where it was entered
   std::int32_t cell_;  // flat index of the cell that is (0, 0) after turning over
   std::int32_t step_x_, step_y_;
   bool crossed_x_ = false;

@@ -27,11 +27,12 @@ struct GridCells {
   /// A cell that ends a ray without being a surface (unknown, if those are to stop a ray).
   bool stops(std::int32_t cell) const { return free_squares->towards(false, false)[cell] == 0 && !occupied(cell); }
 
-  /// The occupied cell that the ray meets where the walk stands: its own or one beside the corner; -1 none.
+  /// The occupied cell that the ray meets where the walk stands: its own or one beside the corner; -1 none. Where the
+  /// ray leaves the grid at a corner there is still one beside it.
   template <class Ignored>
   std::int32_t met(const GridWalk& walk, const Ignored& ignored) const {
-    const std::int32_t cell = walk.cell();
-    if (occupied(cell) && !ignored(cell)) return cell;
+    if (walk.t() > walk.t_max()) return -1;
+    if (walk.inside() && occupied(walk.cell()) && !ignored(walk.cell())) return walk.cell();
     const std::int32_t beside = walk.cell_beside_corner();
     return beside >= 0 && occupied(beside) && !ignored(beside) ? beside : -1;
   }
@@ -99,9 +100,9 @@ class ExactSeeker {
   /// Looks at the present cell and leaps on. Returns what seek() is to return, or kOnTheWay.
   template <class Ignored>
   std::int32_t step(GridWalk& walk, const std::uint8_t* free_square, const Ignored& ignored) const {
-    if (!walk.inside()) return -1;
+    if (!walk.inside()) return cells_.met(walk, ignored);
     const int edge = free_square[walk.cell()];
-    if (edge == 0 || walk.at_corner()) {
+    if (edge == 0 || walk.near_corner()) {
       const std::int32_t met = cells_.met(walk, ignored);
       if (met >= 0) return met;
       if (cells_.stops(walk.cell())) return -1;
@@ -140,7 +141,7 @@ class MrptSeeker {
         if (cells_.stops(walk.cell())) return -1;
       }
     }
-    return -1;
+    return cells_.met(walk, ignored);
   }
 
   /// As ExactSeeker::seek_all, one ray after the other.

@@ -55,6 +55,7 @@ class SurfaceFinder {
       const double length = pass_run(walk, rules_.max_thickness / cos_incidence);
       if (length == kInfinity) break;
       found.thickness[i] = length * cos_incidence;
+      if (!walk.inside()) break;
     }
     return found;
   }

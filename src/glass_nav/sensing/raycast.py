@@ -55,7 +55,7 @@ class RayCaster:
         """
         Args:
             grid_map: cells of at least OCCUPIED_PERCENT end a ray.
-            backend: "exact" leaps by a chessboard distance; "mrpt" is MRPT's simulateScanRay with its known faults
+            backend: "exact" leaps over free squares; "mrpt" is MRPT's simulateScanRay with its known faults
                 corrected, slower, for comparison.
             threads: of each cast; the poses are dealt out to them. The results do not depend on it.
             unknown: "pass", unknown cells are like free ones; "stop", a ray that comes to one meets nothing (inf).
@@ -132,6 +132,11 @@ class RayCaster:
                                          self._threads)
         found["normal_rad"] = self._in_map(found["normal_rad"])
         return SurfaceHits(**found)
+
+    def simulate_scan_ray_raw(self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float) -> np.ndarray:
+        """As cast(), by MRPT's simulateScanRay as it is, faults included: to be compared with, not to be used."""
+        poses, angles_rad = self._checked(poses, angles_rad, max_range_m)
+        return self._grid.simulate_scan_ray_raw(poses, angles_rad, max_range_m)
 
     def normals(self) -> Tuple[np.ndarray, np.ndarray]:
         """Normals of all cells that a ray may meet first; computed once, when first needed.
