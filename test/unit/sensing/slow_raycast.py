@@ -1,7 +1,7 @@
 """A second ray caster, written to be obviously right: the tests and the benchmark hold the compiled one against it.
 
-It does not walk. The parameters at which a ray crosses grid lines are listed for both axes, sorted, and the cell between
-two crossings is where the middle of that stretch lies. Lengths are in cells; t is the length of the ray.
+It does not walk. The parameters at which a ray crosses grid lines are listed for both axes, sorted, and the cell
+between two crossings is where the middle of that stretch lies. Lengths are in cells; t is the length of the ray.
 """
 
 from __future__ import annotations
