@@ -88,4 +88,12 @@ def log_weights(caster: RayCaster, thickness_m: np.ndarray, map_from_laser: np.n
         cos = np.where(usable, np.maximum(np.abs(np.cos(beam_rad - normal_rad[cell])), _LEAST_COS), 1.0)
         across = np.minimum((((z - expected) * cos - residuals.depth_share * thickness_m[cell]) / residuals.sigma_m) ** 2, 100.0)
         log_w += np.log(mixture.laser_z_hit * np.exp(-0.5 * across) + mixture.laser_z_rand).sum(axis=1)
-    return log_w * min(1.0, mixture.laser_independent_beams / len(case))
+    return log_w * min(1.0, independent_beams(residuals, mixture) / len(case))
+
+
+def independent_beams(residuals: RangeResiduals, mixture: BeamMixture) -> float:
+    """As how many independent beams the chosen ones count.
+
+    A spread wider than the lidar's is the map's fault, and the map errs the same way along a whole wall.
+    """
+    return mixture.laser_independent_beams * min(1.0, mixture.laser_sigma_hit / residuals.sigma_m)

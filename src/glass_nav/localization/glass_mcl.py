@@ -175,7 +175,7 @@ class GlassMcl:
         predicted = self._predict(odom_from_base)
         beams = self._beams(scan)
         if len(beams):
-            self._correct(scan, beams, predicted)
+            self._correct(scan, beams, predicted, odom_from_base)
         else:
             self._particles = predicted
         self._best = pose_estimate.of(self._particles, self._weights)
@@ -184,7 +184,8 @@ class GlassMcl:
         self._update_due = False
         return self._estimate(scan, odom_from_base, updated=True)
 
-    def _correct(self, scan: Scan, beams: np.ndarray, predicted: np.ndarray) -> None:
+    def _correct(self, scan: Scan, beams: np.ndarray, predicted: np.ndarray,
+                 odom_from_base: np.ndarray) -> None:
         """The scan moves and weighs the particles."""
         best = pose_estimate.of(predicted, self._weights)
         points = scan.points_in_base()[beams]
@@ -193,13 +194,15 @@ class GlassMcl:
             fit = scan_alignment.fit(self._field, points, predicted)
             self._weights = resampling.normalised(np.log(self._weights) + 20.0 * fit)
             return
-        aligned = self._anchor.find(best.map_from_base, best.covariance, points)
-        particles, log_ratio = proposal.draw(predicted, self._weights, aligned, len(beams),
-                                             self._params.proposal, self._rng)
+        aligned = self._anchor.find(best.map_from_base, best.covariance, odom_from_base, points)
+        independent = beam_weights.independent_beams(self._residuals, self._params.mixture)
+        particles, log_ratio = proposal.draw(
+            predicted, self._weights, aligned, min(1.0, independent / len(beams)) / self._residuals.sigma_m**2,
+            self._params.proposal, self._rng)
         cases, references = self._classify(scan, aligned.poses[0], np.zeros((3, 3)))
         self._learn(scan, references)
         self._particles = particles
-        self._weights = resampling.normalised(log_ratio + self._log_weights(scan, particles, cases))
+        self._weights = resampling.tempered(log_ratio + self._log_weights(scan, particles, cases))
 
     def _checked(self, scan: Scan, odom_from_base: np.ndarray) -> np.ndarray:
         odom_from_base = np.array(odom_from_base, float)

@@ -26,8 +26,6 @@ _SLIP_DEVIATION = np.array([0.3, 0.3, np.radians(30.0)])    # a wheel that slipp
 class Proposal:
     """How particles are shared between odometry and scan."""
     proposal_scan_share: float = 0.5       # of the particles drawn around aligned poses; 0 turns it off
-    proposal_sigma_m: float = 0.05         # deviation of a beam's end point from the wall
-    proposal_independent_beams: float = 20.0
     proposal_max_beams: int = 90
     proposal_min_cluster_share: float = 0.5  # below it the cloud has no one place to align from
     odom_slip_probability: float = 0.001   # that a step of odometry is worth nothing
@@ -35,22 +33,24 @@ class Proposal:
     def __post_init__(self) -> None:
         if not 0.0 <= self.proposal_scan_share < 1.0:
             raise ValueError(f"~proposal_scan_share must be in [0, 1), got {self.proposal_scan_share}")
-        for name in ("proposal_sigma_m", "proposal_independent_beams"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"~{name} must be > 0, got {getattr(self, name)}")
+        if not self.proposal_max_beams >= 2:
+            raise ValueError(f"~proposal_max_beams must be >= 2, got {self.proposal_max_beams}")
+        if not 0.0 <= self.proposal_min_cluster_share <= 1.0:
+            raise ValueError("~proposal_min_cluster_share must be in [0, 1], got "
+                             f"{self.proposal_min_cluster_share}")
         if not 0.0 <= self.odom_slip_probability < 1.0:
             raise ValueError(f"~odom_slip_probability must be in [0, 1), got {self.odom_slip_probability}")
 
 
-def draw(predicted: np.ndarray, weights: np.ndarray, aligned: Alignment, beam_count: int, proposal: Proposal,
-         rng: np.random.Generator) -> Tuple[np.ndarray, np.ndarray]:
+def draw(predicted: np.ndarray, weights: np.ndarray, aligned: Alignment, beam_information: float,
+         proposal: Proposal, rng: np.random.Generator) -> Tuple[np.ndarray, np.ndarray]:
     """Particles from both sources, and what their weights have to be multiplied with.
 
     Args:
         predicted: (P, 3) particles moved by odometry, one cluster.
         weights: (P,) of them, sum 1.
         aligned: K poses at which the scan fits.
-        beam_count: beams that were aligned.
+        beam_information: what one aligned beam says across the wall [1/m2].
         proposal: shares and deviations.
         rng: source of all randomness.
 
@@ -63,7 +63,8 @@ def draw(predicted: np.ndarray, weights: np.ndarray, aligned: Alignment, beam_co
     mean, covariance = pose_estimate.moments(predicted, weights)
     covariance += np.diag(_LEAST_DEVIATION**2)
     slipped = covariance + np.diag(_SLIP_DEVIATION**2)
-    around = _covariances(aligned, slipped, beam_count, proposal)
+    # Directions that no wall constrains keep odometry's spread.
+    around = np.linalg.inv(aligned.information * beam_information + np.linalg.inv(slipped))
     which = rng.integers(len(aligned.poses), size=count)
     noise = np.einsum("pij,pj->pi", np.linalg.cholesky(around)[which], rng.standard_normal((count, 3)))
     drawn = aligned.poses[which] + noise
@@ -79,12 +80,6 @@ def draw(predicted: np.ndarray, weights: np.ndarray, aligned: Alignment, beam_co
     target = np.logaddexp(np.log1p(-eps) + by_odometry, np.log(eps + 1e-300) + by_slip)
     source = np.logaddexp(np.log1p(-share) + by_odometry, np.log(share) + by_scan)
     return poses, target - source
-
-
-def _covariances(aligned: Alignment, prior: np.ndarray, beam_count: int, proposal: Proposal) -> np.ndarray:
-    """(K, 3, 3) of the aligned poses; directions that no wall constrains keep odometry's spread."""
-    per_beam = min(1.0, proposal.proposal_independent_beams / beam_count) / proposal.proposal_sigma_m**2
-    return np.linalg.inv(aligned.information * per_beam + np.linalg.inv(prior))
 
 
 def _log_normal(poses: np.ndarray, mean: np.ndarray, covariance: np.ndarray) -> np.ndarray:

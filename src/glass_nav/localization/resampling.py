@@ -45,6 +45,23 @@ def effective_count(weights: np.ndarray) -> float:
     return float(1.0 / np.sum(weights**2))
 
 
+def tempered(log_w: np.ndarray, least_effective: float = 20.0) -> np.ndarray:
+    """(P,) weights that sum to 1, flattened until that many particles count.
+
+    A scan that one particle alone explains says more about the model of the errors than about the pose.
+    """
+    weights = normalised(log_w)
+    least_effective = min(least_effective, 0.5 * len(weights))
+    if effective_count(weights) >= least_effective:
+        return weights
+    low, high = 0.0, 1.0
+    for _ in range(20):
+        power = 0.5 * (low + high)
+        enough = effective_count(normalised(power * log_w)) >= least_effective
+        low, high = (power, high) if enough else (low, power)
+    return normalised(low * log_w)
+
+
 def low_variance(weights: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
     """(count,) indices of the particles drawn: one random number, then equal strides."""
     strides = (np.arange(count) + rng.uniform()) / count

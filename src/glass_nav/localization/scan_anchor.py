@@ -2,17 +2,20 @@
 
 The seed document assumes a good prediction (assumption i). Real odometry breaks it: wheels slip, an old
 log steps a metre and 10 degrees between scans, a turn of 80 degrees goes unnoticed. So the scan is
-aligned from preliminary samples over the predicted spread first, and over ever wider ones when it fits
-much worse than it did lately.
+aligned from preliminary samples over the predicted spread first. When it fits much worse there than
+scans did lately, wider spreads are tried; a place that odometry did not lead to is only believed when
+the next scan fits there too, and still not where odometry leads: a crowd around the robot may look like
+another room once.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Optional
 
 import numpy as np
 
-from glass_nav.geometry import angles
+from glass_nav.geometry import angles, se2
 from glass_nav.localization import preliminary_samples, scan_alignment
 from glass_nav.localization.preliminary_samples import PreliminarySamples
 from glass_nav.localization.scan_alignment import Alignment
@@ -45,27 +48,50 @@ class ScanAnchor:
         self._field = field
         self._usual_fit = float("nan")
         self._scale_m = _LEAST_SCALE_M
+        self._suspect: Optional[np.ndarray] = None  # (3,) map_from_odom of a place that needs a second scan
 
-    def find(self, mean: np.ndarray, covariance: np.ndarray, points_m: np.ndarray) -> Alignment:
+    def find(self, mean: np.ndarray, covariance: np.ndarray, odom_from_base: np.ndarray,
+             points_m: np.ndarray) -> Alignment:
         """At most 4 distinct poses, the best first.
 
         Args:
             mean, covariance: (3,), (3, 3) of the predicted cluster.
+            odom_from_base: (3,) odometry at the scan.
             points_m: (B, 2) finite end points of beams in the robot's frame, B >= 1.
         """
         found = self._align_around(mean, covariance, _LEVELS[0], points_m)
+        suspect, self._suspect = self._suspect, None
+        if found.fit[0] < _POOR_FIT * self._usual_fit:
+            farther = self._confirmed(suspect, odom_from_base, points_m)
+            if farther is not None:
+                return farther
+            self._suspect = self._search(mean, covariance, odom_from_base, points_m)
+        self._remember(found, points_m)
+        return found
+
+    def _confirmed(self, suspect: Optional[np.ndarray], odom_from_base: np.ndarray,
+                   points_m: np.ndarray) -> Optional[Alignment]:
+        """Poses around the place that the last scan suggested, if this one fits there too."""
+        if suspect is None:
+            return None
+        again = self._align_around(se2.compose(suspect, odom_from_base), np.zeros((3, 3)), _LEVELS[0], points_m)
+        return again if again.fit[0] > _CONVINCING_FIT * self._usual_fit else None
+
+    def _search(self, mean: np.ndarray, covariance: np.ndarray, odom_from_base: np.ndarray,
+                points_m: np.ndarray) -> Optional[np.ndarray]:
+        """map_from_odom of a farther place where the scan fits as scans usually do."""
         for level in _LEVELS[1:]:
-            if not found.fit[0] < _POOR_FIT * self._usual_fit:
-                break
             farther = self._align_around(mean, covariance, level, points_m)
             if farther.fit[0] > _CONVINCING_FIT * self._usual_fit:
-                found = _distinct(found, farther)
+                return se2.compose(farther.poses[0], se2.inverse(odom_from_base))
+        return None
+
+    def _remember(self, found: Alignment, points_m: np.ndarray) -> None:
         past = found.fit[0] if np.isnan(self._usual_fit) else self._usual_fit
         self._usual_fit = _MEMORY * past + (1.0 - _MEMORY) * float(found.fit[0])
         scale = _SCALE_MEDIANS * scan_alignment.median_distance(self._field, points_m, found.poses[0])
         self._scale_m = float(np.clip(_MEMORY * self._scale_m + (1.0 - _MEMORY) * scale,
                                       _LEAST_SCALE_M, _MOST_SCALE_M))
-        return found
 
     def _align_around(self, mean: np.ndarray, covariance: np.ndarray, shape: PreliminarySamples,
                       points_m: np.ndarray) -> Alignment:
@@ -80,16 +106,14 @@ class ScanAnchor:
         return _distinct(scan_alignment.align(self._field, points_m, starts, last_scale_m=self._scale_m))
 
 
-def _distinct(*alignments: Alignment) -> Alignment:
+def _distinct(aligned: Alignment) -> Alignment:
     """The best of each place, best first."""
-    poses, information, fit = (np.concatenate([getattr(one, name) for one in alignments])
-                               for name in ("poses", "information", "fit"))
     chosen: "list[int]" = []
-    for index in np.argsort(-fit):
-        off = poses[chosen] - poses[index]
+    for index in np.argsort(-aligned.fit):
+        off = aligned.poses[chosen] - aligned.poses[index]
         same = (np.hypot(off[:, 0], off[:, 1]) < _SAME_M) & (np.abs(angles.wrap(off[:, 2])) < _SAME_RAD)
-        if not same.any() and fit[index] > _AS_GOOD * fit.max():
+        if not same.any() and aligned.fit[index] > _AS_GOOD * aligned.fit.max():
             chosen.append(int(index))
         if len(chosen) == _KEEP:
             break
-    return Alignment(poses[chosen], information[chosen], fit[chosen])
+    return Alignment(aligned.poses[chosen], aligned.information[chosen], aligned.fit[chosen])
