@@ -38,9 +38,16 @@ struct GridCells {
   }
 };
 
+/// A ray and how far it has been followed.
+struct Search {
+  Ray ray;
+  GridWalk walk;
+};
+
 /// For rays that take every occupied cell as it comes.
 struct NothingIgnored {
   bool operator()(std::int32_t) const { return false; }
+  bool operator()(std::size_t, std::int32_t) const { return false; }
 };
 
 /// Leaps from free square to free square; exact.
@@ -48,38 +55,33 @@ class ExactSeeker {
  public:
   explicit ExactSeeker(const GridCells& cells) : cells_(cells) {}
 
-  /// Walks on to the next occupied cell that is not ignored. Returns it, or -1 where the ray ends before.
-  template <class Ignored>
-  std::int32_t seek(const Ray&, GridWalk& walk, const Ignored& ignored) const {
-    const std::uint8_t* free_square = cells_.free_squares->towards(walk.minus_x(), walk.minus_y());
-    std::int32_t met = kOnTheWay;
-    while (met == kOnTheWay) met = step(walk, free_square, ignored);
-    return met;
-  }
-
-  /// Seeks along many rays from their origins, several at a time: while one waits for the cell it leapt to to come from
-  /// memory, the others go on. Half as long for scattered poses as one ray after the other.
+  /// Walks on along many rays, each to the next occupied cell that is not ignored.
   ///
-  /// @param next_ray  called count times
-  /// @param found     found(i, walk, cell): where the walk of the ray number i ended, and what seek() returns
-  template <class NextRay, class Found>
-  void seek_all(std::size_t count, double t_max, const NextRay& next_ray, const Found& found) const {
+  /// Several at a time: while one waits for the cell it leapt to to come from memory, the others go on. Half as long
+  /// for scattered poses as one ray after the other.
+  ///
+  /// @param start    start(i), called once for every i < count in order: the Search to go on with
+  /// @param ignored  ignored(i, cell): cells that ray i passes
+  /// @param found    found(i, walk, cell): where that walk ended, and the cell it met; -1 if the ray ends before one
+  template <class Start, class Ignored, class Found>
+  void seek_all(std::size_t count, const Start& start, const Ignored& ignored, const Found& found) const {
     std::array<Lane, kLanes> lanes;
     std::size_t next = 0, busy = 0;
-    const auto start = [&](Lane& lane) {
-      lane.walk = GridWalk(next_ray(), cells_.width, cells_.height, t_max);
+    const auto fill = [&](Lane& lane) {
+      lane.walk = start(next).walk;
       lane.free_square = cells_.free_squares->towards(lane.walk.minus_x(), lane.walk.minus_y());
       lane.ray = next++;
     };
-    while (busy < kLanes && next < count) start(lanes[busy++]);
+    while (busy < kLanes && next < count) fill(lanes[busy++]);
     while (busy > 0) {
       for (std::size_t i = 0; i < busy; ++i) {
         Lane& lane = lanes[i];
-        const std::int32_t met = step(lane.walk, lane.free_square, NothingIgnored{});
+        const std::int32_t met = step(lane.walk, lane.free_square,
+                                      [&](std::int32_t cell) { return ignored(lane.ray, cell); });
         if (met == kOnTheWay) continue;
         found(lane.ray, lane.walk, met);
         if (next < count) {
-          start(lane);
+          fill(lane);
         } else {
           lane = lanes[--busy];  // its turn comes in the next round
         }
@@ -97,7 +99,7 @@ class ExactSeeker {
     std::size_t ray = 0;
   };
 
-  /// Looks at the present cell and leaps on. Returns what seek() is to return, or kOnTheWay.
+  /// Looks at the present cell and leaps on. Returns the cell met, -1 where the ray ends, or kOnTheWay.
   template <class Ignored>
   std::int32_t step(GridWalk& walk, const std::uint8_t* free_square, const Ignored& ignored) const {
     if (!walk.inside()) return cells_.met(walk, ignored);
@@ -131,27 +133,14 @@ class MrptSeeker {
   MrptSeeker(const GridCells& cells, const mrpt::maps::COccupancyGridMap2D& map, double resolution_m)
       : cells_(cells), map_(map), resolution_m_(resolution_m) {}
 
-  template <class Ignored>
-  std::int32_t seek(const Ray& ray, GridWalk& walk, const Ignored& ignored) const {
-    while (walk.inside()) {
-      const double look_until = walk.t() + free_cells(ray, walk.t(), walk.t_max()) + kMarginCells;
-      for (; walk.inside() && walk.t() <= look_until; walk.leap(1)) {
-        const std::int32_t met = cells_.met(walk, ignored);
-        if (met >= 0) return met;
-        if (cells_.stops(walk.cell())) return -1;
-      }
-    }
-    return cells_.met(walk, ignored);
-  }
-
   /// As ExactSeeker::seek_all, one ray after the other.
-  template <class NextRay, class Found>
-  void seek_all(std::size_t count, double t_max, const NextRay& next_ray, const Found& found) const {
+  template <class Start, class Ignored, class Found>
+  void seek_all(std::size_t count, const Start& start, const Ignored& ignored, const Found& found) const {
     for (std::size_t i = 0; i < count; ++i) {
-      const Ray ray = next_ray();
-      GridWalk walk(ray, cells_.width, cells_.height, t_max);
-      const std::int32_t met = seek(ray, walk, NothingIgnored{});
-      found(i, walk, met);
+      Search search = start(i);
+      const auto passes = [&](std::int32_t cell) { return ignored(i, cell); };
+      const std::int32_t met = seek(search.ray, search.walk, passes);
+      found(i, search.walk, met);
     }
   }
 
@@ -166,6 +155,19 @@ class MrptSeeker {
   }
 
  private:
+  template <class Ignored>
+  std::int32_t seek(const Ray& ray, GridWalk& walk, const Ignored& ignored) const {
+    while (walk.inside()) {
+      const double look_until = walk.t() + free_cells(ray, walk.t(), walk.t_max()) + kMarginCells;
+      for (; walk.inside() && walk.t() <= look_until; walk.leap(1)) {
+        const std::int32_t met = cells_.met(walk, ignored);
+        if (met >= 0) return met;
+        if (cells_.stops(walk.cell())) return -1;
+      }
+    }
+    return cells_.met(walk, ignored);
+  }
+
   static constexpr double kStepCells = 0.8;    // of simulateScanRay
   static constexpr double kMarginCells = 2.0;  // it reports the sample before or after the boundary
   static constexpr float kPassFrom = 0.4F;     // a cell that is free with at least this probability lets a ray pass

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 #include "grid_walk.hpp"
 #include "seekers.hpp"
@@ -38,26 +40,24 @@ class SurfaceFinder {
   SurfaceFinder(const GridCells& cells, const Seeker& seeker, const WallNormals& normals, const SurfaceRules& rules)
       : cells_(cells), seeker_(seeker), normals_(normals), rules_(rules) {}
 
-  Surfaces along(const Ray& ray, double t_max) const {
-    Surfaces found;
-    GridWalk walk(ray, cells_.width, cells_.height, t_max);
-    for (std::size_t i = 0; i < found.range.size(); ++i) {
-      found.cell[i] = seeker_.seek(ray, walk, NothingIgnored{});
-      if (found.cell[i] < 0) break;
-      found.range[i] = walk.t();
-      if (i == 2) break;  // what is behind the third surface is nobody's business
-      const WallNormals::Normal normal = facing(normals_.at(found.cell[i]), ray);
-      if (i == 0) {
-        found.normal = normal;
-        found.mirrored = mirrored(ray, walk.t(), found.cell[0], normal, t_max);
-      }
-      const double cos_incidence = usable(normal) ? -projection(normal, ray) : 1.0;
-      const double length = pass_run(walk, rules_.max_thickness / cos_incidence);
-      if (length == kInfinity) break;
-      found.thickness[i] = length * cos_incidence;
-      if (!walk.inside()) break;
+  /// Follows `count` rays of the stream `rays`; found(i, Surfaces) for each. All rays go from surface to surface
+  /// together, since the seeker is fastest with many.
+  template <class Rays, class Found>
+  void along_all(std::size_t count, double t_max, Rays& rays, const Found& found) const {
+    std::vector<Search> searches(count);
+    std::vector<Surfaces> surfaces(count);
+    std::vector<std::size_t> going(count);  // rays that are not at their end
+    for (std::size_t i = 0; i < count; ++i) {
+      const Ray ray = rays.next();
+      searches[i] = {ray, GridWalk(ray, cells_.width, cells_.height, t_max)};
+      going[i] = i;
     }
-    return found;
+    for (std::size_t k = 0; k < 3 && !going.empty(); ++k) {
+      seek_surface(k, going, searches, surfaces);
+      if (k == 0) mirror(going, searches, surfaces, t_max);
+      if (k < 2) pass_surface(k, going, searches, surfaces);  // what is behind the third is nobody's business
+    }
+    for (std::size_t i = 0; i < count; ++i) found(i, surfaces[i]);
   }
 
  private:
@@ -74,6 +74,65 @@ class SurfaceFinder {
       return near && std::abs(nx * dx + ny * dy) <= 1.5;  // cells; a wall drawn one to two cells thick
     }
   };
+
+  /// Sends the rays on to their surface number k; `going` keeps those that meet one.
+  void seek_surface(std::size_t k, std::vector<std::size_t>& going, std::vector<Search>& searches,
+                    std::vector<Surfaces>& surfaces) const {
+    seeker_.seek_all(
+        going.size(), [&](std::size_t j) -> const Search& { return searches[going[j]]; }, NothingIgnored{},
+        [&](std::size_t j, const GridWalk& walk, std::int32_t met) {
+          searches[going[j]].walk = walk;
+          surfaces[going[j]].cell[k] = met;
+          if (met >= 0) surfaces[going[j]].range[k] = walk.t();
+        });
+    const auto ended = [&](std::size_t i) { return surfaces[i].cell[k] < 0; };
+    going.erase(std::remove_if(going.begin(), going.end(), ended), going.end());
+  }
+
+  /// Takes the rays through their surface number k; `going` keeps those that come out.
+  void pass_surface(std::size_t k, std::vector<std::size_t>& going, std::vector<Search>& searches,
+                    std::vector<Surfaces>& surfaces) const {
+    const auto ends = [&](std::size_t i) {
+      Search& search = searches[i];
+      const WallNormals::Normal normal =
+          k == 0 ? surfaces[i].normal : facing(normals_.at(surfaces[i].cell[k]), search.ray);
+      const double cos_incidence = usable(normal) ? -projection(normal, search.ray) : 1.0;
+      const double length = pass_run(search.walk, rules_.max_thickness / cos_incidence);
+      surfaces[i].thickness[k] = length == kInfinity ? kInfinity : length * cos_incidence;
+      return length == kInfinity || !search.walk.inside();
+    };
+    going.erase(std::remove_if(going.begin(), going.end(), ends), going.end());
+  }
+
+  /// Finds the normals of the first surfaces and follows the rays mirrored there: along u - 2 (u . n) n.
+  void mirror(const std::vector<std::size_t>& hits, const std::vector<Search>& searches,
+              std::vector<Surfaces>& surfaces, double t_max) const {
+    std::vector<std::size_t> mirrored;
+    std::vector<MirrorItself> mirrors;
+    for (const std::size_t i : hits) {
+      surfaces[i].normal = facing(normals_.at(surfaces[i].cell[0]), searches[i].ray);
+      if (!usable(surfaces[i].normal)) continue;
+      mirrored.push_back(i);
+      mirrors.push_back({cells_.width, surfaces[i].cell[0], surfaces[i].normal.x, surfaces[i].normal.y});
+    }
+    seeker_.seek_all(
+        mirrored.size(),
+        [&](std::size_t j) {
+          const double t = surfaces[mirrored[j]].range[0];
+          const Ray ray = reflected(searches[mirrored[j]].ray, t, surfaces[mirrored[j]].normal);
+          return Search{ray, GridWalk(ray, cells_.width, cells_.height, t_max - t)};
+        },
+        [&](std::size_t j, std::int32_t cell) { return mirrors[j](cell); },
+        [&](std::size_t j, const GridWalk& walk, std::int32_t met) {
+          Surfaces& at = surfaces[mirrored[j]];
+          if (met >= 0) at.mirrored = at.range[0] + walk.t();
+        });
+  }
+
+  static Ray reflected(const Ray& ray, double t, const WallNormals::Normal& normal) {
+    const double into = projection(normal, ray);
+    return {ray.x + t * ray.dx, ray.y + t * ray.dy, ray.dx - 2.0 * into * normal.x, ray.dy - 2.0 * into * normal.y};
+  }
 
   bool usable(const WallNormals::Normal& normal) const {
     return normal.linearity > 0.0F && normal.linearity >= rules_.min_linearity;
@@ -107,18 +166,6 @@ class SurfaceFinder {
         return kInfinity;
       }
     }
-  }
-
-  /// Path from the origin to the mirror at t and on along u - 2 (u . n) n to the next surface.
-  double mirrored(const Ray& ray, double t, std::int32_t cell, const WallNormals::Normal& normal,
-                  double t_max) const {
-    if (!usable(normal)) return kInfinity;
-    const double nx = normal.x, ny = normal.y;
-    const double into = projection(normal, ray);
-    const Ray reflected{ray.x + t * ray.dx, ray.y + t * ray.dy, ray.dx - 2.0 * into * nx, ray.dy - 2.0 * into * ny};
-    GridWalk walk(reflected, cells_.width, cells_.height, t_max - t);
-    const MirrorItself mirror{cells_.width, cell, nx, ny};
-    return seeker_.seek(reflected, walk, mirror) < 0 ? kInfinity : t + walk.t();
   }
 
   const GridCells& cells_;
