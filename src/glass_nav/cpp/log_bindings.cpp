@@ -61,7 +61,8 @@ py::dict readGridMap(const std::string& path) {
     grid = glass_nav::readGridMap(path);
   }
   py::dict out;
-  out["occupancy"] = array(grid.occupancy).reshape({grid.rows, grid.columns});
+  const std::array<py::ssize_t, 2> shape{grid.rows, grid.columns};  // by the constructor: pybind11 2.4 has no reshape
+  out["occupancy"] = py::array_t<std::int8_t>(shape, grid.occupancy.data());
   out["resolution_m"] = grid.resolution_m;
   out["x_min_m"] = grid.x_min_m;
   out["y_min_m"] = grid.y_min_m;
