@@ -13,11 +13,12 @@ import numpy as np
 from glass_nav import params
 from glass_nav.cli import replay_params, replay_run
 from glass_nav.cli.progress import Progress
-from glass_nav.cli.replay_params import ReplayParams, StartParams
+from glass_nav.cli.replay_params import Frames, ReplayParams
 from glass_nav.cli.replay_run import Window
 from glass_nav.evaluation import pictures, replay_result
 from glass_nav.evaluation.replay_result import ReplayResult
 from glass_nav.localization.glass_mcl import GlassMcl
+from glass_nav.localization.start_pose import StartPose
 from glass_nav.recording.log_file import open_log
 from glass_nav.recording.recording import LogOptions, Recording
 from glass_nav.world import map_file
@@ -83,7 +84,7 @@ def main(arguments: argparse.Namespace) -> None:
     """
     settings, unused = (ReplayParams(), []) if arguments.params is None else replay_params.load(arguments.params)
     grid_map = map_file.load(arguments.map)
-    recording = open_log(arguments.log, _log_options(arguments, settings.start))
+    recording = open_log(arguments.log, _log_options(arguments, settings.frames))
     notes = list(recording.notes)
     if unused:
         notes.append(f"parameters that only a node uses: {', '.join(unused)}")
@@ -145,11 +146,11 @@ def _window(arguments: argparse.Namespace) -> Window:
     return Window(arguments.start, arguments.duration, arguments.every, arguments.max_scans)
 
 
-def _log_options(arguments: argparse.Namespace, start: StartParams) -> LogOptions:
+def _log_options(arguments: argparse.Namespace, frames: Frames) -> LogOptions:
     """The command first, then a frame that the parameters name and that is not just the default."""
-    default = StartParams()
-    odom_frame = start.odom_frame_id if start.odom_frame_id != default.odom_frame_id else None
-    base_frame = start.base_frame_id if start.base_frame_id != default.base_frame_id else None
+    default = Frames()
+    odom_frame = frames.odom_frame_id if frames.odom_frame_id != default.odom_frame_id else None
+    base_frame = frames.base_frame_id if frames.base_frame_id != default.base_frame_id else None
     pose = arguments.laser_pose
     return LogOptions(arguments.scan_topic, arguments.odom_topic, arguments.base_frame or base_frame,
                       arguments.odom_frame or odom_frame, None if pose is None else (pose[0], pose[1], pose[2]),
@@ -157,7 +158,7 @@ def _log_options(arguments: argparse.Namespace, start: StartParams) -> LogOption
 
 
 def _start(mcl: GlassMcl, recording: Recording, arguments: argparse.Namespace,
-           defaults: StartParams) -> Tuple[Callable[[int], None], str]:
+           defaults: StartPose) -> Tuple[Callable[[int], None], str]:
     """What places the particles at the first scan, and a text that says where."""
     covariance = defaults.covariance if arguments.initial_cov is None else np.diag(arguments.initial_cov)
     truth = recording.ground_truth

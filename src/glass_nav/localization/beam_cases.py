@@ -84,25 +84,36 @@ def classify(measured_m: np.ndarray, references: ReferenceRanges, residuals: Ran
     """
     answered = np.isfinite(measured_m)
     ballots = _paper_ballots if vote.vote_mode == "paper" else _soft_ballots
-    cos = np.maximum(references.cos_incidence, _LEAST_COS)
-    depth = residuals.depth_share * references.thickness_m / cos
-    references = replace(references, range_m=references.range_m + depth)
+    references = _inside_walls(references, residuals)
     share = ballots(measured_m, references, residuals.sigma_m, vote)  # (5, B), column sums 1
     share[:, ~answered] = np.array([1.0, 0.0, 0.0, 0.0, 0.0])[:, None]
     won = _winner(share)
     case = np.where(answered & (share[won, np.arange(len(won))] >= vote.case_min_share), won, UNCERTAIN)
-    row = np.maximum(case - 1, 0)
-    expected = np.where(case > 0, _expected(references, row), np.nan)
+    return _told_from_sample_0(case, share[case, np.arange(len(case))], measured_m, references)
+
+
+def as_seen_from(cases: BeamCases, measured_m: np.ndarray, references: ReferenceRanges,
+                 residuals: RangeResiduals) -> BeamCases:
+    """The same cases, with the ranges expected at sample 0 of other references."""
+    return _told_from_sample_0(cases.case, cases.weight, measured_m, _inside_walls(references, residuals))
+
+
+def _told_from_sample_0(case: np.ndarray, weight: np.ndarray, measured_m: np.ndarray,
+                        references: ReferenceRanges) -> BeamCases:
+    row = np.maximum(case.astype(int) - 1, 0)
+    expected = np.where(case > 0, references.range_m[row, 0, np.arange(len(row))], np.nan)
     case = np.where(np.isfinite(expected), case, UNCERTAIN)  # sample 0 itself must see the surface
     expected[case == UNCERTAIN] = np.nan
     with np.errstate(invalid="ignore"):
         residual = np.where(case > 0, measured_m - expected, np.nan)
-    return BeamCases(case.astype(np.uint8), expected, residual, share[case, np.arange(len(case))])
+    return BeamCases(case.astype(np.uint8), expected, residual, weight)
 
 
-def _expected(references: ReferenceRanges, row: np.ndarray) -> np.ndarray:
-    """(B,) the reference of the chosen row at sample 0."""
-    return references.range_m[row, 0, np.arange(len(row))].copy()
+def _inside_walls(references: ReferenceRanges, residuals: RangeResiduals) -> ReferenceRanges:
+    """References where beams end, not at the near boundary of the wall's cells."""
+    cos = np.maximum(references.cos_incidence, _LEAST_COS)
+    depth = residuals.depth_share * references.thickness_m / cos
+    return replace(references, range_m=references.range_m + depth)
 
 
 def _winner(share: np.ndarray) -> np.ndarray:

@@ -30,7 +30,7 @@ class BeamMixture:
     laser_z_rand: float = 0.05
     laser_sigma_hit: float = 0.04        # [m] across the surface, lidar and map together; at least
     laser_sigma_hit_max: float = 0.2     # [m] at most: the filter learns how well map and lidar agree
-    laser_independent_beams: float = 20.0
+    laser_independent_beams: float = 30.0
 
     def __post_init__(self) -> None:
         if not self.laser_max_beams >= 2:
@@ -86,8 +86,9 @@ def log_weights(caster: RayCaster, thickness_m: np.ndarray, map_from_laser: np.n
         usable = (cell >= 0) & (linearity[cell] >= min_linearity)
         beam_rad = map_from_laser[:, 2:3] + angle
         cos = np.where(usable, np.maximum(np.abs(np.cos(beam_rad - normal_rad[cell])), _LEAST_COS), 1.0)
-        across = np.minimum((((z - expected) * cos - residuals.depth_share * thickness_m[cell]) / residuals.sigma_m) ** 2, 100.0)
-        log_w += np.log(mixture.laser_z_hit * np.exp(-0.5 * across) + mixture.laser_z_rand).sum(axis=1)
+        across = (z - expected) * cos - residuals.depth_share * thickness_m[cell]
+        square = np.minimum((across / residuals.sigma_m) ** 2, 100.0)
+        log_w += np.log(mixture.laser_z_hit * np.exp(-0.5 * square) + mixture.laser_z_rand).sum(axis=1)
     return log_w * min(1.0, independent_beams(residuals, mixture) / len(case))
 
 

@@ -32,6 +32,8 @@ from glass_nav.sensing.scan import Scan, ScanError
 from glass_nav.sensing.wall_thickness import wall_thickness
 from glass_nav.world.grid_map import GridMap
 
+_NATS_OF_A_FULL_FIT = 20.0  # of log weight between a scan that fits nowhere and one that fits everywhere
+
 
 @dataclass(frozen=True)
 class Schedule:
@@ -51,9 +53,25 @@ class Schedule:
 
 
 @dataclass(frozen=True)
+class LaserLimits:
+    """Ranges that are looked at; the names and meanings are AMCL's."""
+    laser_min_range: float = -1.0   # [m] nearer ranges are no answers; < 0: as the scan says
+    laser_max_range: float = -1.0   # [m] farther ones neither; < 0: as the scan says
+
+    def __post_init__(self) -> None:
+        for name in ("laser_min_range", "laser_max_range"):
+            if not np.isfinite(getattr(self, name)):
+                raise ValueError(f"~{name} must be finite, got {getattr(self, name)}")
+        if 0.0 <= self.laser_max_range <= max(self.laser_min_range, 0.0):
+            raise ValueError("~laser_max_range must be above 0 and ~laser_min_range, or < 0 for the scan's own, "
+                             f"got {self.laser_max_range}")
+
+
+@dataclass(frozen=True)
 class GlassMclParams:
     """All parameters of the filter, a struct per model."""
     schedule: Schedule = field(default_factory=Schedule)
+    limits: LaserLimits = field(default_factory=LaserLimits)
     count: ParticleCount = field(default_factory=ParticleCount)
     odometry: OdometryNoise = field(default_factory=OdometryNoise)
     proposal: Proposal = field(default_factory=Proposal)
@@ -94,8 +112,9 @@ class GlassMcl:
         self.set_map(grid_map)
         self._particles = np.zeros((0, 3))
         self._weights = np.zeros(0)
-        self._odom_from_base: Optional[np.ndarray] = None  # at the last update of the particles
-        self._best: Optional[pose_estimate.PoseEstimate] = None
+        self._odom_from_base: Optional[np.ndarray] = None  # at that update
+        self._best: pose_estimate.PoseEstimate           # once started
+        self._map_from_odom = np.zeros(3)                 # since the last update of the particles
         self._stamp_ns: Optional[int] = None
         self._quality = pose_quality.PoseQuality(params.quality)
         self._update_due = True
@@ -169,40 +188,43 @@ class GlassMcl:
             ScanError: the stamp runs backwards, or odometry is not finite; nothing is changed then.
             RuntimeError: neither set_pose() nor scatter() was called.
         """
+        scan = scan.limited(self._params.limits.laser_min_range, self._params.limits.laser_max_range)
         odom_from_base = self._checked(scan, odom_from_base)
         if not self._is_due(odom_from_base):
-            return self._estimate(scan, odom_from_base, updated=False)
+            map_from_base = se2.compose(self._map_from_odom, odom_from_base)
+            return self._estimate(scan, odom_from_base, self._vote(scan, map_from_base, self._best.covariance)[0])
         predicted = self._predict(odom_from_base)
-        beams = self._beams(scan)
-        if len(beams):
-            self._correct(scan, beams, predicted, odom_from_base)
-        else:
-            self._particles = predicted
+        cases = self._correct(scan, predicted, odom_from_base)
         self._best = pose_estimate.of(self._particles, self._weights)
         self._resample()
+        self._map_from_odom = se2.compose(self._best.map_from_base, se2.inverse(odom_from_base))
         self._odom_from_base = odom_from_base
         self._update_due = False
-        return self._estimate(scan, odom_from_base, updated=True)
+        return self._estimate(scan, odom_from_base, cases, updated=True)
 
-    def _correct(self, scan: Scan, beams: np.ndarray, predicted: np.ndarray,
-                 odom_from_base: np.ndarray) -> None:
-        """The scan moves and weighs the particles."""
+    def _correct(self, scan: Scan, predicted: np.ndarray, odom_from_base: np.ndarray) -> BeamCases:
+        """The scan places and weighs the particles, by the beams whose case is known."""
+        self._particles = predicted
         best = pose_estimate.of(predicted, self._weights)
+        beams = beam_weights.choose(scan.answered, self._params.proposal.proposal_max_beams)
+        if not len(beams):
+            return self._vote(scan, best.map_from_base, best.covariance)[0]
         points = scan.points_in_base()[beams]
         if best.share < self._params.proposal.proposal_min_cluster_share:
-            self._particles = predicted
             fit = scan_alignment.fit(self._field, points, predicted)
-            self._weights = resampling.normalised(np.log(self._weights) + 20.0 * fit)
-            return
+            self._weights = resampling.normalised(np.log(self._weights) + _NATS_OF_A_FULL_FIT * fit)
+            best = pose_estimate.of(predicted, self._weights)
+            return self._vote(scan, best.map_from_base, best.covariance)[0]
         aligned = self._anchor.find(best.map_from_base, best.covariance, odom_from_base, points)
         independent = beam_weights.independent_beams(self._residuals, self._params.mixture)
         particles, log_ratio = proposal.draw(
             predicted, self._weights, aligned, min(1.0, independent / len(beams)) / self._residuals.sigma_m**2,
             self._params.proposal, self._rng)
-        cases, references = self._classify(scan, aligned.poses[0], np.zeros((3, 3)))
+        cases, references = self._vote(scan, aligned.poses[0], np.zeros((3, 3)))
         self._learn(scan, references)
         self._particles = particles
         self._weights = resampling.tempered(log_ratio + self._log_weights(scan, particles, cases))
+        return cases
 
     def _checked(self, scan: Scan, odom_from_base: np.ndarray) -> np.ndarray:
         odom_from_base = np.array(odom_from_base, float)
@@ -229,16 +251,17 @@ class GlassMcl:
         step = se2.compose(se2.inverse(self._odom_from_base), odom_from_base)
         return motion.sample(self._particles, step, self._params.odometry, self._rng)
 
-    def _beams(self, scan: Scan) -> np.ndarray:
-        """Indices of the answering beams that are aligned, spread evenly."""
-        return beam_weights.choose(scan.answered, self._params.proposal.proposal_max_beams)
-
-    def _classify(self, scan: Scan, map_from_base: np.ndarray, covariance: np.ndarray) -> Tuple[BeamCases, ReferenceRanges]:
+    def _vote(self, scan: Scan, map_from_base: np.ndarray,
+              covariance: np.ndarray) -> Tuple[BeamCases, ReferenceRanges]:
+        """Cases of all beams, by preliminary samples around a pose."""
         samples = preliminary_samples.around(map_from_base, covariance, self._params.samples)
+        references = self._references(scan, samples)
+        return beam_cases.classify(scan.ranges_m, references, self._residuals, self._params.vote), references
+
+    def _references(self, scan: Scan, samples: np.ndarray) -> ReferenceRanges:
         vote = self._params.vote
-        references = reference_ranges.of(self._caster, self._thickness_m, samples, scan, vote.glass_max_thickness_m,
-                                         vote.normal_min_linearity)
-        return beam_cases.classify(scan.ranges_m, references, self._residuals, vote), references
+        return reference_ranges.of(self._caster, self._thickness_m, samples, scan, vote.glass_max_thickness_m,
+                                   vote.normal_min_linearity)
 
     def _learn(self, scan: Scan, references: ReferenceRanges) -> None:
         mixture = self._params.mixture
@@ -265,17 +288,19 @@ class GlassMcl:
         self._particles = self._particles[resampling.low_variance(self._weights, count, self._rng)]
         self._weights = np.full(count, 1.0 / count)
 
-    def _estimate(self, scan: Scan, odom_from_base: np.ndarray, updated: bool) -> Estimate:
+    def _estimate(self, scan: Scan, odom_from_base: np.ndarray, cases: BeamCases,
+                  updated: bool = False) -> Estimate:
         """The pose of the best cluster, carried on by odometry since the last update."""
-        map_from_odom = se2.compose(self._best.map_from_base, se2.inverse(self._odom_from_base))
-        map_from_base = se2.compose(map_from_odom, odom_from_base)
-        cases, _ = self._classify(scan, map_from_base, self._best.covariance)
+        map_from_base = se2.compose(self._map_from_odom, odom_from_base)
+        if updated:  # the vote was held at the aligned pose
+            cases = beam_cases.as_seen_from(cases, scan.ranges_m, self._references(scan, map_from_base[None]),
+                                            self._residuals)
         answered = int(scan.answered.sum())
         used_share = float(np.count_nonzero(cases.case)) / answered if answered else float("nan")
         if updated:
             self._quality.observe(used_share)
         state, reason = self._quality.judge(self._best)
-        return Estimate(scan.stamp_ns, map_from_base, self._best.covariance, map_from_odom, cases,
+        return Estimate(scan.stamp_ns, map_from_base, self._best.covariance, self._map_from_odom, cases,
                         self._particles, state, reason, used_share, updated)
 
     def _start_with(self, particles: np.ndarray, searching: bool) -> None:
@@ -283,5 +308,7 @@ class GlassMcl:
         self._weights = np.full(len(particles), 1.0 / len(particles))
         self._best = pose_estimate.of(particles, self._weights)
         self._odom_from_base = None
+        self._stamp_ns = None
+        self._anchor = ScanAnchor(self._field)
         self._quality = pose_quality.PoseQuality(self._params.quality, searching)
         self._update_due = True

@@ -189,19 +189,15 @@ def mounting_from_transform(base_from_laser: Transform) -> Mounting:
     return Mounting(planar, float(base_from_laser.translation.z), bool(up < 0.0))
 
 
-def scan_from_msg(msg: LaserScan, mounting: Mounting, least_range_m: float = -1.0,
-                  most_range_m: float = -1.0) -> Scan:
+def scan_from_msg(msg: LaserScan, mounting: Mounting) -> Scan:
     """LaserScan -> Scan by REP 117. ScanError if its fields describe no lidar.
 
     Args:
         msg: as the driver sent it.
         mounting: of the lidar that took it.
-        least_range_m, most_range_m: narrower limits than the message's own; < 0 for none.
     """
-    range_min = max(msg.range_min, least_range_m) if least_range_m >= 0.0 else msg.range_min
-    range_max = min(msg.range_max, most_range_m) if most_range_m >= 0.0 else msg.range_max
     return scan_from_fields(ns_from_stamp(msg.header.stamp), np.array(msg.ranges, float), msg.angle_min,
-                            msg.angle_increment, range_min, range_max, mounting.base_from_laser,
+                            msg.angle_increment, msg.range_min, msg.range_max, mounting.base_from_laser,
                             mounting.upside_down)
 
 

@@ -64,7 +64,7 @@ class LocalizationNode:
         self._map: Optional[GridMap] = None
         self._estimate: Optional[Estimate] = None
         self._start: Optional[_Start] = None  # waits for its scan
-        self._restart_pose = (p.node.initial_pose, p.node.initial_covariance)  # where a bag starts over
+        self._restart_pose = (p.start.pose, p.start.covariance)  # where a bag starts over
         self._publish_pose = True
         self._log = LogThrottle()
         self._inbox = Mailbox(scans=100, commands=100)
@@ -347,7 +347,7 @@ class LocalizationNode:
             return
         started = time.process_time()
         try:
-            scan = conversions.scan_from_msg(msg, mounting, self._p.laser_min_range, self._p.laser_max_range)
+            scan = conversions.scan_from_msg(msg, mounting)
             if self._start is not None:
                 self._apply_start(scan.stamp_ns, odom_from_base)
             estimate = self._mcl.update(scan, odom_from_base)

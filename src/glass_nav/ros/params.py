@@ -10,30 +10,16 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass, field
-from typing import Any, Dict, List, Mapping, Tuple
+from typing import Any, List, Mapping, Tuple
 
 import numpy as np
 
-from glass_nav import params
+from glass_nav import amcl_parameters, params
 from glass_nav.localization.glass_mcl import GlassMclParams
+from glass_nav.localization.start_pose import StartPose
 from glass_nav.params import ParamError
 
-__all__ = ["AMCL_PARAMETERS", "LocalizationNodeParams", "LocalizationParams", "ParamError",
-           "localization_params"]
-
-# Every parameter that AMCL 1.17 reads. Those that no dataclass here has are accepted and not used.
-AMCL_PARAMETERS = frozenset("""
-    base_frame_id bag_scan_period beam_skip_distance beam_skip_error_threshold beam_skip_threshold do_beamskip
-    first_map_only force_update_after_initialpose force_update_after_set_map global_frame_id
-    gui_publish_rate initial_cov_aa initial_cov_xx initial_cov_yy initial_pose_a initial_pose_x
-    initial_pose_y kld_err kld_z laser_lambda_short laser_likelihood_max_dist laser_max_beams
-    laser_max_range laser_min_range laser_model_type laser_sigma_hit laser_z_hit laser_z_max
-    laser_z_rand laser_z_short max_particles min_particles odom_alpha1 odom_alpha2 odom_alpha3
-    odom_alpha4 odom_alpha5 odom_frame_id odom_model_type recovery_alpha_fast recovery_alpha_slow
-    resample_interval restore_defaults save_pose_rate selective_resampling std_warn_level_x
-    std_warn_level_y std_warn_level_yaw tf_broadcast transform_tolerance update_min_a update_min_d
-    use_map_topic""".split())
-
+__all__ = ["LocalizationNodeParams", "LocalizationParams", "ParamError", "localization_params"]
 
 @dataclass(frozen=True)
 class LocalizationNodeParams:
@@ -46,14 +32,6 @@ class LocalizationNodeParams:
     transform_wait_s: float = 1.0          # [s] how long a scan waits for odom <- base <- laser
     use_map_topic: bool = False
     first_map_only: bool = False
-    initial_pose_x: float = 0.0            # [m]
-    initial_pose_y: float = 0.0            # [m]
-    initial_pose_a: float = 0.0            # [rad]
-    initial_cov_xx: float = 0.25           # [m^2]
-    initial_cov_yy: float = 0.25           # [m^2]
-    initial_cov_aa: float = (math.pi / 12.0) ** 2  # [rad^2]
-    laser_min_range: float = -1.0          # [m] nearer ranges are no answers; < 0: as the scan says
-    laser_max_range: float = -1.0          # [m] farther ones neither; < 0: as the scan says
     force_update_after_initialpose: bool = False
     force_update_after_set_map: bool = False
     gui_publish_rate: float = -1.0         # [Hz] of particlecloud and ~beam_cloud; <= 0: no limit
@@ -76,24 +54,10 @@ class LocalizationNodeParams:
         for name, kind in [(f.name, f.type) for f in dataclasses.fields(self)]:
             if kind in (float, "float") and not math.isfinite(getattr(self, name)):
                 raise ValueError(f"~{name} must be finite, got {getattr(self, name)}")
-        for name in ("transform_tolerance", "transform_wait_s", "initial_cov_xx", "initial_cov_yy",
-                     "initial_cov_aa", "std_warn_level_x", "std_warn_level_y", "std_warn_level_yaw"):
+        for name in ("transform_tolerance", "transform_wait_s", "std_warn_level_x", "std_warn_level_y",
+                     "std_warn_level_yaw"):
             if not getattr(self, name) >= 0.0:
                 raise ValueError(f"~{name} must be >= 0, got {getattr(self, name)}")
-
-        if 0.0 <= self.laser_max_range <= max(self.laser_min_range, 0.0):
-            raise ValueError("~laser_max_range must be above 0 and ~laser_min_range, or < 0 for the scan's own, "
-                             f"got {self.laser_max_range}")
-
-    @property
-    def initial_pose(self) -> np.ndarray:
-        """map_from_base (3,) to start at."""
-        return np.array([self.initial_pose_x, self.initial_pose_y, self.initial_pose_a])
-
-    @property
-    def initial_covariance(self) -> np.ndarray:
-        """(3, 3) of x, y, yaw at the start."""
-        return np.diag([self.initial_cov_xx, self.initial_cov_yy, self.initial_cov_aa])
 
     @property
     def rng(self) -> np.random.Generator:
@@ -105,6 +69,7 @@ class LocalizationNodeParams:
 class LocalizationParams:
     """Everything the node reads: its own parameters and the filter's, one flat set of names."""
     node: LocalizationNodeParams = field(default_factory=LocalizationNodeParams)
+    start: StartPose = field(default_factory=StartPose)
     mcl: GlassMclParams = field(default_factory=GlassMclParams)
 
 
@@ -118,6 +83,5 @@ def localization_params(mapping: Mapping[str, Any], owner: str) -> Tuple[Localiz
     Raises:
         ParamError: a name nobody knows, a wrong type, a value out of its range.
     """
-    unused = sorted(AMCL_PARAMETERS.intersection(mapping).difference(params.names(LocalizationParams)))
-    ours: Dict[str, Any] = {name: value for name, value in mapping.items() if name not in unused}
+    ours, unused = amcl_parameters.without_unused(mapping, LocalizationParams)
     return params.load(LocalizationParams, ours, owner), unused

@@ -19,7 +19,7 @@ _DEEPEST_M = 0.4  # a wall that a mapper blurred is rarely thicker
 
 
 class DistanceField:
-    """Distance to the centre of the nearest wall cell beside free space, cut at max_distance_m, bilinear between cells."""
+    """Distance to the centre of the nearest wall cell, cut at max_distance_m, bilinear between cells."""
 
     def __init__(self, grid_map: GridMap, max_distance_m: float = 2.0) -> None:
         """Args:

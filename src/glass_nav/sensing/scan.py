@@ -5,7 +5,7 @@ B beams. Ranges follow REP 117: -inf too near, +inf nothing met, NaN no measurem
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,11 +33,30 @@ class Scan:
         return np.isfinite(self.ranges_m)
 
     def points_in_base(self) -> np.ndarray:
-        """(B, 2) end points [m] in the robot's frame; not finite where the beam did not answer."""
+        """(B, 2) end points [m] in the robot's frame; NaN where the beam did not answer."""
         x, y, yaw = self.base_from_laser
         bearing = self.angles_rad + yaw
-        return np.stack([x + self.ranges_m * np.cos(bearing),
-                         y + self.ranges_m * np.sin(bearing)], axis=-1)
+        ranges_m = np.where(self.answered, self.ranges_m, np.nan)
+        return np.stack([x + ranges_m * np.cos(bearing), y + ranges_m * np.sin(bearing)], axis=-1)
+
+    def limited(self, min_range_m: float, max_range_m: float) -> "Scan":
+        """The same turn without the ranges outside these limits; a negative limit is the scan's own.
+
+        Raises:
+            ScanError: no range is left between the limits.
+        """
+        if min_range_m < 0.0 and max_range_m < 0.0:
+            return self
+        low = max(self.range_min_m, min_range_m)
+        high = min(self.range_max_m, max_range_m) if max_range_m >= 0.0 else self.range_max_m
+        if not low < high:
+            raise ScanError(f"scan at {self.stamp_ns * 1e-9:.3f} s: no range is left between "
+                            f"{low:g} m and {high:g} m")
+        ranges_m = self.ranges_m.copy()
+        with np.errstate(invalid="ignore"):
+            ranges_m[ranges_m < low] = -np.inf
+            ranges_m[ranges_m >= high] = np.inf
+        return replace(self, ranges_m=ranges_m, range_min_m=low, range_max_m=high)
 
 
 def scan_from_fields(stamp_ns: int, ranges_m: np.ndarray, angle_min_rad: float,

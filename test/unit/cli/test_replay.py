@@ -269,7 +269,7 @@ def test_a_missing_or_empty_parameter_file(tmp_path):
 
 def test_the_parameters_of_the_node_serve_the_replay():
     settings, unused = replay_params.load(REPO / "config" / "localization.yaml")
-    assert settings.start == replay_params.StartParams()
+    assert settings.start == replay_params.StartPose()
     assert "transform_tolerance" in unused
 
 

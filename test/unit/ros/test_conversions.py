@@ -201,14 +201,6 @@ def test_a_scan_keeps_ranges_angles_and_stamp():
     assert scan.ranges_m.tolist() == [1.0, np.inf, 2.0]
 
 
-@pytest.mark.parametrize("least, most, ranges", [
-    (-1.0, -1.0, [1.0, 4.0, np.inf]), (2.0, -1.0, [-np.inf, 4.0, np.inf]), (-1.0, 3.0, [1.0, np.inf, np.inf]),
-    (0.0, 100.0, [1.0, 4.0, np.inf])])
-def test_limits_may_only_narrow_what_the_lidar_says(least, most, ranges):
-    scan = conversions.scan_from_msg(scan_message(ranges=[1.0, 4.0, 11.0]), upright(), least, most)
-    assert scan.ranges_m.tolist() == ranges
-
-
 @pytest.mark.parametrize("yaw", [0.0, 0.3, 2.5, -3.0])
 def test_points_of_a_laser_upside_down_are_those_of_the_rotation_in_space(yaw):
     transform = Transform(Vector3(0.2, -0.1, 0.5), quaternion(np.pi, 0.0, yaw))

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import yaml
 
+from glass_nav import amcl_parameters
 from glass_nav.params import as_mapping
-from glass_nav.ros.params import AMCL_PARAMETERS, LocalizationParams, ParamError, localization_params
+from glass_nav.ros.params import LocalizationParams, ParamError, localization_params
 
 REPO = Path(__file__).parents[3]
 
@@ -44,12 +45,12 @@ def test_parameters_of_amcl_that_mean_nothing_here_are_taken_and_named():
     given = {"laser_likelihood_max_dist": 2.0, "do_beamskip": False, "initial_pose_x": 3, "laser_z_short": 0.1}
     p, unused = localization_params(given, "/amcl")
     assert unused == ["do_beamskip", "laser_likelihood_max_dist", "laser_z_short"]
-    assert p.node.initial_pose_x == 3.0
-    assert isinstance(p.node.initial_pose_x, float)
+    assert p.start.initial_pose_x == 3.0
+    assert isinstance(p.start.initial_pose_x, float)
 
 
 def test_all_of_amcls_parameters_are_known_at_once():
-    p, unused = localization_params({name: None for name in AMCL_PARAMETERS
+    p, unused = localization_params({name: None for name in amcl_parameters.NAMES
                                      if name not in as_mapping(LocalizationParams())}, "/amcl")
     assert p == LocalizationParams()
     assert "kld_err" in unused or "kld_err" in as_mapping(p)
@@ -62,7 +63,7 @@ def test_all_of_amcls_parameters_are_known_at_once():
     ({"save_pose_rate": "0.5"}, "/n: ~save_pose_rate must be float, got '0.5'"),
     ({"random_seed": 1.5}, "/n: ~random_seed must be int, got 1.5"),
     ({"initial_pose_x": math.nan}, "/n: ~initial_pose_x must be finite, got nan"),
-    ({"initial_cov_aa": -0.1}, "/n: ~initial_cov_aa must be >= 0, got -0.1"),
+    ({"initial_cov_aa": -0.1}, "/n: ~initial_cov_aa must be finite and >= 0, got -0.1"),
     ({"transform_tolerance": -1}, "/n: ~transform_tolerance must be >= 0, got -1.0"),
     ({"laser_max_range": 0}, "/n: ~laser_max_range must be above 0 and ~laser_min_range"),
     ({"laser_max_range": 2.0, "laser_min_range": 2.0}, "or < 0 for the scan's own, got 2.0"),
@@ -89,5 +90,5 @@ def test_the_same_seed_gives_the_same_numbers_and_a_negative_one_new_ones():
 
 def test_the_start_is_given_as_pose_and_covariance():
     p, _ = localization_params({"initial_pose_x": 1, "initial_pose_a": 0.5, "initial_cov_yy": 4.0}, "/n")
-    assert p.node.initial_pose.tolist() == [1.0, 0.0, 0.5]
-    assert np.diag(p.node.initial_covariance)[1] == 4.0
+    assert p.start.pose.tolist() == [1.0, 0.0, 0.5]
+    assert np.diag(p.start.covariance)[1] == 4.0
