@@ -1,0 +1,40 @@
+"""scripts/setup and scripts/demo refuse what they cannot do, in one line and before they change anything."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Tuple
+
+import pytest
+
+SCRIPTS = Path(__file__).parents[2] / "scripts"
+
+
+def run(script: Path, *arguments: str) -> Tuple[int, str]:
+    done = subprocess.run([str(script), *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT, text=True)
+    return done.returncode, done.stdout.strip()
+
+
+def test_setup_names_an_unknown_argument() -> None:
+    assert run(SCRIPTS / "setup", "--develop") == (1, "setup: unknown argument '--develop', allowed: --dev")
+
+
+def test_setup_refuses_a_path_that_catkin_cannot_build_in(tmp_path: Path) -> None:
+    checkout = tmp_path / "my robot"
+    (checkout / "scripts").mkdir(parents=True)
+    shutil.copy(SCRIPTS / "setup", checkout / "scripts")
+    assert run(checkout / "scripts" / "setup") == (
+        1, f"setup: catkin cannot work below a path with spaces or ;$\", got '{checkout}': move the checkout")
+    assert not (checkout / ".build").exists()
+
+
+@pytest.mark.parametrize("arguments, message", [
+    (["--seed", "3"], "demo: unknown argument '--seed', allowed: --seeds N, --out DIR"),
+    (["--seeds", "0"], "demo: --seeds must be a whole number >= 1, got '0'"),
+    (["--seeds"], "demo: --seeds must be a whole number >= 1, got ''"),
+])
+def test_demo_names_a_wrong_argument(arguments: "list[str]", message: str) -> None:
+    assert run(SCRIPTS / "demo", *arguments) == (2, message)
