@@ -1,0 +1,99 @@
+"""How far is the nearest wall: against distances worked out one by one, and slopes by small steps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from glass_nav.geometry import se2
+from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.world.grid_map import GridMap
+
+CELL_M = 0.1
+TURNED = np.array([3.0, -2.0, 0.7])
+
+
+def grid_map(occupied, origin=(0.0, 0.0, 0.0)):
+    return GridMap(np.where(occupied, 100, 0).astype(np.int8), CELL_M, np.array(origin, float))
+
+
+def scattered(seed, origin=(0.0, 0.0, 0.0)):
+    return grid_map(np.random.default_rng(seed).random((25, 30)) < 0.03, origin)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("origin", [(0.0, 0.0, 0.0), TURNED])
+def test_at_cell_centres_it_is_the_distance_to_the_nearest_of_all_walls(seed, origin):
+    there = scattered(seed, origin)
+    centres = there.centres(*np.indices(there.occupied.shape)).reshape(-1, 2)
+    walls = there.centres(*np.nonzero(there.occupied))
+    nearest = np.linalg.norm(centres[:, None] - walls, axis=-1).min(axis=1)
+    distance, _, _ = DistanceField(there, max_distance_m=50.0).at(centres[:, 0], centres[:, 1])
+    np.testing.assert_allclose(distance, nearest, atol=1e-5)
+
+
+def test_between_cell_centres_it_is_bilinear():
+    # One wall cell with its centre at (1.05, 1.05). The four centres around (1.28, 1.17) lie (0.2 or 0.3, 0.1 or
+    # 0.2) from it, and the point at 0.3 and 0.2 of the way between them.
+    occupied = np.zeros((30, 30), bool)
+    occupied[10, 10] = True
+    lower = 0.7 * np.hypot(0.2, 0.1) + 0.3 * np.hypot(0.3, 0.1)
+    upper = 0.7 * np.hypot(0.2, 0.2) + 0.3 * np.hypot(0.3, 0.2)
+    distance, _, _ = DistanceField(grid_map(occupied)).at(np.array([1.28]), np.array([1.17]))
+    np.testing.assert_allclose(distance, 0.8 * lower + 0.2 * upper, atol=1e-6)
+
+
+def test_distances_are_cut():
+    occupied = np.zeros((5, 60), bool)
+    occupied[:, 0] = True
+    distance, along_x, along_y = DistanceField(grid_map(occupied), max_distance_m=1.5).at(
+        np.array([0.45, 4.0]), np.array([0.2, 0.2]))
+    np.testing.assert_allclose(distance, [0.4, 1.5], atol=1e-6)
+    np.testing.assert_allclose(along_x, [1.0, 0.0], atol=1e-5)
+    np.testing.assert_allclose(along_y, 0.0, atol=1e-6)
+
+
+def test_without_a_wall_all_is_far_and_flat():
+    distance, along_x, along_y = DistanceField(grid_map(np.zeros((4, 5), bool)), max_distance_m=1.2).at(
+        np.array([0.1, 0.3, -5.0]), np.array([0.1, 0.2, 9.0]))
+    np.testing.assert_allclose(distance, 1.2, rtol=1e-6)
+    np.testing.assert_array_equal(along_x, 0.0)
+    np.testing.assert_array_equal(along_y, 0.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_slope_is_what_a_small_step_changes(seed):
+    field = DistanceField(scattered(seed, TURNED), max_distance_m=50.0)
+    rng = np.random.default_rng(seed)
+    inside = CELL_M * (rng.integers(2, 20, (400, 2)) + rng.uniform(0.52, 1.48, (400, 2)))  # clear of the kinks
+    x, y = se2.transform_points(TURNED, inside).T
+    step = 1e-5
+    _, along_x, along_y = field.at(x, y)
+    by_x = (field.at(x + step, y)[0] - field.at(x - step, y)[0]) / (2.0 * step)
+    by_y = (field.at(x, y + step)[0] - field.at(x, y - step)[0]) / (2.0 * step)
+    np.testing.assert_allclose(along_x, by_x, atol=1e-3)
+    np.testing.assert_allclose(along_y, by_y, atol=1e-3)
+
+
+def test_outside_the_grid_the_borders_value_holds():
+    occupied = np.zeros((10, 10), bool)
+    occupied[5, 2] = True
+    field = DistanceField(grid_map(occupied))
+    border = field.at(np.array([0.95, 0.55]), np.array([0.55, 0.05]))[0]
+    outside = field.at(np.array([40.0, 0.55]), np.array([0.55, -40.0]))[0]
+    np.testing.assert_allclose(outside, border, atol=1e-6)
+
+
+def test_a_beam_does_not_end_deep_inside_what_is_drawn_solid():
+    occupied = np.zeros((40, 60), bool)
+    occupied[:, 20:] = True  # solid from x = 2 m on
+    field = DistanceField(grid_map(occupied))
+    distance, along_x, _ = field.at(np.array([2.05, 2.35, 4.35]), np.array([2.0, 2.0, 2.0]))
+    np.testing.assert_allclose(distance[:2], 0.0, atol=1e-6)  # a wall drawn as thick as walls are
+    assert distance[2] > 1.5                                  # 2 m inside: some way out
+    assert along_x[2] > 0.9
+
+
+def test_a_map_of_walls_alone_is_all_wall():
+    distance, _, _ = DistanceField(grid_map(np.ones((6, 6), bool))).at(np.array([0.3]), np.array([0.3]))
+    np.testing.assert_array_equal(distance, 0.0)
