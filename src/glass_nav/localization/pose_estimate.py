@@ -56,20 +56,16 @@ def moments(poses: np.ndarray, weights: np.ndarray) -> "tuple[np.ndarray, np.nda
 def _clusters(poses: np.ndarray) -> np.ndarray:
     """(P,) label of each particle: histogram bins that touch are one cluster."""
     cells = resampling.bins(poses)
-    cells[:, 2] %= _YAW_BINS
-    filled, which = np.unique(cells, axis=0, return_inverse=True)
-    which = which.reshape(-1)
-    if len(filled) == 1:
-        return which
-    span = filled[:, :2].max(axis=0) - filled[:, :2].min(axis=0) + 3
-    base = filled[:, :2].min(axis=0) - 1
+    base = cells[:, :2].min(axis=0) - 1
+    span_y = cells[:, 1].max() - base[1] + 2
 
-    def key(cell: np.ndarray) -> np.ndarray:
+    def key(cell: np.ndarray) -> np.ndarray:  # yaw goes round
         x, y = cell[..., 0] - base[0], cell[..., 1] - base[1]
-        return (x * span[1] + y) * _YAW_BINS + cell[..., 2] % _YAW_BINS
+        return (x * span_y + y) * _YAW_BINS + cell[..., 2] % _YAW_BINS
 
-    keys = key(filled)  # np.unique sorts rows, so these ascend
-    wanted = key(filled[:, None, :] + _NEIGHBOURS[None])
+    keys, first, which = np.unique(key(cells), return_index=True, return_inverse=True)
+    which = which.reshape(-1)
+    wanted = key(cells[first][:, None, :] + _NEIGHBOURS[None])
     at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
     row, column = np.nonzero(keys[at] == wanted)
     links = coo_matrix((np.ones(len(row)), (row, at[row, column])), shape=(len(keys),) * 2)

@@ -16,7 +16,7 @@ _BIN = np.array([0.5, 0.5, np.radians(10.0)])  # AMCL's: m, m, rad
 @dataclass(frozen=True)
 class ParticleCount:
     """How many particles; the names and meanings are AMCL's."""
-    min_particles: int = 500
+    min_particles: int = 100
     max_particles: int = 5000
     kld_err: float = 0.01  # largest error between the true and the estimated distribution
     kld_z: float = 0.99    # upper normal quantile of the probability that the error is below kld_err
@@ -79,7 +79,10 @@ def enough_particles(poses: np.ndarray, limits: ParticleCount) -> int:
     Args:
         poses: (P, 3) particles with equal weights; only how many bins they fill counts.
     """
-    filled = len(np.unique(bins(poses), axis=0))
+    cells = bins(poses)
+    off = cells - cells.min(axis=0)
+    span = off.max(axis=0) + 1
+    filled = len(np.unique((off[:, 0] * span[1] + off[:, 1]) * span[2] + off[:, 2]))
     if filled <= 1:
         return limits.min_particles
     share = 2.0 / (9.0 * (filled - 1))

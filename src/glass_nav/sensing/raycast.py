@@ -13,7 +13,7 @@ cell meets it at 0; one that starts outside the map meets what it enters.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Tuple
+from typing import Optional, Tuple
 
 import numpy as np
 
@@ -74,6 +74,7 @@ class RayCaster:
         self._grid_from_map = se2.inverse(grid_map.map_from_grid)
         self._grid = _mrpt_grid.Grid(grid_map.occupancy, grid_map.resolution_m, OCCUPIED_PERCENT, backend,
                                      unknown == "stop")
+        self._normals: Optional[Tuple[np.ndarray, np.ndarray]] = None
 
     @property
     def grid_map(self) -> GridMap:
@@ -145,8 +146,10 @@ class RayCaster:
             normal_rad: (H * W,) float32 axis of the normal in map, up to half a turn; NaN: none.
             linearity: (H * W,) float32, 1 straight wall ... 0 no direction, or no normal.
         """
-        normal_rad, linearity = self._grid.normals()
-        return self._in_map(normal_rad), linearity
+        if self._normals is None:  # two threads may both compute it: the same arrays
+            normal_rad, linearity = self._grid.normals()
+            self._normals = self._in_map(normal_rad), linearity
+        return self._normals
 
     def _in_map(self, grid_angle_rad: np.ndarray) -> np.ndarray:
         yaw = self._grid_map.map_from_grid[2]
