@@ -62,3 +62,34 @@ def test_wrong_limits_are_refused_in_one_line(values, text):
     with pytest.raises(ValueError) as err:
         ParticleCount(**values)
     assert str(err.value) == text
+
+
+def test_weights_that_many_particles_share_are_left_alone():
+    log_w = np.random.default_rng(0).normal(0.0, 0.5, 500)
+    np.testing.assert_array_equal(resampling.tempered(log_w), resampling.normalised(log_w))
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("scale", [5.0, 100.0, 10000.0])
+def test_a_scan_that_one_particle_alone_explains_is_flattened_until_enough_count(seed, scale):
+    log_w = scale * np.random.default_rng(seed).standard_normal(500)
+    weights = resampling.tempered(log_w, least_effective=20.0)
+    assert weights.sum() == pytest.approx(1.0)
+    assert resampling.effective_count(resampling.normalised(log_w)) < 20.0  # the case is meant
+    assert 20.0 <= resampling.effective_count(weights) < 22.0  # and no flatter than that
+    assert np.all(np.diff(weights[np.argsort(log_w)]) >= 0.0)  # the better explained stay the heavier
+
+
+def test_of_a_few_particles_half_have_to_count():
+    weights = resampling.tempered(np.array([0.0, -1e3, -2e3, -3e3]), least_effective=20.0)
+    assert resampling.effective_count(weights) == pytest.approx(2.0, rel=0.05)
+    np.testing.assert_array_equal(resampling.tempered(np.array([-7.0])), [1.0])
+
+
+def test_flattening_does_not_depend_on_the_offset():
+    log_w = 50.0 * np.random.default_rng(3).standard_normal(100)
+    np.testing.assert_allclose(resampling.tempered(log_w), resampling.tempered(log_w - 1e4), rtol=1e-6)
+
+
+def test_if_nothing_is_possible_flattening_leaves_all_equal():
+    np.testing.assert_allclose(resampling.tempered(np.full(30, -np.inf)), 1.0 / 30)

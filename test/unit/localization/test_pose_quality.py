@@ -1,0 +1,98 @@
+"""Is it lost? What the state is, and what it says why."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from glass_nav.localization.pose_estimate import PoseEstimate
+from glass_nav.localization.pose_quality import PoseQuality, QualityLimits
+
+
+def best(position_sigma_m=0.05, heading_sigma_rad=0.02, share=1.0):
+    covariance = np.diag([0.01, position_sigma_m, heading_sigma_rad]) ** 2
+    return PoseEstimate(np.zeros(3), covariance, share, np.ones(1, bool))
+
+
+def judged(used_shares, estimate=None, searching=False, **limits):
+    quality = PoseQuality(QualityLimits(**limits), searching)
+    for used_share in used_shares:
+        quality.observe(used_share)
+    return quality.judge(best() if estimate is None else estimate)
+
+
+def test_a_narrow_pose_that_explains_the_scan_is_localized():
+    state, reason = judged([0.9, 0.9, 0.9])
+    assert state == "LOCALIZED"
+    assert reason == ("the map explains 90% of the answering beams; "
+                      "100% of the weight in one place, sigma 0.05 m, 1.1 deg")
+
+
+def test_before_the_first_scan_nothing_is_believed():
+    assert judged([]) == ("UNCERTAIN", "no scan has been used yet; 100% of the weight in one place, "
+                                       "sigma 0.05 m, 1.1 deg")
+
+
+@pytest.mark.parametrize("estimate", [pytest.param(best(position_sigma_m=0.31), id="position"),
+                                      pytest.param(best(heading_sigma_rad=0.21), id="heading"),
+                                      pytest.param(best(share=0.79), id="two places")])
+def test_a_wide_pose_is_uncertain_however_well_it_explains_the_scan(estimate):
+    assert judged([1.0] * 10, estimate)[0] == "UNCERTAIN"
+
+
+def test_the_widest_direction_counts_not_an_axis():
+    turn = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
+    covariance = np.zeros((3, 3))
+    covariance[:2, :2] = turn @ np.diag([0.35**2, 0.0]) @ turn.T  # neither sigma_x nor sigma_y is above 0.3
+    assert judged([1.0], PoseEstimate(np.zeros(3), covariance, 1.0, np.ones(1, bool)))[0] == "UNCERTAIN"
+
+
+@pytest.mark.parametrize("used_share, state", [(0.41, "LOCALIZED"), (0.39, "UNCERTAIN"), (0.21, "UNCERTAIN"),
+                                               (0.19, "LOST"), (0.0, "LOST")])
+def test_what_the_map_explains_decides_however_sure_the_filter_is(used_share, state):
+    assert judged([used_share] * 3)[0] == state
+
+
+def test_one_bad_scan_loses_nobody_and_many_do():
+    assert judged([0.9] * 5 + [0.0])[0] == "LOCALIZED"
+    assert judged([0.9] * 5 + [0.0] * 20)[0] == "LOST"
+
+
+def test_a_lost_robot_that_sees_what_it_should_again_is_found():
+    assert judged([0.0] * 5 + [0.9] * 20)[0] == "LOCALIZED"
+
+
+def test_the_past_weighs_four_fifths():
+    # 0.5 -> 0.8 x 0.5 + 0.2 x 0.1 = 0.42 -> 0.356
+    assert judged([0.5, 0.1])[1].startswith("the map explains 42% ")
+    assert judged([0.5, 0.1, 0.1])[1].startswith("the map explains 36% ")
+
+
+def test_a_scan_without_answers_says_nothing():
+    assert judged([0.9, np.nan, np.nan]) == judged([0.9])
+
+
+def test_a_search_goes_on_until_one_place_is_left():
+    quality = PoseQuality(QualityLimits(), searching=True)
+    quality.observe(0.1)
+    wide = best(share=0.3)
+    assert quality.judge(wide) == ("GLOBAL_SEARCH", "30% of the weight in one place, sigma 0.05 m, 1.1 deg")
+    quality.observe(1.0)
+    for _ in range(10):
+        quality.observe(1.0)
+    assert quality.judge(best())[0] == "LOCALIZED"
+    assert quality.judge(wide)[0] == "UNCERTAIN"  # found once, the search is over
+
+
+@pytest.mark.parametrize("values, text", [
+    (dict(localized_max_position_sigma_m=0.0), "~localized_max_position_sigma_m must be > 0, got 0.0"),
+    (dict(localized_max_heading_sigma_rad=-1.0), "~localized_max_heading_sigma_rad must be > 0, got -1.0"),
+    (dict(lost_used_share=0.5),
+     "~lost_used_share and ~uncertain_used_share must ascend in [0, 1], got 0.5 and 0.4"),
+    (dict(uncertain_used_share=1.1),
+     "~lost_used_share and ~uncertain_used_share must ascend in [0, 1], got 0.2 and 1.1"),
+    (dict(localized_min_cluster_share=1.5), "~localized_min_cluster_share must be in [0, 1], got 1.5")])
+def test_wrong_limits_are_refused_in_one_line(values, text):
+    with pytest.raises(ValueError) as err:
+        QualityLimits(**values)
+    assert str(err.value) == text
