@@ -37,13 +37,13 @@ class Building:
 
     def grid_map(self) -> GridMap:
         """All lines, glass or not, one cell thick."""
-        cells = np.rint(self.lines_m / CELL_M).astype(int) + BORDER_CELLS
-        columns, rows = cells[:, [0, 2]].max() + BORDER_CELLS, cells[:, [1, 3]].max() + BORDER_CELLS
+        cells = np.rint(self.lines_m / CELL_M).astype(int).reshape(-1, 2)
+        first = cells.min(axis=0) - BORDER_CELLS
+        columns, rows = cells.max(axis=0) + BORDER_CELLS - first
         occupancy = np.zeros((rows, columns), np.int8)
-        for x0, y0, x1, y1 in cells:
+        for x0, y0, x1, y1 in (cells - first).reshape(-1, 4):
             occupancy[min(y0, y1):max(y0, y1) + 1, min(x0, x1):max(x0, x1) + 1] = 100
-        corner = -(BORDER_CELLS + 0.5) * CELL_M
-        return GridMap(occupancy, CELL_M, np.array([corner, corner, 0.0]))
+        return GridMap(occupancy, CELL_M, np.append((first - 0.5) * CELL_M, 0.0))
 
     def crossings(self, map_from_laser: np.ndarray, angles_rad: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Ranges at which each beam crosses a line, ascending, and whether that is glass; (B, W), inf: no more."""
