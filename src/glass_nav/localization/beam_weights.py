@@ -28,9 +28,9 @@ class BeamMixture:
     laser_max_beams: int = 60
     laser_z_hit: float = 0.95
     laser_z_rand: float = 0.05
-    laser_sigma_hit: float = 0.04        # [m] across the surface, lidar and map together; at least
+    laser_sigma_hit: float = 0.05        # [m] across the surface, lidar and map together; at least
     laser_sigma_hit_max: float = 0.2     # [m] at most: the filter learns how well map and lidar agree
-    laser_independent_beams: float = 30.0
+    laser_independent_beams: float = 50.0
 
     def __post_init__(self) -> None:
         if not self.laser_max_beams >= 2:
@@ -97,4 +97,4 @@ def independent_beams(residuals: RangeResiduals, mixture: BeamMixture) -> float:
 
     A spread wider than the lidar's is the map's fault, and the map errs the same way along a whole wall.
     """
-    return mixture.laser_independent_beams * min(1.0, mixture.laser_sigma_hit / residuals.sigma_m)
+    return mixture.laser_independent_beams * min(1.0, (mixture.laser_sigma_hit / residuals.sigma_m) ** 2)

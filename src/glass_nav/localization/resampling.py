@@ -16,7 +16,7 @@ _BIN = np.array([0.5, 0.5, np.radians(10.0)])  # AMCL's: m, m, rad
 @dataclass(frozen=True)
 class ParticleCount:
     """How many particles; the names and meanings are AMCL's."""
-    min_particles: int = 100
+    min_particles: int = 300
     max_particles: int = 5000
     kld_err: float = 0.01  # largest error between the true and the estimated distribution
     kld_z: float = 0.99    # upper normal quantile of the probability that the error is below kld_err
