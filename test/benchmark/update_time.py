@@ -1,0 +1,118 @@
+#!/usr/bin/env python3
+"""Does the filter keep up?  CPU time of one update, and of its parts, on a map of the data folder.
+
+    python test/benchmark/update_time.py
+    python test/benchmark/update_time.py --map ../shared/data/logs/intel/map.yaml --beams 541 --particles 2000
+
+A robot is put on free cells, scans are cast from there (with noise) and the particles are kept at the number
+asked for. Prints the median CPU milliseconds of the process, one thread; exit 1 if a whole update takes more
+than --limit-ms.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Callable, List
+
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
+
+import numpy as np
+
+from glass_nav import params
+from glass_nav.localization import beam_cases, beam_weights, preliminary_samples, reference_ranges
+from glass_nav.localization.glass_mcl import GlassMcl, GlassMclParams
+from glass_nav.localization.range_residuals import RangeResiduals
+from glass_nav.sensing.raycast import RayCaster
+from glass_nav.sensing.scan import Scan
+from glass_nav.sensing.wall_thickness import wall_thickness
+from glass_nav.world import map_file
+from glass_nav.world.grid_map import GridMap
+
+REPO = Path(__file__).resolve().parents[2]
+MAX_RANGE_M = 30.0
+
+
+def scan_at(caster: RayCaster, pose: np.ndarray, beams: int, stamp_ns: int, rng: np.random.Generator) -> Scan:
+    """What a lidar of 270 degrees would measure there."""
+    angles_rad = np.radians(np.linspace(-135.0, 135.0, beams))
+    ranges_m = caster.cast(pose[None], angles_rad, MAX_RANGE_M)[0] + rng.normal(0.0, 0.01, beams)
+    return Scan(stamp_ns, ranges_m, angles_rad, 0.02, MAX_RANGE_M, np.zeros(3))
+
+
+def places(grid_map: GridMap, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Poses (count, 3) in free cells."""
+    rows, columns = np.nonzero(grid_map.free)
+    chosen = rng.integers(len(rows), size=count)
+    return np.column_stack([grid_map.centres(rows[chosen], columns[chosen]), rng.uniform(-np.pi, np.pi, count)])
+
+
+def cpu_ms(work: Callable[[], object]) -> float:
+    started = time.process_time()
+    work()
+    return 1e3 * (time.process_time() - started)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    data = Path(os.environ.get("GLASS_NAV_DATA", REPO.parent / "shared" / "data"))
+    parser.add_argument("--map", type=Path, default=data / "logs" / "intel" / "map.yaml")
+    parser.add_argument("--beams", type=int, default=360)
+    parser.add_argument("--weighted-beams", type=int, default=60)
+    parser.add_argument("--particles", type=int, default=2000)
+    parser.add_argument("--runs", type=int, default=30)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--limit-ms", type=float, default=100.0)
+    arguments = parser.parse_args()
+
+    grid_map = map_file.load(arguments.map)
+    settings = params.load(GlassMclParams, {"min_particles": arguments.particles, "max_particles": arguments.particles,
+                                            "laser_max_beams": arguments.weighted_beams}, "update_time")
+    rng = np.random.default_rng(arguments.seed)
+    caster = RayCaster(grid_map)
+    caster.normals()  # once a map, not once an update
+    thickness_m = wall_thickness(grid_map)
+    vote, residuals = settings.vote, RangeResiduals(0.5, settings.mixture.laser_sigma_hit)
+    mcl = GlassMcl(settings, grid_map, rng)
+    whole: List[float] = []
+    classified: List[float] = []
+    weighted: List[float] = []
+    for pose in places(grid_map, arguments.runs, rng):
+        mcl.set_pose(pose, np.diag([0.05, 0.05, 0.02]) ** 2)
+        mcl.update(scan_at(caster, pose, arguments.beams, 0, rng), np.zeros(3))
+        scan = scan_at(caster, pose, arguments.beams, 1, rng)
+        mcl.request_update()
+        whole.append(cpu_ms(lambda scan=scan: mcl.update(scan, np.zeros(3))))
+        samples = preliminary_samples.around(pose, np.zeros((3, 3)), settings.samples)
+
+        def classify(scan: Scan = scan, samples: np.ndarray = samples) -> beam_cases.BeamCases:
+            references = reference_ranges.of(caster, thickness_m, samples, scan, vote.glass_max_thickness_m,
+                                             vote.normal_min_linearity)
+            return beam_cases.classify(scan.ranges_m, references, residuals, vote)
+
+        classified.append(cpu_ms(classify))
+        cases = classify()
+        chosen = beam_weights.choose(cases.case, arguments.weighted_beams)
+        particles = pose + rng.normal(0.0, 1.0, (arguments.particles, 3)) * [0.05, 0.05, 0.02]
+        weighted.append(cpu_ms(lambda scan=scan, cases=cases, chosen=chosen, particles=particles:
+                               beam_weights.log_weights(
+                                   caster, thickness_m, particles, scan.angles_rad[chosen], scan.ranges_m[chosen],
+                                   cases.case[chosen], residuals, settings.mixture, MAX_RANGE_M,
+                                   vote.glass_max_thickness_m, vote.normal_min_linearity)))
+
+    print(f"{arguments.map}: {arguments.beams} beams classified by {settings.samples.sample_count} samples, "
+          f"{arguments.particles} particles weighted on {arguments.weighted_beams} beams; "
+          f"CPU ms, {arguments.runs} places")
+    for name, times in (("classify", classified), ("weigh", weighted), ("whole update", whole)):
+        print(f"  {name:12s}  median {np.median(times):6.1f}  min {min(times):6.1f}  max {max(times):6.1f}")
+    kept = float(np.median(whole)) <= arguments.limit_ms
+    print(f"  limit {arguments.limit_ms:g} ms for a whole update: {'kept' if kept else 'missed'}")
+    return 0 if kept else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
