@@ -122,6 +122,7 @@ def main() -> int:
     parser.add_argument("--logs", nargs="+", choices=sorted(PEERS), default=list(PEERS), metavar="NAME",
                         help=" ".join(PEERS))
     parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--even", action="store_true", help="only the logs that have a map_even.yaml, with it")
     parser.add_argument("--params", type=Path, help="yaml of parameters")
@@ -131,7 +132,8 @@ def main() -> int:
     settings = settings_from(arguments.params, arguments.set)
     logs = [name for name in arguments.logs if not arguments.even or files(name, True)[1].name == "map_even.yaml"
             and files(name, True)[1].is_file()]
-    jobs = [(name, seed, settings, arguments.even) for name in logs for seed in range(arguments.seeds)]
+    jobs = [(name, seed, settings, arguments.even) for name in logs
+            for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)]
     runs: Dict[str, List[Dict[str, Any]]] = {name: [] for name in logs}
     began = time.monotonic()
     print(HEADER, flush=True)
