@@ -217,9 +217,9 @@ class GlassMcl:
             return self._vote(scan, best.map_from_base, best.covariance)[0]
         aligned = self._anchor.find(best.map_from_base, best.covariance, odom_from_base, points)
         independent = beam_weights.independent_beams(self._residuals, self._params.mixture)
-        particles, log_ratio = proposal.draw(
-            predicted, self._weights, aligned, min(1.0, independent / len(beams)) / self._residuals.sigma_m**2,
-            self._params.proposal, self._rng)
+        beam_information = min(1.0, independent / len(beams)) / self._residuals.sigma_m**2
+        particles, log_ratio = proposal.draw(predicted, self._weights, best, aligned, beam_information,
+                                             self._params.proposal, self._rng)
         cases, references = self._vote(scan, aligned.poses[0], np.zeros((3, 3)))
         self._learn(scan, references)
         self._particles = particles

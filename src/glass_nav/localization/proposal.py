@@ -15,7 +15,8 @@ from typing import Tuple
 import numpy as np
 
 from glass_nav.geometry import angles
-from glass_nav.localization import pose_estimate, resampling
+from glass_nav.localization import resampling
+from glass_nav.localization.pose_estimate import PoseEstimate
 from glass_nav.localization.scan_alignment import Alignment
 
 _LEAST_DEVIATION = np.array([0.01, 0.01, np.radians(0.2)])  # of odometry: m, m, rad
@@ -42,13 +43,14 @@ class Proposal:
             raise ValueError(f"~odom_slip_probability must be in [0, 1), got {self.odom_slip_probability}")
 
 
-def draw(predicted: np.ndarray, weights: np.ndarray, aligned: Alignment, beam_information: float,
-         proposal: Proposal, rng: np.random.Generator) -> Tuple[np.ndarray, np.ndarray]:
+def draw(predicted: np.ndarray, weights: np.ndarray, best: PoseEstimate, aligned: Alignment,
+         beam_information: float, proposal: Proposal, rng: np.random.Generator) -> Tuple[np.ndarray, np.ndarray]:
     """Particles from both sources, and what their weights have to be multiplied with.
 
     Args:
-        predicted: (P, 3) particles moved by odometry, one cluster.
+        predicted: (P, 3) particles moved by odometry.
         weights: (P,) of them, sum 1.
+        best: their best cluster, which the scan was aligned from.
         aligned: K poses at which the scan fits.
         beam_information: what one aligned beam says across the wall [1/m2].
         proposal: shares and deviations.
@@ -60,9 +62,8 @@ def draw(predicted: np.ndarray, weights: np.ndarray, aligned: Alignment, beam_in
     count = int(round(proposal.proposal_scan_share * len(predicted)))
     if not count or not len(aligned.poses):
         return predicted, np.log(weights + 1e-300)
-    mean, covariance = pose_estimate.moments(predicted, weights)
-    covariance += np.diag(_LEAST_DEVIATION**2)
-    slipped = covariance + np.diag(_SLIP_DEVIATION**2)
+    near = best.covariance + np.diag(_LEAST_DEVIATION**2)
+    slipped = near + np.diag(_SLIP_DEVIATION**2)
     # Directions that no wall constrains keep odometry's spread.
     around = np.linalg.inv(aligned.information * beam_information + np.linalg.inv(slipped))
     which = rng.integers(len(aligned.poses), size=count)
@@ -71,15 +72,18 @@ def draw(predicted: np.ndarray, weights: np.ndarray, aligned: Alignment, beam_in
     drawn[:, 2] = angles.wrap(drawn[:, 2])
     kept = resampling.low_variance(weights, len(predicted) - count, rng)
     poses = np.concatenate([predicted[kept], drawn])
-    by_odometry = _log_normal(poses, mean, covariance)
-    by_slip = _log_normal(poses, mean, slipped)
+    by_odometry = _log_normal(poses, best.map_from_base, near)
+    by_slip = _log_normal(poses, best.map_from_base, slipped)
     by_scan = np.logaddexp.reduce([_log_normal(poses, pose, spread) for pose, spread
                                    in zip(aligned.poses, around)]) - np.log(len(aligned.poses))
     share = proposal.proposal_scan_share
     eps = proposal.odom_slip_probability
     target = np.logaddexp(np.log1p(-eps) + by_odometry, np.log(eps + 1e-300) + by_slip)
     source = np.logaddexp(np.log1p(-share) + by_odometry, np.log(share) + by_scan)
-    return poses, target - source
+    log_ratio = target - source
+    # What odometry itself put there, in another cluster or in a tail that is fatter than normal, has its density.
+    log_ratio[:len(kept)] = np.minimum(log_ratio[:len(kept)], -np.log1p(-share))
+    return poses, log_ratio
 
 
 def _log_normal(poses: np.ndarray, mean: np.ndarray, covariance: np.ndarray) -> np.ndarray:
