@@ -88,7 +88,7 @@ CORRIDOR = Building([(0, 0), (60, 0), (60, 2), (0, 2)])
 
 
 def loop_drive(steps: int, centre: Tuple[float, float] = (2.6, 1.6), radii: Tuple[float, float] = (1.2, 0.7),
-               step_rad: float = 0.1) -> List[np.ndarray]:
+               step_rad: float = 0.16) -> List[np.ndarray]:
     """Poses of a robot that drives round an ellipse; each step turns and drives enough for an update."""
     at = step_rad * np.arange(steps)
     yaw = np.arctan2(radii[1] * np.cos(at), -radii[0] * np.sin(at))

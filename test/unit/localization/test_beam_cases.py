@@ -16,6 +16,8 @@ from glass_nav.sensing.wall_thickness import wall_thickness
 
 MODES = ("soft", "paper")
 AT_THE_BOUNDARY = RangeResiduals(depth_share=0.0, sigma_m=0.04)
+VOTE = dict(case_gate_m=0.15, case_min_share=0.5, prior_specular=0.02, prior_first_penetration=0.12,
+            prior_second_penetration=0.04, prior_uncertain=0.1)
 NEVER = np.inf
 
 
@@ -29,7 +31,7 @@ def references(first=NEVER, mirrored=NEVER, second=NEVER, third=NEVER, cos=1.0, 
 
 def classify(measured_m, offered, mode="soft", residuals=AT_THE_BOUNDARY, **values):
     return beam_cases.classify(np.atleast_1d(np.asarray(measured_m, float)), offered, residuals,
-                               CaseVote(vote_mode=mode, **values))
+                               CaseVote(**{**VOTE, **values}, vote_mode=mode))
 
 
 @pytest.mark.parametrize("mode", MODES)

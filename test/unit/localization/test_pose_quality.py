@@ -14,8 +14,12 @@ def best(position_sigma_m=0.05, heading_sigma_rad=0.02, share=1.0):
     return PoseEstimate(np.zeros(3), covariance, share, np.ones(1, bool))
 
 
-def judged(used_shares, estimate=None, searching=False, **limits):
-    quality = PoseQuality(QualityLimits(**limits), searching)
+LIMITS = QualityLimits(localized_max_position_sigma_m=0.3, localized_max_heading_sigma_rad=0.2,
+                       localized_min_cluster_share=0.8, uncertain_used_share=0.4, lost_used_share=0.2)
+
+
+def judged(used_shares, estimate=None):
+    quality = PoseQuality(LIMITS)
     for used_share in used_shares:
         quality.observe(used_share)
     return quality.judge(best() if estimate is None else estimate)
@@ -73,7 +77,7 @@ def test_a_scan_without_answers_says_nothing():
 
 
 def test_a_search_goes_on_until_one_place_is_left():
-    quality = PoseQuality(QualityLimits(), searching=True)
+    quality = PoseQuality(LIMITS, searching=True)
     quality.observe(0.1)
     wide = best(share=0.3)
     assert quality.judge(wide) == ("GLOBAL_SEARCH", "30% of the weight in one place, sigma 0.05 m, 1.1 deg")

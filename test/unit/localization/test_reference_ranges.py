@@ -120,7 +120,7 @@ def test_every_sample_and_beam_has_its_own_place():
     for row, sample in enumerate(samples):
         for column, angle in enumerate(angles_rad):
             alone = seen(ROW, sample, [angle], BASE_FROM_LASER)
-            np.testing.assert_array_equal(together.range_m[:, row, column], alone.range_m[:, 0, 0])
-            np.testing.assert_array_equal(together.cos_incidence[:, row, column], alone.cos_incidence[:, 0, 0])
-            np.testing.assert_array_equal(together.thickness_m[:, row, column], alone.thickness_m[:, 0, 0])
-            np.testing.assert_array_equal(together.pane_incidence[row, column], alone.pane_incidence[0, 0])
+            np.testing.assert_allclose(together.range_m[:, row, column], alone.range_m[:, 0, 0])
+            np.testing.assert_allclose(together.cos_incidence[:, row, column], alone.cos_incidence[:, 0, 0])
+            np.testing.assert_allclose(together.thickness_m[:, row, column], alone.thickness_m[:, 0, 0])
+            np.testing.assert_allclose(together.pane_incidence[row, column], alone.pane_incidence[0, 0])

@@ -1,0 +1,496 @@
+"""A robot driven through rooms: tracked, with its beams told apart, and unmoved by what it cannot use."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from buildings import BASE_FROM_LASER, GLASS_ROOM, L_ROOM, SECOND_NS, Building, loop_drive, odometry, off
+from glass_nav import params
+from glass_nav.geometry import angles, se2
+from glass_nav.localization import scan_alignment
+from glass_nav.localization.glass_mcl import GlassMcl, GlassMclParams, LaserLimits, Schedule
+from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.scan import Scan, ScanError
+from glass_nav.world.grid_map import GridMap
+
+START_COVARIANCE = np.diag([0.05, 0.05, 0.03]) ** 2
+MAPS = {building: building.grid_map() for building in (L_ROOM, GLASS_ROOM)}
+ALL_ROUND = np.linspace(-np.pi, np.pi, 56, endpoint=False)
+
+
+def parameters(**values):
+    return params.load(GlassMclParams, {"min_particles": 200, "max_particles": 800, **values}, "test")
+
+
+def started(building=L_ROOM, at=None, seed=0, grid_map=None, **values):
+    mcl = GlassMcl(parameters(**values), grid_map or MAPS[building], np.random.default_rng(seed))
+    mcl.set_pose(loop_drive(1)[0] if at is None else at, START_COVARIANCE)
+    return mcl
+
+
+class Drive:
+    """The same robot for every filter: where it is, what odometry says, what it measures."""
+
+    def __init__(self, building=L_ROOM, steps=30, seed=0, glass_share=0.0, centre=(2.6, 1.6), beams=180,
+                 way_share=0.05):
+        rng = np.random.default_rng(seed + 1000)
+        self.true = loop_drive(steps, centre)
+        self.odometry = odometry(self.true, rng, way_share)
+        self.scans = [building.scan(pose, index * SECOND_NS, rng, beams=beams, glass_share=glass_share)
+                      for index, pose in enumerate(self.true)]
+
+    def through(self, mcl, first=0, last=None):
+        return [mcl.update(scan, odom) for scan, odom in list(zip(self.scans, self.odometry))[first:last]]
+
+    def errors(self, estimates):
+        """(S, 2) of position [m] and heading [rad]."""
+        first = [scan.stamp_ns for scan in self.scans].index(estimates[0].stamp_ns)
+        return np.array([off(estimate.map_from_base, true)
+                         for estimate, true in zip(estimates, self.true[first:])])
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return Drive()
+
+
+def same(one, other):
+    """Two estimates agree, up to what numpy's cosine does (it depends on where the numbers lie in memory)."""
+    assert one.state == other.state and one.reason == other.reason and one.updated == other.updated
+    for name in ("map_from_base", "covariance", "map_from_odom", "particles"):
+        np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=0.0, atol=1e-9)
+    np.testing.assert_array_equal(one.cases.case, other.cases.case)
+
+
+# -- it tracks
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_robot_in_an_opaque_room_is_tracked_within_centimetres(seed):
+    drive = Drive(seed=seed, steps=50)
+    estimates = drive.through(started(seed=seed))
+    way_m, turn_rad = drive.errors(estimates).T
+    assert way_m.max() < 0.05 and way_m.mean() < 0.02
+    assert turn_rad.max() < np.radians(1.5)
+    assert estimates[-1].state == "LOCALIZED"
+    assert all(estimate.updated for estimate in estimates)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("glass_share", [0.3, 0.9])
+def test_a_robot_beside_glass_is_tracked_within_centimetres(seed, glass_share):
+    drive = Drive(GLASS_ROOM, seed=seed, glass_share=glass_share, centre=(3.6, 1.8))
+    way_m, turn_rad = drive.errors(drive.through(started(GLASS_ROOM, drive.true[0], seed))).T
+    assert way_m.max() < 0.05 and way_m.mean() < 0.02
+    assert turn_rad.max() < np.radians(1.5)
+
+
+@pytest.mark.parametrize("vote_mode", ["soft", "paper"])
+def test_beams_are_told_apart_as_they_were(vote_mode):
+    """Half of the beams pass the pane. Those told wrong are few, and few are not told."""
+    drive = Drive(GLASS_ROOM, seed=5, glass_share=0.5, centre=(3.6, 1.8), steps=20)
+    told, truly = [], []
+    for estimate, scan, pose in zip(drive.through(started(GLASS_ROOM, drive.true[0], vote_mode=vote_mode)),
+                                    drive.scans, drive.true):
+        laser = se2.compose(pose, BASE_FROM_LASER)
+        stopped, _ = GLASS_ROOM.measured(laser, scan.angles_rad)
+        passed, case_passed = GLASS_ROOM.measured(laser, scan.angles_rad, np.ones(len(scan), bool))
+        was_passed = (case_passed == 3) & (np.abs(scan.ranges_m - passed) < np.abs(scan.ranges_m - stopped))
+        told.append(estimate.cases.case)
+        truly.append(np.where(was_passed, 3, 1))
+    told, truly = np.concatenate(told), np.concatenate(truly)
+    assert np.count_nonzero(truly == 3) > 150
+    assert np.mean(told[truly == 3] == 3) > (0.9 if vote_mode == "soft" else 0.75)  # paper: mirrors not gated
+    assert np.mean(told[truly == 1] == 1) > 0.97
+
+
+def test_in_an_opaque_room_no_beam_is_said_to_pass(drive):
+    cases = np.concatenate([estimate.cases.case for estimate in drive.through(started())])
+    assert np.mean(cases == 1) > 0.99
+
+
+@pytest.mark.parametrize("beams", [1, 2, 5, 40])
+def test_few_beams_are_used_as_far_as_they_go(beams):
+    """With 40 beams all is well; with fewer the estimate is at least as good as the odometry of the drive."""
+    drive = Drive(beams=beams, way_share=0.02)
+    way_m, _ = drive.errors(drive.through(started())).T
+    assert way_m[-1] < (0.03 if beams == 40 else 0.35)
+    assert len(drive.scans[0]) == beams
+
+
+def test_it_tracks_with_fewer_resamplings_and_more_threads():
+    drive = Drive(seed=7, steps=20)
+    way_m, _ = drive.errors(drive.through(started(resample_interval=3, raycast_threads=2))).T
+    assert way_m.max() < 0.05
+
+
+def test_it_tracks_without_particles_from_the_scan():
+    drive = Drive(seed=8)
+    way_m, _ = drive.errors(drive.through(started(proposal_scan_share=0.0))).T
+    assert way_m.max() < 0.15
+
+
+@pytest.mark.parametrize("where", [np.array([10.0, -20.0, 0.0]), np.array([-3.0, 5.0, 2.0])])
+def test_where_the_map_lies_and_how_it_is_turned_does_not_matter(drive, where):
+    straight = MAPS[L_ROOM]
+    moved = GridMap(straight.occupancy, straight.resolution_m, se2.compose(where, straight.map_from_grid))
+    estimates = drive.through(started(grid_map=moved, at=se2.compose(where, drive.true[0])), last=12)
+    for estimate, true in zip(estimates, drive.true):
+        way_m, turn_rad = off(estimate.map_from_base, se2.compose(where, true))
+        assert way_m < 0.05 and turn_rad < np.radians(1.5)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_scans_leave_one_place_of_a_scatter(seed):
+    """Not always the right one, yet one where the scans fit."""
+    drive = Drive(seed=seed, steps=8)
+    mcl = GlassMcl(parameters(min_particles=1000, max_particles=3000), MAPS[L_ROOM], np.random.default_rng(seed))
+    mcl.scatter()
+    last = drive.through(mcl)[-1]
+    assert np.sqrt(np.linalg.eigvalsh(last.covariance[:2, :2])[-1]) < 0.1
+    assert last.used_share > 0.6
+    assert last.state == "LOCALIZED"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_over_a_large_building_a_scatter_thins_out_where_the_scan_does_not_fit(seed):
+    rng = np.random.default_rng(seed)
+    walls = [(x, 10.0, x, 13.0 + x / 10) for x in range(3, 40, 4)] + [(x, 0.0, x, 6.0) for x in range(5, 40, 7)]
+    building = Building([(0, 0), (40, 0), (40, 20), (0, 20)], walls=walls)
+    true = np.array([9.0, 14.0, 0.3])
+    scan, odom = building.scan(true, rng=rng), np.zeros(3)
+    mcl = GlassMcl(parameters(max_particles=1500), building.grid_map(), np.random.default_rng(seed))
+    mcl.scatter()
+    blind = mcl.update(replace(scan, ranges_m=np.full(180, np.nan)), odom)
+    mcl.request_update()
+    seen = mcl.update(scan, odom)
+    field = DistanceField(building.grid_map())
+    fits = [scan_alignment.fit(field, scan.points_in_base(), estimate.particles) for estimate in (blind, seen)]
+    assert fits[1].mean() > 1.2 * fits[0].mean()
+    assert np.mean(fits[1] > np.median(fits[0])) > 0.6
+    assert seen.state == "GLOBAL_SEARCH" and " of the weight in one place, sigma " in seen.reason
+
+
+# -- what happens between and beside good scans
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_wheel_that_slips_is_made_up_for_by_the_scan(seed):
+    drive = Drive(seed=seed)
+    slip = np.array([0.3, -0.1, np.radians(12.0)])
+    for index in range(15, 30):
+        drive.odometry[index] = se2.compose(se2.compose(drive.odometry[14], slip),
+                                            se2.compose(se2.inverse(drive.odometry[14]), drive.odometry[index]))
+    way_m, turn_rad = drive.errors(drive.through(started(seed=seed))).T
+    assert way_m[17:].max() < 0.05 and turn_rad[17:].max() < np.radians(1.5)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_one_absurd_scan_is_forgotten_with_the_next_ones(seed):
+    """A ring of 56 beams at 1.0 m all round in the midst of a good drive."""
+    drive = Drive(seed=seed)
+    drive.scans[15] = replace(drive.scans[15], ranges_m=np.full(56, 1.0), angles_rad=ALL_ROUND)
+    way_m, turn_rad = drive.errors(drive.through(started(seed=seed))).T
+    assert way_m[:15].max() < 0.05
+    assert way_m[18:].max() < 0.05 and turn_rad[18:].max() < np.radians(1.5)
+
+
+@pytest.mark.parametrize("nothing", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("seed", range(2))
+def test_without_answers_the_robot_goes_where_odometry_leads(nothing, seed):
+    drive = Drive(seed=seed, way_share=0.01)
+    for index in range(10, 20):
+        drive.scans[index] = replace(drive.scans[index], ranges_m=np.full(180, nothing))
+    mcl = started(seed=seed)
+    estimates = drive.through(mcl)
+    blind = estimates[10:20]
+    for index in range(10, 20):
+        expected = se2.compose(estimates[9].map_from_odom, drive.odometry[index])
+        way_m, turn_rad = off(estimates[index].map_from_base, expected)
+        assert way_m < 0.08 and turn_rad < np.radians(3.0)
+    assert np.linalg.eigvalsh(blind[-1].covariance).min() >= 0.0
+    assert np.trace(blind[-1].covariance) > np.trace(blind[0].covariance)  # it knows that it knows less
+    assert all(np.isnan(estimate.used_share) and not estimate.cases.case.any() for estimate in blind)
+    assert drive.errors(estimates)[21:, 0].max() < 0.05  # and what it sees again counts again
+
+
+def test_a_robot_that_never_saw_anything_is_not_called_localized():
+    drive = Drive(steps=3)
+    drive.scans = [replace(scan, ranges_m=np.full(180, np.inf)) for scan in drive.scans]
+    last = drive.through(started())[-1]
+    assert last.state == "UNCERTAIN"
+    assert last.reason.startswith("no scan has been used yet; ")
+
+
+def test_a_robot_that_sees_what_cannot_be_is_called_lost():
+    drive = Drive(seed=3, steps=45)
+    rng = np.random.default_rng(0)
+    for index in range(10, 45):
+        drive.scans[index] = replace(drive.scans[index], ranges_m=rng.uniform(0.3, 11.0, 180))
+    states = [estimate.state for estimate in drive.through(started())]
+    assert states[9] == "LOCALIZED" and states[-1] == "LOST"
+
+
+def test_who_stands_still_is_not_moved(drive):
+    mcl = started()
+    drive.through(mcl, last=5)
+    rng = np.random.default_rng(1)
+    still = [mcl.update(L_ROOM.scan(drive.true[4], (10 + index) * SECOND_NS, rng), drive.odometry[4])
+             for index in range(50)]
+    assert not any(estimate.updated for estimate in still)
+    poses = np.array([estimate.map_from_base for estimate in still])
+    assert np.abs(poses - poses[0]).max() < 1e-12
+    np.testing.assert_array_equal(still[0].particles, still[-1].particles)
+    assert np.mean(still[-1].cases.case == 1) > 0.95  # the cases are those of the newest scan all the same
+
+
+def test_below_the_least_way_and_turn_odometry_alone_carries_on(drive):
+    mcl = started(update_min_d=0.2, update_min_a=0.2)
+    before = drive.through(mcl, last=1)[0]
+    odom = se2.compose(drive.odometry[0], np.array([0.15, 0.0, 0.15]))
+    after = mcl.update(replace(drive.scans[1]), odom)
+    assert before.updated and not after.updated
+    np.testing.assert_allclose(after.map_from_base, se2.compose(before.map_from_base, [0.15, 0.0, 0.15]), atol=1e-12)
+    turned = mcl.update(replace(drive.scans[2]), se2.compose(drive.odometry[0], np.array([0.0, 0.0, 0.21])))
+    assert turned.updated
+
+
+def test_a_requested_update_uses_the_next_scan_of_a_robot_that_stands(drive):
+    mcl = started()
+    drive.through(mcl, last=1)
+    mcl.request_update()
+    scans = [replace(drive.scans[0], stamp_ns=stamp_ns) for stamp_ns in (1, 2)]
+    assert [mcl.update(scan, drive.odometry[0]).updated for scan in scans] == [True, False]
+
+
+def test_another_map_leaves_the_particles_where_they_are(drive):
+    mcl = started(odom_alpha1=0.0, odom_alpha2=0.0, odom_alpha3=0.0, odom_alpha4=0.0)
+    before = drive.through(mcl, last=3)[-1]
+    mcl.set_map(MAPS[GLASS_ROOM])
+    blind = replace(drive.scans[2], stamp_ns=drive.scans[2].stamp_ns + 1, ranges_m=np.full(180, np.nan))
+    after = mcl.update(blind, drive.odometry[2])
+    assert after.updated  # a new map makes an update due
+
+    def places(estimate):
+        return {tuple(pose) for pose in np.round(estimate.particles, 9)}
+
+    assert places(after) <= places(before)
+
+
+def test_in_another_map_the_robot_is_tracked_by_its_walls():
+    drive = Drive(GLASS_ROOM, seed=2, centre=(3.0, 1.6), glass_share=0.3)
+    mcl = started(L_ROOM, drive.true[0])
+    mcl.set_map(MAPS[GLASS_ROOM])
+    assert drive.errors(drive.through(mcl))[:, 0].max() < 0.05
+
+
+def test_a_new_pose_starts_over(drive):
+    mcl = started()
+    drive.through(mcl)
+    mcl.set_pose(drive.true[0], START_COVARIANCE)  # the robot was carried back; its stamps start over, too
+    assert drive.errors(drive.through(mcl))[:, 0].max() < 0.05
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_particles_start_as_the_covariance_says(seed):
+    turn = np.array([[np.cos(0.5), -np.sin(0.5), 0.0], [np.sin(0.5), np.cos(0.5), 0.0], [0.0, 0.0, 1.0]])
+    covariance = turn @ np.diag([0.2, 0.05, 0.1]) ** 2 @ turn.T
+    mcl = GlassMcl(parameters(max_particles=5000, min_particles=5000), MAPS[L_ROOM], np.random.default_rng(seed))
+    pose = np.array([2.0, 1.5, np.pi])
+    mcl.set_pose(pose, covariance)
+    estimate = mcl.update(Scan(0, np.full(4, np.nan), np.arange(4.0), 0.1, 10.0, np.zeros(3)), np.zeros(3))
+    off_pose = estimate.particles - pose
+    off_pose[:, 2] = angles.wrap(off_pose[:, 2])
+    np.testing.assert_allclose(np.cov(off_pose.T), covariance, atol=0.06 * 0.2**2)
+    assert estimate.particles[:, 2].min() >= -np.pi and estimate.particles[:, 2].max() < np.pi
+
+
+def test_a_start_may_be_exact(drive):
+    mcl = started()
+    mcl.set_pose(drive.true[0], np.zeros((3, 3)))
+    assert drive.errors(drive.through(mcl))[:, 0].max() < 0.05
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_scatter_covers_the_free_cells_and_nothing_else(seed):
+    occupancy = np.full((40, 60), 100, np.int8)
+    occupancy[5:20, 10:30] = 0
+    occupancy[30:35, 50:55] = 0
+    grid_map = GridMap(occupancy, 0.1, np.array([3.0, -1.0, 0.4]))
+    mcl = GlassMcl(parameters(max_particles=3000, min_particles=3000), grid_map, np.random.default_rng(seed))
+    mcl.scatter()
+    found = mcl.update(Scan(0, np.full(4, np.nan), np.arange(4.0), 0.1, 10.0, np.zeros(3)), np.zeros(3)).particles
+    assert grid_map.is_free(found[:, :2]).all()
+    rows, _ = grid_map.cells(found[:, :2])
+    assert np.mean(rows >= 30) == pytest.approx(25.0 / 325.0, abs=0.03)  # by area
+    assert np.histogram(found[:, 2], 8, (-np.pi, np.pi))[0].min() > 200  # any heading
+
+
+# -- what it says
+
+def test_an_estimate_is_whole(drive):
+    for estimate, scan, odom in zip(drive.through(started()), drive.scans, drive.odometry):
+        assert estimate.stamp_ns == scan.stamp_ns
+        np.testing.assert_allclose(se2.compose(estimate.map_from_odom, odom), estimate.map_from_base, atol=1e-12)
+        np.testing.assert_allclose(estimate.covariance, estimate.covariance.T, atol=1e-15)
+        assert np.linalg.eigvalsh(estimate.covariance).min() >= -1e-12
+        assert 200 <= len(estimate.particles) <= 800 and np.isfinite(estimate.particles).all()
+        assert estimate.cases.case.shape == (180,)
+        assert estimate.used_share == pytest.approx(np.mean(estimate.cases.case > 0))
+        told = estimate.cases.case > 0
+        np.testing.assert_allclose(estimate.cases.residual_m[told],
+                                   (scan.ranges_m - estimate.cases.expected_m)[told])
+        assert np.median(np.abs(estimate.cases.residual_m[told])) < 0.03
+
+
+def test_the_same_seed_gives_the_same_answer(drive):
+    for one, other in zip(drive.through(started(seed=4)), drive.through(started(seed=4))):
+        same(one, other)
+
+
+def test_threads_do_not_change_the_answer(drive):
+    for one, other in zip(drive.through(started(seed=4), last=10),
+                          drive.through(started(seed=4, raycast_threads=3), last=10)):
+        same(one, other)
+
+
+def test_another_seed_gives_nearly_the_same_answer(drive):
+    one, other = drive.through(started(seed=5)), drive.through(started(seed=6))
+    assert not np.array_equal(one[-1].particles, other[-1].particles)
+    ways = [off(left.map_from_base, right.map_from_base)[0] for left, right in zip(one, other)]
+    assert max(ways) < 0.03
+
+
+# -- what it does not use
+
+@pytest.mark.parametrize("limits, garbage", [
+    (dict(laser_max_range=2.0), lambda z, rng: np.where(z >= 2.0, rng.uniform(2.0, 9.0, len(z)), z)),
+    (dict(laser_min_range=1.5), lambda z, rng: np.where(z < 1.5, rng.uniform(0.1, 1.5, len(z)), z)),
+    (dict(laser_min_range=1.0, laser_max_range=3.0),
+     lambda z, rng: np.where((z < 1.0) | (z >= 3.0), rng.choice([0.5, 7.0, np.nan], len(z)), z))])
+def test_ranges_outside_the_limits_do_not_matter(drive, limits, garbage):
+    rng = np.random.default_rng(0)
+    clean, spoilt = started(**limits), started(**limits)
+    used = []
+    for scan, odom in list(zip(drive.scans, drive.odometry))[:15]:
+        estimate = clean.update(scan, odom)
+        same(estimate, spoilt.update(replace(scan, ranges_m=garbage(scan.ranges_m, rng)), odom))
+        outside = ((scan.ranges_m >= limits.get("laser_max_range", np.inf))
+                   | (scan.ranges_m < limits.get("laser_min_range", 0.0)))
+        assert not estimate.cases.case[outside].any()
+        used.append(np.count_nonzero(estimate.cases.case))
+    assert np.mean(used) > 20
+
+
+@pytest.mark.parametrize("nothing", [np.nan, np.inf, -np.inf])
+def test_single_beams_without_answer_are_uncertain_and_do_no_harm(drive, nothing):
+    mcl = started()
+    for index, (scan, odom, true) in enumerate(zip(drive.scans, drive.odometry, drive.true)):
+        ranges_m = scan.ranges_m.copy()
+        ranges_m[index % 3::3] = nothing
+        estimate = mcl.update(replace(scan, ranges_m=ranges_m), odom)
+        assert not estimate.cases.case[index % 3::3].any()
+        assert off(estimate.map_from_base, true)[0] < 0.05
+
+
+def refused(mcl, kind, text, call):
+    with pytest.raises(kind) as err:
+        call(mcl)
+    assert type(err.value) is kind
+    assert str(err.value) == text
+
+
+BAD_INPUT = [
+    pytest.param(ScanError, "scan at 1.000 s: time runs backwards, the last scan was at 3.000 s",
+                 lambda mcl, drive: mcl.update(drive.scans[1], drive.odometry[4]), id="time runs backwards"),
+    pytest.param(ScanError, "scan at 4.000 s: odometry must be finite x, y, yaw, got [ 0. nan  0.]",
+                 lambda mcl, drive: mcl.update(drive.scans[4], np.array([0.0, np.nan, 0.0])), id="odometry NaN"),
+    pytest.param(ScanError, "scan at 4.000 s: odometry must be finite x, y, yaw, got [0. 0.]",
+                 lambda mcl, drive: mcl.update(drive.scans[4], np.zeros(2)), id="odometry of two numbers"),
+    pytest.param(ValueError, "a pose needs finite x, y, yaw, got [ 0.  0. inf]",
+                 lambda mcl, drive: mcl.set_pose(np.array([0.0, 0.0, np.inf]), np.zeros((3, 3))), id="pose inf"),
+    pytest.param(ValueError, "a pose needs finite x, y, yaw, got [0. 0.]",
+                 lambda mcl, drive: mcl.set_pose(np.zeros(2), np.zeros((3, 3))), id="pose of two numbers"),
+    pytest.param(ValueError, "a pose needs a finite covariance (3, 3), got "
+                 "[[nan, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]",
+                 lambda mcl, drive: mcl.set_pose(np.zeros(3), np.diag([np.nan, 1.0, 1.0])), id="covariance NaN"),
+    pytest.param(ValueError, "a pose needs a finite covariance (3, 3), got [[1.0, 0.0], [0.0, 1.0]]",
+                 lambda mcl, drive: mcl.set_pose(np.zeros(3), np.eye(2)), id="covariance (2, 2)"),
+    pytest.param(ValueError, "the covariance of a pose must be symmetric, got "
+                 "[[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]",
+                 lambda mcl, drive: mcl.set_pose(np.zeros(3), np.eye(3) + 0.5 * np.eye(3)[[1, 1, 1]]
+                                                 * np.array([[1.0], [0.0], [0.0]])), id="asymmetric covariance"),
+    pytest.param(ValueError, "the covariance of a pose must not be negative, got "
+                 "[[1.0, 0.0, 0.0], [0.0, -0.1, 0.0], [0.0, 0.0, 1.0]]",
+                 lambda mcl, drive: mcl.set_pose(np.zeros(3), np.diag([1.0, -0.1, 1.0])), id="negative covariance")]
+
+
+@pytest.mark.parametrize("kind, text, call", BAD_INPUT)
+def test_what_cannot_be_used_is_refused_in_one_line_and_changes_nothing(drive, kind, text, call):
+    """A filter that refused something goes on as one that was never asked."""
+    asked, twin = started(seed=9), started(seed=9)
+    drive.through(asked, last=4)
+    drive.through(twin, last=4)
+    refused(asked, kind, text, lambda mcl: call(mcl, drive))
+    for one, other in zip(drive.through(asked, 4, 7), drive.through(twin, 4, 7)):
+        same(one, other)
+
+
+def test_limits_that_leave_nothing_of_a_scan_refuse_it_and_change_nothing(drive):
+    asked, twin = (started(seed=9, laser_min_range=0.1) for _ in range(2))
+    drive.through(asked, last=5)
+    drive.through(twin, last=5)
+    short = replace(drive.scans[5], range_max_m=0.08)
+    refused(asked, ScanError, "scan at 5.000 s: no range is left between 0.1 m and 0.08 m",
+            lambda mcl: mcl.update(short, drive.odometry[5]))
+    same(drive.through(asked, 5, 6)[0], drive.through(twin, 5, 6)[0])
+
+
+def test_two_scans_may_bear_the_same_stamp(drive):
+    mcl = started()
+    drive.through(mcl, last=3)
+    assert mcl.update(drive.scans[2], drive.odometry[2]).stamp_ns == drive.scans[2].stamp_ns
+
+
+def test_before_a_start_there_is_nothing_to_update(drive):
+    mcl = GlassMcl(parameters(), MAPS[L_ROOM], np.random.default_rng(0))
+    refused(mcl, RuntimeError, "update() needs set_pose() or scatter() first",
+            lambda mcl: mcl.update(drive.scans[0], drive.odometry[0]))
+    mcl.set_pose(drive.true[0], START_COVARIANCE)
+    assert drive.errors(drive.through(mcl))[:, 0].max() < 0.05
+
+
+@pytest.mark.parametrize("cell", [100, -1, 50])
+def test_on_a_map_without_free_cells_nothing_can_be_scattered(drive, cell):
+    mcl = started()
+    drive.through(mcl, last=3)
+    mcl.set_map(GridMap(np.full((20, 20), cell, np.int8), 0.1, np.zeros(3)))
+    refused(mcl, ValueError, "the map has no free cell to put particles on", lambda mcl: mcl.scatter())
+    mcl.set_map(MAPS[L_ROOM])
+    assert drive.errors(drive.through(mcl, 3, 8))[:, 0].max() < 0.05  # it still knows where it was
+
+
+def test_on_a_map_without_walls_odometry_alone_leads():
+    drive = Drive(way_share=0.0)
+    empty = GridMap(np.zeros((100, 140), np.int8), 0.05, np.zeros(3))
+    estimates = drive.through(started(grid_map=empty), last=10)
+    assert drive.errors(estimates)[:, 0].max() < 0.3
+    assert not any(estimate.cases.case.any() for estimate in estimates)
+
+
+@pytest.mark.parametrize("kind, values, text", [
+    (Schedule, dict(update_min_d=-0.1), "~update_min_d must be >= 0, got -0.1"),
+    (Schedule, dict(update_min_a=float("nan")), "~update_min_a must be >= 0, got nan"),
+    (Schedule, dict(resample_interval=0), "~resample_interval must be >= 1, got 0"),
+    (Schedule, dict(raycast_threads=0), "~raycast_threads must be >= 1, got 0"),
+    (LaserLimits, dict(laser_min_range=float("nan")), "~laser_min_range must be finite, got nan"),
+    (LaserLimits, dict(laser_max_range=float("inf")), "~laser_max_range must be finite, got inf"),
+    (LaserLimits, dict(laser_max_range=0.0),
+     "~laser_max_range must be above 0 and ~laser_min_range, or < 0 for the scan's own, got 0.0"),
+    (LaserLimits, dict(laser_min_range=3.0, laser_max_range=2.0),
+     "~laser_max_range must be above 0 and ~laser_min_range, or < 0 for the scan's own, got 2.0")])
+def test_wrong_values_are_refused_in_one_line(kind, values, text):
+    with pytest.raises(ValueError) as err:
+        kind(**values)
+    assert str(err.value) == text
