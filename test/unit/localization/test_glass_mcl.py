@@ -67,9 +67,9 @@ def same(one, other):
 
 # -- it tracks
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(3))
 def test_a_robot_in_an_opaque_room_is_tracked_within_centimetres(seed):
-    drive = Drive(seed=seed, steps=50)
+    drive = Drive(seed=seed, steps=40)
     estimates = drive.through(started(seed=seed))
     way_m, turn_rad = drive.errors(estimates).T
     assert way_m.max() < 0.05 and way_m.mean() < 0.02
@@ -224,9 +224,9 @@ def test_a_robot_that_never_saw_anything_is_not_called_localized():
 
 
 def test_a_robot_that_sees_what_cannot_be_is_called_lost():
-    drive = Drive(seed=3, steps=45)
+    drive = Drive(seed=3, steps=35)
     rng = np.random.default_rng(0)
-    for index in range(10, 45):
+    for index in range(10, 35):
         drive.scans[index] = replace(drive.scans[index], ranges_m=rng.uniform(0.3, 11.0, 180))
     states = [estimate.state for estimate in drive.through(started())]
     assert states[9] == "LOCALIZED" and states[-1] == "LOST"
@@ -287,9 +287,9 @@ def test_in_another_map_the_robot_is_tracked_by_its_walls():
 
 def test_a_new_pose_starts_over(drive):
     mcl = started()
-    drive.through(mcl)
+    drive.through(mcl, last=12)
     mcl.set_pose(drive.true[0], START_COVARIANCE)  # the robot was carried back; its stamps start over, too
-    assert drive.errors(drive.through(mcl))[:, 0].max() < 0.05
+    assert drive.errors(drive.through(mcl, last=12))[:, 0].max() < 0.05
 
 
 @pytest.mark.parametrize("seed", range(3))

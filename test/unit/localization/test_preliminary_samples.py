@@ -39,8 +39,9 @@ def test_voters_stand_one_or_two_deviations_away():
     assert set(np.round(radius / 0.2, 9)) == {1.0, 2.0}
 
 
-def test_the_rings_are_as_long_as_the_covariance():
-    along = np.array([np.cos(0.6), np.sin(0.6)])
+@pytest.mark.parametrize("axis_rad", [0.6, -0.6, 2.0, 2.8])
+def test_the_rings_are_as_long_as_the_covariance(axis_rad):
+    along = np.array([np.cos(axis_rad), np.sin(axis_rad)])
     across = np.array([-along[1], along[0]])
     covariance = np.zeros((3, 3))
     covariance[:2, :2] = 0.3**2 * np.outer(along, along) + 0.1**2 * np.outer(across, across)
