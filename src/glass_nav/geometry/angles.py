@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Optional
+from typing import TYPE_CHECKING, Optional, Tuple
 
 import numpy as np
 
@@ -25,6 +25,15 @@ def mean(angle_rad: np.ndarray, weights: Optional[np.ndarray] = None) -> float:
     Returns:
         Mean angle in [-pi, pi].
     """
-    angle_rad = np.asarray(angle_rad)
-    return float(np.arctan2(np.average(np.sin(angle_rad), weights=weights),
-                            np.average(np.cos(angle_rad), weights=weights)))
+    cos, sin = cos_sin(angle_rad)
+    return float(np.arctan2(np.average(sin, weights=weights), np.average(cos, weights=weights)))
+
+
+def cos_sin(angle_rad: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
+    """Cosine and sine, any shape.
+
+    Of a copy: for a column of a table numpy's last bit depends on where the table lies in memory, and a run
+    would not repeat.
+    """
+    angle_rad = np.array(angle_rad, float)
+    return np.cos(angle_rad), np.sin(angle_rad)

@@ -14,7 +14,7 @@ from glass_nav.geometry import angles
 def compose(a_from_b: np.ndarray, b_from_c: np.ndarray) -> np.ndarray:
     """a_from_c, yaw in [-pi, pi)."""
     a_from_b, b_from_c = np.asarray(a_from_b, float), np.asarray(b_from_c, float)
-    cos, sin = np.cos(a_from_b[..., 2]), np.sin(a_from_b[..., 2])
+    cos, sin = angles.cos_sin(a_from_b[..., 2])
     x, y = b_from_c[..., 0], b_from_c[..., 1]
     return np.stack(np.broadcast_arrays(a_from_b[..., 0] + cos * x - sin * y,
                                         a_from_b[..., 1] + sin * x + cos * y,
@@ -24,7 +24,7 @@ def compose(a_from_b: np.ndarray, b_from_c: np.ndarray) -> np.ndarray:
 def inverse(a_from_b: np.ndarray) -> np.ndarray:
     """b_from_a, yaw in [-pi, pi)."""
     a_from_b = np.asarray(a_from_b, float)
-    cos, sin = np.cos(a_from_b[..., 2]), np.sin(a_from_b[..., 2])
+    cos, sin = angles.cos_sin(a_from_b[..., 2])
     x, y = a_from_b[..., 0], a_from_b[..., 1]
     return np.stack([-cos * x - sin * y, sin * x - cos * y, angles.wrap(-a_from_b[..., 2])], axis=-1)
 
@@ -32,7 +32,7 @@ def inverse(a_from_b: np.ndarray) -> np.ndarray:
 def transform_points(a_from_b: np.ndarray, points_b: np.ndarray) -> np.ndarray:
     """Points (..., 2) [m] given in b, in a."""
     a_from_b, points_b = np.asarray(a_from_b, float), np.asarray(points_b, float)
-    cos, sin = np.cos(a_from_b[..., 2]), np.sin(a_from_b[..., 2])
+    cos, sin = angles.cos_sin(a_from_b[..., 2])
     x, y = points_b[..., 0], points_b[..., 1]
     return np.stack(np.broadcast_arrays(a_from_b[..., 0] + cos * x - sin * y,
                                         a_from_b[..., 1] + sin * x + cos * y), axis=-1)

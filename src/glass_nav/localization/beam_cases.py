@@ -21,6 +21,7 @@ VOTE_MODES = ("soft", "paper")
 _TIE_ORDER = (DIFFUSE, FIRST_PENETRATION, SECOND_PENETRATION, SPECULAR)
 _LEAST_COS = 0.2          # a surface seen flatter than 78 degrees is no worse placed than at that
 _GATE_SIGMAS = 3.0
+_TOLD_GATES = 2.0         # the samples that won the vote may stand one gate away from the pose told
 _PANE_INDEX = 1.51        # of soda-lime glass
 
 
@@ -89,24 +90,27 @@ def classify(measured_m: np.ndarray, references: ReferenceRanges, residuals: Ran
     share[:, ~answered] = np.array([1.0, 0.0, 0.0, 0.0, 0.0])[:, None]
     won = _winner(share)
     case = np.where(answered & (share[won, np.arange(len(won))] >= vote.case_min_share), won, UNCERTAIN)
-    return _told_from_sample_0(case, share[case, np.arange(len(case))], measured_m, references)
+    return _told_from_sample_0(case, share[case, np.arange(len(case))], measured_m, references,
+                               _gate(residuals.sigma_m, vote))
 
 
 def as_seen_from(cases: BeamCases, measured_m: np.ndarray, references: ReferenceRanges,
-                 residuals: RangeResiduals) -> BeamCases:
-    """The same cases, with the ranges expected at sample 0 of other references."""
-    return _told_from_sample_0(cases.case, cases.weight, measured_m, _inside_walls(references, residuals))
+                 residuals: RangeResiduals, vote: CaseVote) -> BeamCases:
+    """The same cases, with the ranges expected at sample 0 of other references; uncertain where none is near."""
+    return _told_from_sample_0(cases.case, cases.weight, measured_m, _inside_walls(references, residuals),
+                               _gate(residuals.sigma_m, vote))
 
 
 def _told_from_sample_0(case: np.ndarray, weight: np.ndarray, measured_m: np.ndarray,
-                        references: ReferenceRanges) -> BeamCases:
-    row = np.maximum(case.astype(int) - 1, 0)
-    expected = np.where(case > 0, references.range_m[row, 0, np.arange(len(row))], np.nan)
-    case = np.where(np.isfinite(expected), case, UNCERTAIN)  # sample 0 itself must see the surface
-    expected[case == UNCERTAIN] = np.nan
+                        references: ReferenceRanges, gate_m: float) -> BeamCases:
+    row, beam = np.maximum(case.astype(int) - 1, 0), np.arange(len(case))
+    expected = references.range_m[row, 0, beam]
     with np.errstate(invalid="ignore"):
-        residual = np.where(case > 0, measured_m - expected, np.nan)
-    return BeamCases(case.astype(np.uint8), expected, residual, weight)
+        residual = measured_m - expected
+        across = np.abs(residual) * references.cos_incidence[row, 0, beam]
+        known = (case > 0) & (across <= _TOLD_GATES * gate_m)  # sample 0 itself must see the surface
+    return BeamCases(np.where(known, case, UNCERTAIN).astype(np.uint8), np.where(known, expected, np.nan),
+                     np.where(known, residual, np.nan), weight)
 
 
 def _inside_walls(references: ReferenceRanges, residuals: RangeResiduals) -> ReferenceRanges:
@@ -127,8 +131,9 @@ def _paper_ballots(measured_m: np.ndarray, references: ReferenceRanges, sigma_m:
     """(5, B) share of the samples whose nearest reference is that case; equal votes."""
     with np.errstate(invalid="ignore"):
         off = np.abs(measured_m - references.range_m)  # (4, N, B)
+    off[np.isnan(off)] = np.inf
     order = np.array(_TIE_ORDER) - 1
-    nearest = order[np.argmin(np.where(np.isnan(off), np.inf, off)[order], axis=0)]  # first of equals
+    nearest = order[np.argmin(off[order], axis=0)]  # first of equals
     near = np.take_along_axis(off, nearest[None], axis=0)[0] <= _gate(sigma_m, vote)
     voted = np.where(near, nearest + 1, UNCERTAIN)
     return np.stack([np.mean(voted == case, axis=0) for case in range(5)])

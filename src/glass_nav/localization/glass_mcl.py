@@ -32,6 +32,7 @@ from glass_nav.sensing.scan import Scan, ScanError
 from glass_nav.sensing.wall_thickness import wall_thickness
 from glass_nav.world.grid_map import GridMap
 
+_WIDEST_PLACE = np.array([1.0, 1.0, 0.7])  # deviations [m, m, rad] that preliminary samples can cover
 _NATS_OF_A_FULL_FIT = 20.0  # of log weight between a scan that fits nowhere and one that fits everywhere
 
 
@@ -210,7 +211,7 @@ class GlassMcl:
         if not len(beams):
             return self._vote(scan, best.map_from_base, best.covariance)[0]
         points = scan.points_in_base()[beams]
-        if best.share < self._params.proposal.proposal_min_cluster_share:
+        if not self._is_one_place(best):
             fit = scan_alignment.fit(self._field, points, predicted)
             self._weights = resampling.normalised(np.log(self._weights) + _NATS_OF_A_FULL_FIT * fit)
             best = pose_estimate.of(predicted, self._weights)
@@ -221,10 +222,16 @@ class GlassMcl:
         particles, log_ratio = proposal.draw(predicted, self._weights, best, aligned, beam_information,
                                              self._params.proposal, self._rng)
         cases, references = self._vote(scan, aligned.poses[0], np.zeros((3, 3)))
-        self._learn(scan, references)
+        if self._anchor.fits:
+            self._learn(scan, references)
         self._particles = particles
         self._weights = resampling.tempered(log_ratio + self._log_weights(scan, particles, cases))
         return cases
+
+    def _is_one_place(self, best: pose_estimate.PoseEstimate) -> bool:
+        """A cloud over a whole room is one cluster too, but no pose to align a scan from."""
+        return (best.share >= self._params.proposal.proposal_min_cluster_share
+                and bool(np.all(np.sqrt(np.diag(best.covariance)) <= _WIDEST_PLACE)))
 
     def _checked(self, scan: Scan, odom_from_base: np.ndarray) -> np.ndarray:
         odom_from_base = np.array(odom_from_base, float)
@@ -294,7 +301,7 @@ class GlassMcl:
         map_from_base = se2.compose(self._map_from_odom, odom_from_base)
         if updated:  # the vote was held at the aligned pose
             cases = beam_cases.as_seen_from(cases, scan.ranges_m, self._references(scan, map_from_base[None]),
-                                            self._residuals)
+                                            self._residuals, self._params.vote)
         answered = int(scan.answered.sum())
         used_share = float(np.count_nonzero(cases.case)) / answered if answered else float("nan")
         if updated:

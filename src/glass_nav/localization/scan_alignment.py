@@ -69,7 +69,7 @@ def median_distance(field: DistanceField, points_m: np.ndarray, pose: np.ndarray
 def _residuals(field: DistanceField, x: np.ndarray, y: np.ndarray,
                poses: np.ndarray) -> "tuple[np.ndarray, np.ndarray]":
     """Distances (K, B) and their derivatives (3, K, B) by the pose."""
-    cos, sin = np.cos(poses[:, 2])[:, None], np.sin(poses[:, 2])[:, None]
+    cos, sin = angles.cos_sin(poses[:, 2:])
     turned_x, turned_y = cos * x - sin * y, sin * x + cos * y
     distance, along_x, along_y = field.at(poses[:, :1] + turned_x, poses[:, 1:2] + turned_y)
     return distance, np.stack([along_x, along_y, along_y * turned_x - along_x * turned_y])

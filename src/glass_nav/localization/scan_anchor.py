@@ -35,6 +35,7 @@ _KEEP = 4                     # alignments that are different places
 _AS_GOOD = 0.9                # of the best fit: worth particles
 _SAME_M, _SAME_RAD = 0.05, np.radians(1.5)
 _POOR_FIT = 0.75              # of the usual fit: odometry is not believed
+_REACH = 3.0                  # deviations: farther away a poor fit is chance
 _CONVINCING_FIT = 0.9         # of the usual fit: a place that odometry did not lead to
 _MEMORY = 0.9
 _LEAST_SCALE_M, _MOST_SCALE_M = 0.06, 0.3  # of the kernel; follows how well the map fits
@@ -45,6 +46,7 @@ class ScanAnchor:
     """Finds the aligned poses and remembers how well scans fit lately."""
 
     def __init__(self, field: DistanceField) -> None:
+        self.fits = True  # the last scan fitted about as well as scans usually do
         self._field = field
         self._usual_fit = float("nan")
         self._scale_m = _LEAST_SCALE_M
@@ -61,11 +63,17 @@ class ScanAnchor:
         """
         found = self._align_around(mean, covariance, _LEVELS[0], points_m)
         suspect, self._suspect = self._suspect, None
-        if found.fit[0] < _POOR_FIT * self._usual_fit:
+        self.fits = not found.fit[0] < _POOR_FIT * self._usual_fit
+        if not self.fits:
             farther = self._confirmed(suspect, odom_from_base, points_m)
             if farther is not None:
+                self.fits = True
                 return farther
             self._suspect = self._search(mean, covariance, odom_from_base, points_m)
+            near = _within_reach(found.poses, mean, covariance)
+            if not near.any():  # the scan says nothing about the place that odometry leads to
+                return Alignment(mean[None], np.zeros((1, 3, 3)), scan_alignment.fit(self._field, points_m, mean[None]))
+            found = Alignment(found.poses[near], found.information[near], found.fit[near])
         self._remember(found, points_m)
         return found
 
@@ -95,15 +103,26 @@ class ScanAnchor:
 
     def _align_around(self, mean: np.ndarray, covariance: np.ndarray, shape: PreliminarySamples,
                       points_m: np.ndarray) -> Alignment:
-        spread = np.clip(np.sqrt(np.diag(covariance)),
-                         [shape.sample_min_radius_m] * 2 + [shape.sample_min_heading_rad],
-                         [shape.sample_max_radius_m] * 2 + [shape.sample_max_heading_rad])
+        spread = _spread(covariance, shape)
         count = int(np.clip(_LEAST_STARTS * np.prod(spread / _START_GRID), _LEAST_STARTS, _MOST_STARTS))
         starts = preliminary_samples.around(mean, covariance, replace(shape, sample_count=count))
         if count > _ALIGNED_STARTS:
             fit = scan_alignment.fit(self._field, points_m, starts)
             starts = starts[np.argsort(-fit)[:_ALIGNED_STARTS]]
         return _distinct(scan_alignment.align(self._field, points_m, starts, last_scale_m=self._scale_m))
+
+
+def _within_reach(poses: np.ndarray, mean: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """(K,) bool: poses (K, 3) that a poor fit may still lead to."""
+    off = np.abs(poses - mean)
+    off[:, 2] = np.abs(angles.wrap(off[:, 2]))
+    return np.all(off < _REACH * _spread(covariance, _LEVELS[0]), axis=1)
+
+
+def _spread(covariance: np.ndarray, shape: PreliminarySamples) -> np.ndarray:
+    """(3,) deviations [m, m, rad] within the limits of the starts."""
+    return np.clip(np.sqrt(np.diag(covariance)), [shape.sample_min_radius_m] * 2 + [shape.sample_min_heading_rad],
+                   [shape.sample_max_radius_m] * 2 + [shape.sample_max_heading_rad])
 
 
 def _distinct(aligned: Alignment) -> Alignment:
