@@ -5,63 +5,18 @@
 #include <limits>
 #include <stdexcept>
 
+#include "first_hits.hpp"
+#include "ray_stream.hpp"
 #include "surfaces.hpp"
 
 namespace glass_nav {
 namespace {
 
-/// Unit vectors of the beams: one sine and cosine for each beam and each pose; their sums come by rotation.
-class Beams {
- public:
-  explicit Beams(const RayBatch& batch) : x_(batch.angle_count), y_(batch.angle_count) {
-    for (std::size_t b = 0; b < batch.angle_count; ++b) {
-      x_[b] = std::cos(batch.angles[b]);
-      y_[b] = std::sin(batch.angles[b]);
-    }
-  }
-
-  std::size_t count() const { return x_.size(); }
-  double x(std::size_t b) const { return x_[b]; }
-  double y(std::size_t b) const { return y_[b]; }
-
- private:
-  std::vector<double> x_, y_;
-};
-
-/// The rays of consecutive poses, one after the other.
-class RayStream {
- public:
-  RayStream(const double* first_pose, const Beams& beams, double resolution_m)
-      : pose_(first_pose), beams_(beams), resolution_m_(resolution_m) {}
-
-  Ray next() {
-    if (beam_ == 0) {
-      ray_.x = pose_[0] / resolution_m_;
-      ray_.y = pose_[1] / resolution_m_;
-      cos_yaw_ = std::cos(pose_[2]);
-      sin_yaw_ = std::sin(pose_[2]);
-      pose_ += 3;
-    }
-    ray_.dx = cos_yaw_ * beams_.x(beam_) - sin_yaw_ * beams_.y(beam_);
-    ray_.dy = sin_yaw_ * beams_.x(beam_) + cos_yaw_ * beams_.y(beam_);
-    if (++beam_ == beams_.count()) beam_ = 0;
-    return ray_;
-  }
-
- private:
-  const double* pose_;
-  const Beams& beams_;
-  double resolution_m_;
-  std::size_t beam_ = 0;
-  double cos_yaw_ = 1.0, sin_yaw_ = 0.0;
-  Ray ray_{};
-};
-
 /// Deals the batch out in chunks: work(index of the first ray, how many, stream of them).
 template <class Work>
 void for_each_chunk(const RayBatch& batch, double resolution_m, const Work& work) {
   constexpr std::ptrdiff_t kPoses = 16;
-  const Beams beams(batch);
+  const Beams beams(batch.angles, batch.angle_count);
   const auto pose_count = static_cast<std::ptrdiff_t>(batch.angle_count > 0 ? batch.pose_count : 0);
 #pragma omp parallel for num_threads(batch.threads) if (batch.threads > 1) schedule(dynamic)
   for (std::ptrdiff_t first = 0; first < pose_count; first += kPoses) {
@@ -139,16 +94,27 @@ void GridRaycaster::with_seeker(const Use& use) const {
 
 void GridRaycaster::cast_first(const RayBatch& batch, double* range_m, std::int32_t* cell) const {
   const double t_max = batch.max_range_m / resolution_m_;
-  with_seeker([&](const GridCells& grid, const auto& seeker) {
+  const GridCells grid = cells();
+  const auto store = [&](std::size_t i, double t, std::int32_t met) {
+    range_m[i] = met < 0 ? kInfinity : t * resolution_m_;
+    if (cell != nullptr) cell[i] = met;
+  };
+  if (backend_ == Backend::exact) {
+    const FirstHits first_hits(grid);
     for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
-      const auto start = [&](std::size_t) {
-        const Ray ray = rays.next();
-        return Search{ray, GridWalk(ray, grid.width, grid.height, t_max)};
-      };
-      seeker.seek_all(count, start, NothingIgnored{}, [&](std::size_t i, const GridWalk& walk, std::int32_t met) {
-        range_m[first + i] = met < 0 ? kInfinity : walk.t() * resolution_m_;
-        if (cell != nullptr) cell[first + i] = met;
-      });
+      first_hits.along_all(count, t_max, rays,
+                           [&](std::size_t i, double t, std::int32_t met) { store(first + i, t, met); });
+    });
+    return;
+  }
+  const MrptSeeker seeker(grid, map_, resolution_m_);
+  for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
+    const auto start = [&](std::size_t) {
+      const Ray ray = rays.next();
+      return Search{ray, GridWalk(ray, grid.width, grid.height, t_max)};
+    };
+    seeker.seek_all(count, start, NothingIgnored{}, [&](std::size_t i, const GridWalk& walk, std::int32_t met) {
+      store(first + i, walk.t(), met);
     });
   });
 }

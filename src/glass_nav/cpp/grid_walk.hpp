@@ -24,6 +24,8 @@ class GridWalk {
   // Two crossings this close [cells] are one corner: far above the rounding of the sums that place a pose on a map
   // (1e-12), far below what a map or a sensor resolves.
   static constexpr double kCorner = 1e-9;
+  // A component of a direction this small is rounding: cos(pi / 2) is 6e-17, not 0.
+  static constexpr double kAxisParallel = 1e-12;
 
   GridWalk() : GridWalk({0.0, 0.0, 1.0, 0.0}, 1, 1, 0.0) {}  // to be assigned to
 
@@ -83,8 +85,6 @@ class GridWalk {
   }
 
  private:
-  static constexpr double kAxisParallel = 1e-12;  // cos(pi / 2) is 6e-17, not 0
-
   /// One coordinate of the walk, turned over so that it never decreases.
   struct Axis {
     Axis(double origin, double direction, int cells) : size(cells) {

@@ -133,6 +133,26 @@ def test_nothing_slips_through_cells_that_touch_at_corners(backend, mirror):
     assert hits[:, 0] == pytest.approx(np.sqrt(0.5) * np.array([10, 10, 6]) * 0.25, abs=1e-9)
 
 
+@pytest.mark.parametrize("aside_cells", [1e-10, 3e-9, 1e-8, 1.1e-7, 1.3e-7, 1e-6])
+def test_rays_that_pass_close_by_corners(aside_cells):
+    """Aimed at corners of cells and a little aside: a corner, almost one, or none, whichever way it is found."""
+    rng = np.random.default_rng(5)
+    world = grid_map(scattered(rng, (40, 60), 0.15))
+    corners = np.floor(rng.uniform(0, 1, (300, 2)) * [60, 40])
+    yaw = rng.uniform(-np.pi, np.pi, 300)
+    ahead = np.c_[np.cos(yaw), np.sin(yaw)]
+    aside = rng.choice([-aside_cells, aside_cells], (300, 1)) * np.c_[-ahead[:, 1], ahead[:, 0]]
+    column_row = corners + aside - rng.uniform(0, 5, (300, 1)) * ahead
+    assert_as_slow(world, RayCaster(world), np.c_[column_row * world.resolution_m, yaw], [0.0], 20.0)
+
+
+def test_a_map_of_more_than_a_million_cells_in_a_row():
+    cells = np.zeros((2, 2**20 + 8), np.int8)
+    cells[:, -1] = 100
+    ranges_m = RayCaster(grid_map(cells)).cast([[0.1, 0.1, 0.0], [9.0, 0.3, 1e-7]], [0.0], 1e6)
+    assert ranges_m[:, 0] == pytest.approx((2**20 + 7) * 0.25 - np.array([0.1, 9.0]), abs=1e-6)
+
+
 @pytest.mark.parametrize("backend", ["exact", "mrpt"])
 def test_a_ray_that_starts_in_a_wall_meets_it_at_zero(backend):
     hits = RayCaster(grid_map(np.full((5, 5), 100)), backend).cast_first([[0.6, 0.6, 0.3]], EIGHT_WINDS, 9.0)
