@@ -79,7 +79,8 @@ def classify(measured_m: np.ndarray, references: ReferenceRanges, residuals: Ran
 
     Args:
         measured_m: (B,) ranges by REP 117; beams without an answer are uncertain.
-        references: of the preliminary samples; sample 0 is the pose that expected_m is told for.
+        references: of the preliminary samples; sample 0 is the pose that expected_m is told for. A beam that
+            passes an edge there and met it from the samples that won keeps its case: it tells poses apart.
         residuals: where in a wall beams end, and how widely.
         vote: mode, gate and priors.
     """
@@ -90,8 +91,7 @@ def classify(measured_m: np.ndarray, references: ReferenceRanges, residuals: Ran
     share[:, ~answered] = np.array([1.0, 0.0, 0.0, 0.0, 0.0])[:, None]
     won = _winner(share)
     case = np.where(answered & (share[won, np.arange(len(won))] >= vote.case_min_share), won, UNCERTAIN)
-    return _told_from_sample_0(case, share[case, np.arange(len(case))], measured_m, references,
-                               _gate(residuals.sigma_m, vote))
+    return _told_from_sample_0(case, share[case, np.arange(len(case))], measured_m, references, np.inf)
 
 
 def as_seen_from(cases: BeamCases, measured_m: np.ndarray, references: ReferenceRanges,
@@ -108,7 +108,7 @@ def _told_from_sample_0(case: np.ndarray, weight: np.ndarray, measured_m: np.nda
     with np.errstate(invalid="ignore"):
         residual = measured_m - expected
         across = np.abs(residual) * references.cos_incidence[row, 0, beam]
-        known = (case > 0) & (across <= _TOLD_GATES * gate_m)  # sample 0 itself must see the surface
+        known = (case > 0) & np.isfinite(expected) & (across <= _TOLD_GATES * gate_m)
     return BeamCases(np.where(known, case, UNCERTAIN).astype(np.uint8), np.where(known, expected, np.nan),
                      np.where(known, residual, np.nan), weight)
 

@@ -193,7 +193,8 @@ class GlassMcl:
         odom_from_base = self._checked(scan, odom_from_base)
         if not self._is_due(odom_from_base):
             map_from_base = se2.compose(self._map_from_odom, odom_from_base)
-            return self._estimate(scan, odom_from_base, self._vote(scan, map_from_base, self._best.covariance)[0])
+            cases, references = self._vote(scan, map_from_base, self._best.covariance)
+            return self._estimate(scan, odom_from_base, cases, references)
         predicted = self._predict(odom_from_base)
         cases = self._correct(scan, predicted, odom_from_base)
         self._best = pose_estimate.of(self._particles, self._weights)
@@ -201,7 +202,8 @@ class GlassMcl:
         self._map_from_odom = se2.compose(self._best.map_from_base, se2.inverse(odom_from_base))
         self._odom_from_base = odom_from_base
         self._update_due = False
-        return self._estimate(scan, odom_from_base, cases, updated=True)
+        map_from_base = se2.compose(self._map_from_odom, odom_from_base)  # the vote was held at the aligned pose
+        return self._estimate(scan, odom_from_base, cases, self._references(scan, map_from_base[None]), updated=True)
 
     def _correct(self, scan: Scan, predicted: np.ndarray, odom_from_base: np.ndarray) -> BeamCases:
         """The scan places and weighs the particles, by the beams whose case is known."""
@@ -295,13 +297,11 @@ class GlassMcl:
         self._particles = self._particles[resampling.low_variance(self._weights, count, self._rng)]
         self._weights = np.full(count, 1.0 / count)
 
-    def _estimate(self, scan: Scan, odom_from_base: np.ndarray, cases: BeamCases,
+    def _estimate(self, scan: Scan, odom_from_base: np.ndarray, cases: BeamCases, references: ReferenceRanges,
                   updated: bool = False) -> Estimate:
-        """The pose of the best cluster, carried on by odometry since the last update."""
+        """The pose of the best cluster, carried on by odometry since the last update; references are its."""
         map_from_base = se2.compose(self._map_from_odom, odom_from_base)
-        if updated:  # the vote was held at the aligned pose
-            cases = beam_cases.as_seen_from(cases, scan.ranges_m, self._references(scan, map_from_base[None]),
-                                            self._residuals, self._params.vote)
+        cases = beam_cases.as_seen_from(cases, scan.ranges_m, references, self._residuals, self._params.vote)
         answered = int(scan.answered.sum())
         used_share = float(np.count_nonzero(cases.case)) / answered if answered else float("nan")
         if updated:

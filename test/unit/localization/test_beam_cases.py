@@ -130,7 +130,7 @@ def test_a_sample_that_explains_the_scan_is_heard_more():
     second = np.stack([np.append(np.full(20, NEVER), 5.0), np.full(21, NEVER)])
     offered = references(first=first, second=second)
     assert classify(measured_m, offered, "soft").case[-1] == 3
-    assert classify(measured_m, offered, "paper").case[-1] == 0  # one vote each: case 1, far off at sample 0
+    assert classify(measured_m, offered, "paper").case[-1] == 1  # one vote each: the plainer case
 
 
 def test_a_beam_is_not_told_to_have_met_what_the_pose_itself_does_not_see():
@@ -170,6 +170,9 @@ def test_from_another_pose_the_cases_stay_and_the_ranges_change():
     measured_m = np.array([2.0, 5.0, 3.5, 2.0])
     cases = classify(measured_m, references(first=[2.0] * 4, second=[5.0] * 4))
     moved = references(first=[2.1, 2.1, 2.1, NEVER], second=[5.2] * 4)
+    far = beam_cases.as_seen_from(cases, measured_m, references(first=[2.4] * 4, second=[5.4] * 4), AT_THE_BOUNDARY,
+                                  CaseVote(case_gate_m=0.15))
+    assert far.case.tolist() == [0, 0, 0, 0] and np.isnan(far.expected_m).all()
     seen = beam_cases.as_seen_from(cases, measured_m, moved, AT_THE_BOUNDARY, CaseVote())
     assert seen.case.tolist() == [1, 3, 0, 0]
     np.testing.assert_allclose(seen.expected_m, [2.1, 5.2, np.nan, np.nan])
