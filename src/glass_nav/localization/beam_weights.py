@@ -30,7 +30,7 @@ class BeamMixture:
     laser_z_rand: float = 0.05
     laser_sigma_hit: float = 0.05        # [m] across the surface, lidar and map together; at least
     laser_sigma_hit_max: float = 0.2     # [m] at most: the filter learns how well map and lidar agree
-    laser_independent_beams: float = 50.0
+    laser_independent_beams: float = 40.0
 
     def __post_init__(self) -> None:
         if not self.laser_max_beams >= 2:
