@@ -56,6 +56,7 @@ class Robot:
         self._caster = RayCaster(grid_map)
         self._centre = se2.compose(grid_map.map_from_grid, np.array([4.5, 3.2, 0.0]))
         self._turned_rad = 0.0
+        self._steps = 0
         self.moving = True
         self.silent = False
         self.upside_down = False
@@ -73,7 +74,14 @@ class Robot:
     def _run(self) -> None:
         while not rospy.is_shutdown():
             self._step(rospy.Time.now())
+            self._steps += 1
             time.sleep(1.0 / RATE_HZ)
+
+    def make_steps(self, count: int) -> None:
+        """Returns after so many more turns of the lidar."""
+        wanted = self._steps + count
+        if not wait_until(lambda: self._steps >= wanted, 30.0):
+            raise AssertionError(f"the robot of the test made no {count} steps within 30 s")
 
     def _step(self, stamp: rospy.Time) -> None:
         if self.moving:
@@ -187,9 +195,9 @@ class LocalizationInterface(unittest.TestCase):
 
     def test_nomotion_update_uses_a_scan_of_a_standing_robot(self) -> None:
         self.robot.moving = False
-        time.sleep(3.0 / RATE_HZ)  # the scan under way
+        self.robot.make_steps(3)  # the scan under way
         self.poses.clear()
-        time.sleep(5.0 / RATE_HZ)
+        self.robot.make_steps(5)
         before = len(self.poses)
         rospy.ServiceProxy("request_nomotion_update", Empty)()
         self.assertTrue(wait_until(lambda: len(self.poses) > before, 10.0), "no amcl_pose after the request")
@@ -293,14 +301,14 @@ class LocalizationInterface(unittest.TestCase):
 
     def test_an_initialpose_is_moved_on_by_the_odometry_since_its_stamp(self) -> None:
         self.robot.moving = False
-        time.sleep(2.0 / RATE_HZ)
+        self.robot.make_steps(2)
         before = self.robot.map_from_base()
         msg = pose_message(before)
-        time.sleep(2.0 / RATE_HZ)  # the odometry at its stamp is that of the standing robot
+        self.robot.make_steps(2)  # the odometry at its stamp is that of the standing robot
         self.robot.moving = True
-        time.sleep(3.0)
+        self.robot.make_steps(30)
         self.robot.moving = False
-        time.sleep(2.0 / RATE_HZ)
+        self.robot.make_steps(2)
         now = self.robot.map_from_base()
         self.assertGreater(np.hypot(*(now - before)[:2]), 0.5)
         self.lines.clear()
@@ -338,7 +346,7 @@ class LocalizationInterface(unittest.TestCase):
                 self.lines.clear()
                 self.robot.spoil = lambda msg, fields=fields: changed(msg, **fields)
                 if words is None:
-                    time.sleep(10.0 / RATE_HZ)
+                    self.robot.make_steps(10)
                 else:
                     self.expect_line("scan refused", words)
                 self.robot.spoil = lambda msg: msg
@@ -363,18 +371,18 @@ class LocalizationInterface(unittest.TestCase):
             with self.subTest(shift_s):
                 self.robot.spoil = lambda msg, shift_s=shift_s: changed(
                     msg, header__stamp=msg.header.stamp + rospy.Duration(shift_s))
-                time.sleep(5.0 / RATE_HZ)
+                self.robot.make_steps(5)
                 self.robot.spoil = lambda msg: msg
                 self.expect_right_pose()  # and not only when the stamps have caught up
 
     def test_a_laser_that_hangs_upside_down(self) -> None:
         self.robot.silent = True
-        time.sleep(2.0 / RATE_HZ)
+        self.robot.make_steps(2)
         self.robot.upside_down = True
-        time.sleep(2.0 / RATE_HZ)  # no interpolation between the two mountings
+        self.robot.make_steps(2)  # no interpolation between the two mountings
         self.robot.silent = False
         self.initialpose.publish(pose_message(self.robot.map_from_base()))
-        time.sleep(2.0)
+        self.robot.make_steps(20)
         self.expect_right_pose()
         self.assertNotIn(self.status.last.state_name, ("LOST", "UNKNOWN"), self.status.last.reason)
         self.assertGreater(self.status.last.used_share, 0.8)
