@@ -13,7 +13,9 @@ Parameters: LocalizationNodeParams and GlassMclParams, read once; explained in c
 from __future__ import annotations
 
 import logging
+import signal
 import sys
+import threading
 import time
 from dataclasses import dataclass
 from typing import Any, Callable, Dict, List, Optional
@@ -100,9 +102,9 @@ class LocalizationNode:
             rospy.Subscriber("map", OccupancyGrid, self._command(self._take_map_topic), queue_size=1,
                              buff_size=2 ** 24)
 
-    def run(self) -> None:
-        """The only thread that touches the filter; returns when ROS shuts down."""
-        while not rospy.is_shutdown():
+    def run(self, ending: threading.Event) -> None:
+        """The only thread that touches the filter; returns when ROS shuts down or ending is set."""
+        while not (rospy.is_shutdown() or ending.is_set()):
             mail = self._inbox.take(timeout_s=0.01 if len(self._waiting) else 0.1)
             if self._clock_jumped_back():
                 mail["scans"] = []  # from before the jump
@@ -474,7 +476,12 @@ def _refuse_outside(guess: conversions.PoseGuess, grid_map: GridMap) -> None:
 
 def main(name: str = "glass_localization") -> None:
     """Start the node; exit code 2 if a parameter cannot be used."""
-    rospy.init_node(name)
+    # rospy's own handler shuts down from within whatever the main thread is doing; within a call of the
+    # parameter server, as in save_pose(), it waits for itself. Ours only asks the loop to end.
+    rospy.init_node(name, disable_signals=True)
+    ending = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ending.set())
     core_log = logging.getLogger("glass_nav")
     core_log.handlers = logging.getLogger("rosout").handlers
     core_log.setLevel(logging.INFO)
@@ -484,11 +491,13 @@ def main(name: str = "glass_localization") -> None:
         p, unused = params.localization_params(given, rospy.get_name())
     except params.ParamError as err:
         rospy.logfatal(str(err))
+        rospy.signal_shutdown("a parameter cannot be used")
         sys.exit(2)
     if unused:
         rospy.loginfo(f"parameters of amcl that this filter does not use: ~{', ~'.join(unused)}")
     node = LocalizationNode(p)
     try:
-        node.run()
+        node.run(ending)
     finally:
         node.save_pose()
+        rospy.signal_shutdown("ended")
