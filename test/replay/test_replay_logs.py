@@ -29,8 +29,8 @@ class Limits(NamedTuple):
 
 
 # A third above what the filter does on these, and within AMCL's figures (test/benchmark/replay_logs.py), except on
-# olin_mac, whose reference is 0.16 m off the map while the robot stands at the start: how far the filter follows the map
-# there depends on the seed (rmse 0.058 to 0.094), so its median is what tells.
+# olin_mac, whose reference is 0.16 m off the map while the robot stands at the start: how far the filter follows the
+# map there depends on the seed (rmse 0.058 to 0.094), so its median is what tells.
 TABLE = {
     "uob_trace0": Limits(958, 0.025, 0.035, 0.070, 0.6, 0.0),
     "olin_mac": Limits(357, 0.025, 0.105, 0.190, 0.8, 0.0),
