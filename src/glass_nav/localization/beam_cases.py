@@ -14,12 +14,11 @@ from typing import Tuple
 import numpy as np
 
 from glass_nav.localization.range_residuals import RangeResiduals
-from glass_nav.localization.reference_ranges import ReferenceRanges
+from glass_nav.localization.reference_ranges import LEAST_COS, ReferenceRanges
 
 UNCERTAIN, DIFFUSE, SPECULAR, FIRST_PENETRATION, SECOND_PENETRATION = range(5)
 VOTE_MODES = ("soft", "paper")
 _TIE_ORDER = (DIFFUSE, FIRST_PENETRATION, SECOND_PENETRATION, SPECULAR)
-_LEAST_COS = 0.2          # a surface seen flatter than 78 degrees is no worse placed than at that
 _GATE_SIGMAS = 3.0
 _TOLD_GATES = 2.0         # the samples that won the vote may stand one gate away from the pose told
 _PANE_INDEX = 1.51        # of soda-lime glass
@@ -115,7 +114,7 @@ def _told_from_sample_0(case: np.ndarray, weight: np.ndarray, measured_m: np.nda
 
 def _inside_walls(references: ReferenceRanges, residuals: RangeResiduals) -> ReferenceRanges:
     """References where beams end, not at the near boundary of the wall's cells."""
-    cos = np.maximum(references.cos_incidence, _LEAST_COS)
+    cos = np.maximum(references.cos_incidence, LEAST_COS)
     depth = residuals.depth_share * references.thickness_m / cos
     return replace(references, range_m=references.range_m + depth)
 
@@ -168,7 +167,7 @@ def _gate(sigma_m: float, vote: CaseVote) -> float:
 def _density(z: np.ndarray, references: ReferenceRanges, sigma_m: float,
              gate_m: float) -> Tuple[np.ndarray, np.ndarray]:
     """(4, N, B) how near each reference is, relative to a perfect match, and how possible it is."""
-    cos = np.maximum(references.cos_incidence, _LEAST_COS)
+    cos = np.maximum(references.cos_incidence, LEAST_COS)
     across = (z - references.range_m) * cos
     density = np.exp(-0.5 * np.minimum((across / sigma_m) ** 2, 100.0))
     density[~(np.abs(across) <= gate_m)] = 0.0

@@ -17,9 +17,8 @@ import numpy as np
 
 from glass_nav.localization.beam_cases import DIFFUSE
 from glass_nav.localization.range_residuals import RangeResiduals
+from glass_nav.localization.reference_ranges import LEAST_COS, cos_incidence
 from glass_nav.sensing.raycast import RayCaster
-
-_LEAST_COS = 0.2
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,6 @@ def log_weights(caster: RayCaster, thickness_m: np.ndarray, map_from_laser: np.n
     log_w = np.zeros(len(map_from_laser))
     if not len(case):
         return log_w
-    normal_rad, linearity = caster.normals()
     for chosen in (case == DIFFUSE, case != DIFFUSE):
         if not chosen.any():
             continue
@@ -83,9 +81,7 @@ def log_weights(caster: RayCaster, thickness_m: np.ndarray, map_from_laser: np.n
             rows = (case[chosen] - 2, slice(None), np.arange(len(angle)))
             expected = np.stack([surfaces.mirrored_m, surfaces.second_m, surfaces.third_m])[rows].T
             cell = np.stack([surfaces.first_cell, surfaces.second_cell, surfaces.third_cell])[rows].T
-        usable = (cell >= 0) & (linearity[cell] >= min_linearity)
-        beam_rad = map_from_laser[:, 2:3] + angle
-        cos = np.where(usable, np.maximum(np.abs(np.cos(beam_rad - normal_rad[cell])), _LEAST_COS), 1.0)
+        cos = np.maximum(cos_incidence(caster, map_from_laser[:, 2:3] + angle, cell, min_linearity), LEAST_COS)
         across = (z - expected) * cos - residuals.depth_share * thickness_m[cell]
         square = np.minimum((across / residuals.sigma_m) ** 2, 100.0)
         log_w += np.log(mixture.laser_z_hit * np.exp(-0.5 * square) + mixture.laser_z_rand).sum(axis=1)

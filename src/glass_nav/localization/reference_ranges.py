@@ -16,6 +16,8 @@ from glass_nav.geometry import se2
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
 
+LEAST_COS = 0.2  # a surface seen flatter than 78 degrees is no worse placed than at that
+
 
 @dataclass(frozen=True)
 class ReferenceRanges:
@@ -41,12 +43,10 @@ def of(caster: RayCaster, thickness_m: np.ndarray, samples: np.ndarray, scan: Sc
     from_laser = se2.compose(samples, scan.base_from_laser)
     hits = caster.cast_surfaces(from_laser, scan.angles_rad, scan.range_max_m,
                                 max_thickness_m=max_thickness_m, min_linearity=min_linearity)
-    normal_rad, linearity = caster.normals()
     beam_rad = from_laser[:, 2:3] + scan.angles_rad
 
     def cos_at(cell: np.ndarray) -> np.ndarray:
-        usable = (cell >= 0) & (linearity[cell] >= min_linearity)
-        return np.where(usable, np.abs(np.cos(beam_rad - normal_rad[cell])), 1.0)
+        return cos_incidence(caster, beam_rad, cell, min_linearity)
 
     first = cos_at(hits.first_cell)
     return ReferenceRanges(
@@ -54,3 +54,10 @@ def of(caster: RayCaster, thickness_m: np.ndarray, samples: np.ndarray, scan: Sc
         np.stack([first, first, cos_at(hits.second_cell), cos_at(hits.third_cell)]),
         thickness_m[np.stack([hits.first_cell, hits.first_cell, hits.second_cell, hits.third_cell])],
         np.where(hits.linearity >= min_linearity, np.arccos(np.clip(first, 0.0, 1.0)), np.nan))
+
+
+def cos_incidence(caster: RayCaster, beam_rad: np.ndarray, cell: np.ndarray, min_linearity: float) -> np.ndarray:
+    """|u . n| of beams (P, B) [rad, in map] at the cells (P, B) they meet; 1 where nothing or no normal is there."""
+    normal_rad, linearity = caster.normals()
+    usable = (cell >= 0) & (linearity[cell] >= min_linearity)
+    return np.where(usable, np.abs(np.cos(beam_rad - normal_rad[cell])), 1.0)
