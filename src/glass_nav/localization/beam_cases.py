@@ -86,7 +86,7 @@ def classify(measured_m: np.ndarray, references: ReferenceRanges, residuals: Ran
     answered = np.isfinite(measured_m)
     ballots = _paper_ballots if vote.vote_mode == "paper" else _soft_ballots
     references = _inside_walls(references, residuals)
-    share = ballots(measured_m, references, residuals.sigma_m, vote)  # (5, B), column sums 1
+    share = ballots(measured_m, references, residuals, vote)  # (5, B), column sums 1
     share[:, ~answered] = np.array([1.0, 0.0, 0.0, 0.0, 0.0])[:, None]
     won = _winner(share)
     case = np.where(answered & (share[won, np.arange(len(won))] >= vote.case_min_share), won, UNCERTAIN)
@@ -97,17 +97,17 @@ def as_seen_from(cases: BeamCases, measured_m: np.ndarray, references: Reference
                  residuals: RangeResiduals, vote: CaseVote) -> BeamCases:
     """The same cases, with the ranges expected at sample 0 of other references; uncertain where none is near."""
     return _told_from_sample_0(cases.case, cases.weight, measured_m, _inside_walls(references, residuals),
-                               _gate(residuals.sigma_m, vote))
+                               gate_m(residuals, vote))
 
 
 def _told_from_sample_0(case: np.ndarray, weight: np.ndarray, measured_m: np.ndarray,
-                        references: ReferenceRanges, gate_m: float) -> BeamCases:
+                        references: ReferenceRanges, within_m: float) -> BeamCases:
     row, beam = np.maximum(case.astype(int) - 1, 0), np.arange(len(case))
     expected = references.range_m[row, 0, beam]
     with np.errstate(invalid="ignore"):
         residual = measured_m - expected
         across = np.abs(residual) * references.cos_incidence[row, 0, beam]
-        known = (case > 0) & np.isfinite(expected) & (across <= _TOLD_GATES * gate_m)
+        known = (case > 0) & np.isfinite(expected) & (across <= _TOLD_GATES * within_m)
     return BeamCases(np.where(known, case, UNCERTAIN).astype(np.uint8), np.where(known, expected, np.nan),
                      np.where(known, residual, np.nan), weight)
 
@@ -125,7 +125,7 @@ def _winner(share: np.ndarray) -> np.ndarray:
     return order[np.argmax(share[order], axis=0)]
 
 
-def _paper_ballots(measured_m: np.ndarray, references: ReferenceRanges, sigma_m: float,
+def _paper_ballots(measured_m: np.ndarray, references: ReferenceRanges, residuals: RangeResiduals,
                    vote: CaseVote) -> np.ndarray:
     """(5, B) share of the samples whose nearest reference is that case; equal votes."""
     with np.errstate(invalid="ignore"):
@@ -133,21 +133,22 @@ def _paper_ballots(measured_m: np.ndarray, references: ReferenceRanges, sigma_m:
     off[np.isnan(off)] = np.inf
     order = np.array(_TIE_ORDER) - 1
     nearest = order[np.argmin(off[order], axis=0)]  # first of equals
-    near = np.take_along_axis(off, nearest[None], axis=0)[0] <= _gate(sigma_m, vote)
+    near = np.take_along_axis(off, nearest[None], axis=0)[0] <= gate_m(residuals, vote)
     voted = np.where(near, nearest + 1, UNCERTAIN)
     return np.stack([np.mean(voted == case, axis=0) for case in range(5)])
 
 
-def _soft_ballots(measured_m: np.ndarray, references: ReferenceRanges, sigma_m: float,
+def _soft_ballots(measured_m: np.ndarray, references: ReferenceRanges, residuals: RangeResiduals,
                   vote: CaseVote) -> np.ndarray:
     """(5, B) posterior over the cases, averaged over the samples by how well each explains the scan."""
     answered = np.isfinite(measured_m)
     z = np.where(answered, measured_m, 0.0)
-    density, plausible = _density(z, references, sigma_m, _gate(sigma_m, vote))
+    sigma_m, gate = residuals.sigma_m, gate_m(residuals, vote)
+    density, plausible = _density(z, references, sigma_m, gate)
     prior = np.array([vote.prior_diffuse, vote.prior_specular, vote.prior_first_penetration,
                       vote.prior_second_penetration])
     joint = prior[:, None, None] * density * plausible  # (4, N, B)
-    nothing = vote.prior_uncertain * np.exp(-0.25 * (_gate(sigma_m, vote) / sigma_m) ** 2)
+    nothing = vote.prior_uncertain * np.exp(-0.25 * (gate / sigma_m) ** 2)
     total = joint.sum(axis=0) + nothing
     log_evidence = np.log(total) @ answered  # (N,)
     temper = 4.0 / np.sqrt(max(answered.sum(), 1))  # neighbouring beams err together
@@ -159,18 +160,18 @@ def _soft_ballots(measured_m: np.ndarray, references: ReferenceRanges, sigma_m: 
     return share
 
 
-def _gate(sigma_m: float, vote: CaseVote) -> float:
-    """A map that fits badly everywhere needs a wider gate."""
-    return max(vote.case_gate_m, _GATE_SIGMAS * sigma_m)
+def gate_m(residuals: RangeResiduals, vote: CaseVote) -> float:
+    """How far across the surface a beam may end from it: a map that fits badly everywhere needs a wider gate."""
+    return max(vote.case_gate_m, _GATE_SIGMAS * residuals.sigma_m)
 
 
 def _density(z: np.ndarray, references: ReferenceRanges, sigma_m: float,
-             gate_m: float) -> Tuple[np.ndarray, np.ndarray]:
+             gate: float) -> Tuple[np.ndarray, np.ndarray]:
     """(4, N, B) how near each reference is, relative to a perfect match, and how possible it is."""
     cos = np.maximum(references.cos_incidence, LEAST_COS)
     across = (z - references.range_m) * cos
     density = np.exp(-0.5 * np.minimum((across / sigma_m) ** 2, 100.0))
-    density[~(np.abs(across) <= gate_m)] = 0.0
+    density[~(np.abs(across) <= gate)] = 0.0
     plausible = np.ones_like(density)
     plausible[SPECULAR - 1] = _mirror_beats_what_is_behind(references)
     return density, plausible

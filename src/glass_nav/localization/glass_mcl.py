@@ -13,19 +13,21 @@ from typing import Optional, Tuple
 import numpy as np
 
 from glass_nav.geometry import angles, se2
-from glass_nav.localization import (beam_cases, beam_weights, motion, pose_estimate, pose_quality,
+from glass_nav.localization import (beam_cases, beam_weights, glass_map, motion, pose_estimate, pose_quality,
                                     preliminary_samples, proposal, reference_ranges, resampling,
-                                    scan_alignment)
+                                    scan_alignment, surface_scan)
 from glass_nav.localization.beam_cases import BeamCases, CaseVote
 from glass_nav.localization.beam_weights import BeamMixture
+from glass_nav.localization.glass_map import GlassEvidence, GlassMap
 from glass_nav.localization.motion import OdometryNoise
 from glass_nav.localization.preliminary_samples import PreliminarySamples
 from glass_nav.localization.pose_quality import QualityLimits
 from glass_nav.localization.proposal import Proposal
 from glass_nav.localization.range_residuals import RangeResiduals
-from glass_nav.localization.reference_ranges import ReferenceRanges
+from glass_nav.localization.reference_ranges import LEAST_COS, ReferenceRanges
 from glass_nav.localization.resampling import ParticleCount
 from glass_nav.localization.scan_anchor import ScanAnchor
+from glass_nav.localization.surface_scan import SurfaceScan
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan, ScanError
@@ -78,6 +80,7 @@ class GlassMclParams:
     proposal: Proposal = field(default_factory=Proposal)
     samples: PreliminarySamples = field(default_factory=PreliminarySamples)
     vote: CaseVote = field(default_factory=CaseVote)
+    glass: GlassEvidence = field(default_factory=GlassEvidence)
     mixture: BeamMixture = field(default_factory=BeamMixture)
     quality: QualityLimits = field(default_factory=QualityLimits)
 
@@ -90,6 +93,7 @@ class Estimate:
     covariance: np.ndarray      # (3, 3) of that cluster, x [m], y [m], yaw [rad]
     map_from_odom: np.ndarray   # (3,) what tf needs
     cases: BeamCases            # of every beam of the scan
+    surface_scan: SurfaceScan   # the scan in which glass is an obstacle
     particles: np.ndarray       # (P, 3) poses in map
     state: str                  # UNKNOWN, GLOBAL_SEARCH, LOCALIZED, UNCERTAIN, LOST
     reason: str                 # the state in words
@@ -129,7 +133,13 @@ class GlassMcl:
         self._thickness_m = wall_thickness(grid_map)
         self._anchor = ScanAnchor(self._field)
         self._residuals = RangeResiduals(0.5, self._params.mixture.laser_sigma_hit)
+        self._glass_map = GlassMap(grid_map, self._params.glass)
         self._update_due = True
+
+    @property
+    def glass_map(self) -> GlassMap:
+        """How glassy each wall cell of the map proved since set_map()."""
+        return self._glass_map
 
     def set_pose(self, map_from_base: np.ndarray, covariance: np.ndarray) -> None:
         """Start over around a pose.
@@ -273,12 +283,14 @@ class GlassMcl:
                                    vote.normal_min_linearity)
 
     def _learn(self, scan: Scan, references: ReferenceRanges) -> None:
+        """Where beams end in walls, and which walls let them pass; references are of a pose that is believed."""
         mixture = self._params.mixture
         with np.errstate(invalid="ignore"):
             across = (scan.ranges_m - references.range_m[0, 0]) * references.cos_incidence[0, 0]
         met = np.isfinite(across)
         self._residuals = self._residuals.learn(across[met], references.thickness_m[0, 0][met],
                                                 mixture.laser_sigma_hit, mixture.laser_sigma_hit_max)
+        self._glass_map.learn(*glass_map.crossings(scan.ranges_m, references, self._residuals))
 
     def _log_weights(self, scan: Scan, particles: np.ndarray, cases: BeamCases) -> np.ndarray:
         chosen = beam_weights.choose(cases.case, self._params.mixture.laser_max_beams)
@@ -307,8 +319,16 @@ class GlassMcl:
         if updated:
             self._quality.observe(used_share)
         state, reason = self._quality.judge(self._best)
-        return Estimate(scan.stamp_ns, map_from_base, self._best.covariance, self._map_from_odom, cases,
+        surfaces = self._surfaces(scan, cases, references, state == pose_quality.LOCALIZED)
+        return Estimate(scan.stamp_ns, map_from_base, self._best.covariance, self._map_from_odom, cases, surfaces,
                         self._particles, state, reason, used_share, updated)
+
+    def _surfaces(self, scan: Scan, cases: BeamCases, references: ReferenceRanges, trusted: bool) -> SurfaceScan:
+        across = np.maximum(references.cos_incidence[0, 0], LEAST_COS)
+        first_m = references.range_m[0, 0] + self._residuals.depth_share * references.thickness_m[0, 0] / across
+        gate_m = beam_cases.gate_m(self._residuals, self._params.vote) / across
+        return surface_scan.of(scan.ranges_m, cases.case, first_m, self._glass_map.probability(references.cell[0, 0]),
+                               gate_m, trusted)
 
     def _start_with(self, particles: np.ndarray, searching: bool) -> None:
         self._particles = particles

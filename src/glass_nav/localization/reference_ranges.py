@@ -25,6 +25,7 @@ class ReferenceRanges:
     range_m: np.ndarray          # (4, N, B) along the beam, inf where the map offers nothing
     cos_incidence: np.ndarray    # (4, N, B) |u . n| at the surface that answers; 1 where it has no normal
     thickness_m: np.ndarray      # (4, N, B) of the wall that answers, as drawn
+    cell: np.ndarray             # (3, N, B) int32 flat cell of the first, second, third surface, -1: none
     pane_incidence: np.ndarray   # (N, B) angle to the normal of the first surface [rad], NaN without one
 
 
@@ -53,6 +54,7 @@ def of(caster: RayCaster, thickness_m: np.ndarray, samples: np.ndarray, scan: Sc
         np.stack([hits.first_m, hits.mirrored_m, hits.second_m, hits.third_m]),
         np.stack([first, first, cos_at(hits.second_cell), cos_at(hits.third_cell)]),
         thickness_m[np.stack([hits.first_cell, hits.first_cell, hits.second_cell, hits.third_cell])],
+        np.stack([hits.first_cell, hits.second_cell, hits.third_cell]),
         np.where(hits.linearity >= min_linearity, np.arccos(np.clip(first, 0.0, 1.0)), np.nan))
 
 

@@ -26,7 +26,7 @@ def references(first=NEVER, mirrored=NEVER, second=NEVER, third=NEVER, cos=1.0, 
     ranges = np.stack(np.broadcast_arrays(*[np.atleast_2d(np.asarray(value, float))
                                             for value in (first, mirrored, second, third)]))
     return ReferenceRanges(ranges, np.full(ranges.shape, cos), np.full(ranges.shape, thickness_m),
-                           np.full(ranges.shape[1:], incidence))
+                           np.full((3, *ranges.shape[1:]), -1), np.full(ranges.shape[1:], incidence))
 
 
 def classify(measured_m, offered, mode="soft", residuals=AT_THE_BOUNDARY, **values):

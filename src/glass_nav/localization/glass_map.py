@@ -1,0 +1,132 @@
+"""Beams that passed or ended at walls -> how glassy is each wall cell?
+
+A wall seldom lets a beam through; a pane mostly does, unless it is looked at head on. Every beam that
+was known to cross a surface of the map is evidence, weighed by how often a pane answers at that
+incidence, and kept as log odds per cell. The seed document glass_localization.txt has no such memory
+(its cases are decided scan by scan); the formulation is ours. H rows, W columns, B beams.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Tuple
+
+import numpy as np
+
+from glass_nav.localization.range_residuals import RangeResiduals
+from glass_nav.localization.reference_ranges import ReferenceRanges
+from glass_nav.world.grid_map import UNKNOWN, GridMap
+
+_LEAST_COS = 0.3          # a wall seen flatter than that is passed or met by chance
+_BEHIND_M = 0.3          # a beam that goes on for so long has passed
+_ENDED_SIGMAS = 2.5
+_HEAD_ON_SHARE, _HEAD_ON_RAD, _OBLIQUE_SHARE = 0.6, np.radians(18.0), 0.06
+
+
+def answers_of_a_pane(incidence_rad: np.ndarray) -> np.ndarray:
+    """Share of the beams that come back from clear glass itself, by their angle to its normal [rad].
+
+    Between what is measured: 15-degree bins .56 .39 .11 .04 0 0 (URG-04LX) and .47 .09 .08 .10 .14 .10
+    (RPLidar) on ordinary windows; a 64-ring lidar 5 m away has .97 .91 .82 .36 .20 .14 per 5 degrees.
+    """
+    return _OBLIQUE_SHARE + _HEAD_ON_SHARE * np.exp(-((incidence_rad / _HEAD_ON_RAD) ** 2))
+
+
+def crossings(measured_m: np.ndarray, references: ReferenceRanges,
+              residuals: RangeResiduals) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What a scan says about walls: cell, incidence and passed of GlassMap.learn().
+
+    Only beams for which all samples agree: a wall that stands in the beam's way from each of them was passed, not
+    missed at its edge.
+
+    Args:
+        measured_m: (B,) ranges by REP 117.
+        references: of preliminary samples around a pose that is believed.
+        residuals: where in a wall beams end, and how widely.
+    """
+    first_m, cos, cell = references.range_m[0], references.cos_incidence[0], references.cell[0, 0]
+    nearest, farthest = first_m.min(axis=0), first_m.max(axis=0)  # (B,)
+    depth = residuals.depth_share * references.thickness_m[0, 0]
+    with np.errstate(invalid="ignore"):
+        across = np.abs((measured_m - first_m[0]) * cos[0] - depth)
+        passed = measured_m > farthest + (references.thickness_m[0, 0] + depth) / cos[0] + _BEHIND_M
+        ended = (across <= _ENDED_SIGMAS * residuals.sigma_m) & (farthest - nearest < _BEHIND_M / cos[0])
+    clear = (cell >= 0) & (cos[0] >= _LEAST_COS) & np.isfinite(measured_m) & np.isfinite(farthest) & (passed | ended)
+    return cell[clear], np.arccos(np.minimum(cos[0][clear], 1.0)), passed[clear]
+
+
+@dataclass(frozen=True)
+class GlassEvidence:
+    """How much a crossing of a wall of the map says."""
+    glass_prior: float = 0.15          # chance of a wall cell to be glass before any beam crossed it
+    glass_wall_leak: float = 0.03      # share of the beams that pass a solid wall: errors of map and pose
+    glass_memory: float = 6.0          # largest log odds that beams can add up to: a door may be opened
+
+    def __post_init__(self) -> None:
+        for name in ("glass_prior", "glass_wall_leak"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise ValueError(f"~{name} must be in (0, 1), got {getattr(self, name)}")
+        if not (np.isfinite(self.glass_memory) and self.glass_memory >= 0.0):
+            raise ValueError(f"~glass_memory must be finite and >= 0, got {self.glass_memory}")
+
+
+class GlassMap:
+    """Log odds of being glass for each wall cell of one map."""
+
+    _SPREAD = ((1.0, 0.7, 0.3), 0.25)  # weight of a crossing for cells 0, 1, 2 away; and of a scan as a whole
+
+    def __init__(self, grid_map: GridMap, evidence: GlassEvidence) -> None:
+        self._evidence = evidence
+        self._shape = grid_map.occupancy.shape
+        self._occupied = np.pad(grid_map.occupied, 2).ravel()
+        self._stride = self._shape[1] + 4
+        self._log_odds = np.zeros(len(self._occupied), np.float32)  # added by beams; bordered by 2 cells
+        self._crossed = np.zeros(len(self._occupied), bool)
+        self._prior = float(np.log(evidence.glass_prior / (1.0 - evidence.glass_prior)))
+        self._kernel = self._neighbours()
+
+    def probability(self, cell: np.ndarray) -> np.ndarray:
+        """Chance (...) of being glass for flat cells (...) of the map; the prior for -1."""
+        at = self._bordered(np.maximum(cell, 0))
+        log_odds = np.where(cell >= 0, self._log_odds[at], 0.0)
+        return 1.0 / (1.0 + np.exp(-(self._prior + log_odds)))
+
+    def occupancy(self) -> np.ndarray:
+        """(H, W) int8 [percent]: how glassy each wall cell proved; -1 where no beam said anything."""
+        percent = np.rint(100.0 / (1.0 + np.exp(-(self._prior + self._log_odds))))
+        known = np.where(self._crossed, percent, UNKNOWN).astype(np.int8)
+        return known.reshape(-1, self._stride)[2:-2, 2:-2].copy()
+
+    def learn(self, cell: np.ndarray, incidence_rad: np.ndarray, passed: np.ndarray) -> None:
+        """Take in one scan.
+
+        Args:
+            cell: (B,) flat cells that beams crossed or ended at, known for sure.
+            incidence_rad: (B,) angle to the wall's normal there.
+            passed: (B,) bool: went on behind it; else it ended there.
+        """
+        if not len(cell):
+            return
+        back, leak = answers_of_a_pane(incidence_rad), self._evidence.glass_wall_leak
+        says = np.where(passed, np.log((1.0 - back) / leak), np.log(back / (1.0 - leak)))
+        offsets, weights = self._kernel
+        at = (self._bordered(cell)[:, None] + offsets).ravel()
+        share = (np.ones(len(cell))[:, None] * weights).ravel()
+        touched, group = np.unique(at, return_inverse=True)
+        # A wall cell that many beams of one scan hit has one piece of evidence, not many.
+        mean = np.bincount(group, share * np.repeat(says, len(offsets))) / np.bincount(group, share)
+        walls = self._occupied[touched]
+        touched, added = touched[walls], self._SPREAD[1] * mean[walls]
+        limit = self._evidence.glass_memory
+        self._log_odds[touched] = np.clip(self._log_odds[touched] + added, -limit, limit)
+        self._crossed[touched] = True
+
+    def _bordered(self, cell: np.ndarray) -> np.ndarray:
+        row, column = np.divmod(cell, self._shape[1])
+        return (row + 2) * self._stride + column + 2
+
+    def _neighbours(self) -> Tuple[np.ndarray, np.ndarray]:
+        """Offsets (25,) of the cells around one, and what a crossing counts there."""
+        step = np.arange(-2, 3)
+        ring = np.maximum(np.abs(step)[:, None], np.abs(step))
+        return ((step[:, None] * self._stride + step).ravel(), np.array(self._SPREAD[0])[ring].ravel())
