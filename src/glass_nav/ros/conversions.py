@@ -7,7 +7,7 @@ for scans) with one line for the log. B beams, P particles.
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from io import BytesIO
 
 import numpy as np
@@ -20,11 +20,12 @@ from geometry_msgs.msg import (
     Transform,
     TransformStamped,
 )
-from nav_msgs.msg import OccupancyGrid
-from sensor_msgs.msg import LaserScan, PointCloud2, PointField
+from nav_msgs.msg import MapMetaData, OccupancyGrid
+from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
 
 from glass_nav.localization.glass_mcl import BeamCases, Estimate
+from glass_nav.localization.surface_scan import SurfaceScan
 from glass_nav.msg import BeamCases as BeamCasesMsg
 from glass_nav.msg import LocalizationStatus
 from glass_nav.sensing.scan import Scan, ScanError, scan_from_fields
@@ -32,11 +33,6 @@ from glass_nav.world.grid_map import GridMap
 
 STATES = {name: getattr(LocalizationStatus, name)
           for name in ("UNKNOWN", "GLOBAL_SEARCH", "LOCALIZED", "UNCERTAIN", "LOST")}
-
-# (5, 3) red, green, blue of cases 0 to 4: grey, green, magenta, light blue, dark blue. The hues of Okabe
-# and Ito, which stay apart for colour-blind eyes; blues are beams that went through.
-CASE_COLOURS = np.array([[150, 150, 150], [0, 158, 115], [204, 121, 167], [86, 180, 233], [0, 114, 178]],
-                        dtype=np.uint32)
 
 MAX_TILT_RAD = np.radians(20.0)  # a plane tilted by 20 degrees shortens its ranges seen from above by 6 %
 _X_Y_YAW = np.ix_([0, 1, 5], [0, 1, 5])  # of the 6x6 covariances of ROS: x y z roll pitch yaw
@@ -201,6 +197,29 @@ def scan_from_msg(msg: LaserScan, mounting: Mounting) -> Scan:
                             mounting.upside_down)
 
 
+# What the `intensities` of scan_surfaces say of a beam.
+AS_MEASURED, CUT, NOT_JUDGED = 0.0, 1.0, -1.0
+
+
+def surface_scan_msg(msg: LaserScan, surface: SurfaceScan) -> LaserScan:
+    """The message of `scan_surfaces`: the scan with its beams cut at the first surface of the map.
+
+    Fields, order and ranges are the driver's own, but for the ranges of beams that were cut and for the
+    intensities: 0 as measured, 1 cut; -1 for all beams while the pose is not trusted and nothing is cut.
+
+    Args:
+        msg: as the driver sent it, upside down or not: its beams keep their order.
+        surface: beam by beam in that order.
+    """
+    ranges = np.array(msg.ranges, float)
+    ranges[surface.cut] = surface.ranges_m[surface.cut]
+    flags = np.where(surface.cut, CUT, AS_MEASURED) if surface.trusted else np.full(len(ranges), NOT_JUDGED)
+    return LaserScan(header=Header(stamp=msg.header.stamp, frame_id=frame_id(msg.header.frame_id)),
+                     angle_min=msg.angle_min, angle_max=msg.angle_max, angle_increment=msg.angle_increment,
+                     time_increment=msg.time_increment, scan_time=msg.scan_time, range_min=msg.range_min,
+                     range_max=msg.range_max, ranges=ranges.tolist(), intensities=flags.tolist())
+
+
 # -- maps
 
 
@@ -226,12 +245,46 @@ def map_from_msg(msg: OccupancyGrid) -> GridMap:
 
 def msg_from_map(grid_map: GridMap, stamp: rospy.Time, map_frame: str) -> OccupancyGrid:
     msg = OccupancyGrid(header=Header(stamp=stamp, frame_id=map_frame))
+    msg.info = grid_info(grid_map)
     msg.info.map_load_time = stamp
-    msg.info.resolution = grid_map.resolution_m
-    msg.info.height, msg.info.width = grid_map.occupancy.shape
-    msg.info.origin = pose_from_planar(grid_map.map_from_grid)
     msg.data = grid_map.occupancy.ravel().tolist()
     return msg
+
+
+class _PackedGrid(OccupancyGrid):
+    """An OccupancyGrid whose cells are an array already: a million go out in 1 ms instead of 50."""
+
+    def __init__(self, head: Header, packed: np.ndarray) -> None:
+        super().__init__(header=head)
+        self._packed = packed  # (H, W) int8
+
+    def serialize(self, buff: BytesIO) -> None:
+        raw = BytesIO()
+        super().serialize(raw)
+        buff.write(raw.getvalue()[:-4])  # 4: the count of cells, none so far
+        buff.write(struct.pack("<I", self._packed.size))
+        buff.write(self._packed.tobytes())
+
+
+def glass_map_msg(stamp_ns: int, map_frame: str, grid_map: GridMap, glass: np.ndarray) -> OccupancyGrid:
+    """The message of `~glass_map`; for publishing only, its `data` stays empty.
+
+    Args:
+        stamp_ns: of the last scan that it holds, 0 before the first.
+        map_frame: frame of the map.
+        grid_map: the map whose geometry it has.
+        glass: (H, W) int8, how glassy each wall cell proved [percent], -1 where nothing is known.
+    """
+    msg = _PackedGrid(header(stamp_ns, map_frame), np.asarray(glass, np.int8))
+    msg.info = grid_info(grid_map)
+    msg.info.map_load_time = msg.header.stamp
+    return msg
+
+
+def grid_info(grid_map: GridMap) -> MapMetaData:
+    info = MapMetaData(resolution=grid_map.resolution_m, origin=pose_from_planar(grid_map.map_from_grid))
+    info.height, info.width = grid_map.occupancy.shape
+    return info
 
 
 # -- what the filter says
@@ -255,29 +308,3 @@ def beam_cases_msg(scan_header: Header, cases: BeamCases) -> BeamCasesMsg:
     msg.weight = cases.weight.tolist()
     return msg
 
-
-_CLOUD_FIELDS = ("x", "y", "z", "rgb", "case", "range", "expected", "residual", "weight")
-
-
-def beam_cloud(scan: Scan, cases: BeamCases, height_m: float, base_frame: str) -> PointCloud2:
-    """End points of the beams that answered, in the robot's frame, coloured by case.
-
-    All fields are float32, so that rviz' Select tool shows each of them for a picked beam.
-    """
-    answered = scan.answered
-    red, green, blue = CASE_COLOURS[cases.case[answered]].T
-    ends = replace(scan, ranges_m=scan.ranges_m[answered], angles_rad=scan.angles_rad[answered])
-    points = np.empty((len(ends), len(_CLOUD_FIELDS)), dtype="<f4")
-    points[:, :2] = ends.points_in_base()
-    points[:, 2] = height_m
-    points[:, 3] = (red << 16 | green << 8 | blue).astype("<u4").view("<f4")  # PCL's packing
-    for column, values in enumerate((cases.case, scan.ranges_m, cases.expected_m, cases.residual_m,
-                                     cases.weight), start=4):
-        points[:, column] = values[answered]
-    msg = PointCloud2(header=header(scan.stamp_ns, base_frame), height=1, width=len(points), is_dense=True)
-    msg.fields = [PointField(name, 4 * index, PointField.FLOAT32, 1)
-                  for index, name in enumerate(_CLOUD_FIELDS)]
-    msg.point_step = 4 * len(_CLOUD_FIELDS)
-    msg.row_step = msg.point_step * len(points)
-    msg.data = points.tobytes()
-    return msg

@@ -5,7 +5,14 @@ Wiring only; the answer comes from GlassMcl. Callbacks store, one loop works: no
 Subscribes: scan (LaserScan), initialpose (PoseWithCovarianceStamped), map (OccupancyGrid, if ~use_map_topic),
     tf odom <- base <- laser.
 Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseArray, latched), tf map -> odom,
-    ~status (LocalizationStatus, latched), ~beam_cases (BeamCases), ~beam_cloud (PointCloud2), /diagnostics.
+    ~status (LocalizationStatus, latched), ~beam_cases (BeamCases), /diagnostics;
+    scan_surfaces (LaserScan): the scan for a costmap, with each beam cut at the first surface of the map that it
+    passed or was mirrored at. Stamp, frame and beams are the scan's; its `intensities` say 0 as measured, 1 cut,
+    and -1 for all beams while the pose is not trusted: the scan is passed on raw then. One for every scan that
+    is used; none for a scan that is refused or has no transforms, as nobody knows where it would have to be cut;
+    ~glass_map (OccupancyGrid, latched): how glassy each wall cell proved [percent], -1 where nothing is known;
+    for rviz, while somebody listens: ~beam_cloud (PointCloud2), ~beam_markers (MarkerArray, a namespace per case
+    and one for the status), ~legend (Image, latched).
 Services: global_localization, request_nomotion_update (Empty), set_map (SetMap). Calls static_map (GetMap).
 Parameters: LocalizationNodeParams and GlassMclParams, read once; explained in config/localization.yaml.
 """
@@ -26,17 +33,18 @@ import tf2_ros
 from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap, SetMap, SetMapRequest, SetMapResponse
-from sensor_msgs.msg import LaserScan, PointCloud2
+from sensor_msgs.msg import Image, LaserScan, PointCloud2
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
+from visualization_msgs.msg import MarkerArray
 
 from glass_nav.geometry import se2
 from glass_nav.localization.glass_mcl import Estimate, GlassMcl
 from glass_nav.msg import BeamCases, LocalizationStatus
-from glass_nav.ros import conversions, params
+from glass_nav.ros import beam_displays, conversions, legend, params
 from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Errand, Mailbox, WaitingScans
-from glass_nav.sensing.scan import ScanError
+from glass_nav.sensing.scan import Scan, ScanError
 from glass_nav.world.grid_map import GridMap
 
 TIME_JUMP_S = 0.5       # a clock that goes back by less is noise between machines
@@ -77,7 +85,9 @@ class LocalizationNode:
         self._started_s = time.monotonic()
         self._simulated = bool(rospy.get_param("/use_sim_time", False))
         self._next_report_s = self._next_map_request_s = 0.0  # by the monotonic clock
-        self._last_save_s = self._last_cloud_s = self._last_particles_s = 0.0  # by ROS time
+        self._last_save_s = self._last_beams_s = self._last_particles_s = 0.0  # by ROS time
+        self._last_glass_s = 0.0
+        self._glass_changed = False  # since it was last sent
         self._trouble = "no scan used yet"
 
         self._tf = tf2_ros.Buffer()
@@ -86,7 +96,12 @@ class LocalizationNode:
         self._particles = rospy.Publisher("particlecloud", PoseArray, queue_size=2, latch=True)
         self._status = rospy.Publisher("~status", LocalizationStatus, queue_size=5, latch=True)
         self._beam_cases = rospy.Publisher("~beam_cases", BeamCases, queue_size=5)
+        self._surfaces = rospy.Publisher("scan_surfaces", LaserScan, queue_size=5)
+        self._glass_map = rospy.Publisher("~glass_map", OccupancyGrid, queue_size=1, latch=True)
         self._beam_cloud = rospy.Publisher("~beam_cloud", PointCloud2, queue_size=2)
+        self._beam_markers = rospy.Publisher("~beam_markers", MarkerArray, queue_size=2)
+        self._legend = rospy.Publisher("~legend", Image, queue_size=1, latch=True)
+        self._legend.publish(legend.image_msg(self._p.global_frame_id))
         self._diagnostics = Diagnostics(p.node, self._waiting.counts)
 
         rospy.Service("global_localization", Empty, self._serve_global_localization)
@@ -119,6 +134,7 @@ class LocalizationNode:
                 self._say_no_transform(given_up[-1])
             if msg is not None:
                 self._step(msg)
+            self._send_glass_map()
             self._report()
 
     def save_pose(self) -> None:
@@ -221,7 +237,7 @@ class LocalizationNode:
             self._mcl = self._new_core(grid_map, *self._restart_pose)
         else:
             self._mcl.set_map(grid_map)
-        self._map = grid_map
+        self._map, self._glass_changed = grid_map, True
         height, width = grid_map.occupancy.shape
         rospy.loginfo(f"map of {width} x {height} cells of {grid_map.resolution_m:g} m from {origin}")
         if conversions.frame_id(frame) != self._p.global_frame_id:
@@ -367,11 +383,12 @@ class LocalizationNode:
         self._waiting.counts.used += 1
         self._estimate, self._last_estimate_s = estimate, self._now_s
         self._send_transform(estimate.stamp_ns, estimate.map_from_odom)
+        self._surfaces.publish(conversions.surface_scan_msg(msg, estimate.surface_scan))
         self._publish(estimate)
+        self._glass_changed = self._glass_changed or estimate.updated
         if self._beam_cases.get_num_connections():
             self._beam_cases.publish(conversions.beam_cases_msg(msg.header, estimate.cases))
-        if self._beam_cloud.get_num_connections() and self._due("_last_cloud_s", self._p.gui_publish_rate):
-            self._beam_cloud.publish(conversions.beam_cloud(scan, estimate.cases, mounting.height_m, base))
+        self._show_beams(scan, estimate, mounting.height_m)
         if self._p.save_pose_rate > 0.0 and self._due("_last_save_s", self._p.save_pose_rate):
             self.save_pose()
 
@@ -393,6 +410,33 @@ class LocalizationNode:
         if self._publish_pose or self._due("_last_particles_s", self._p.gui_publish_rate):
             self._particles.publish(conversions.pose_array(estimate.stamp_ns, frame, estimate.particles))
         self._publish_pose = False
+
+    def _show_beams(self, scan: Scan, estimate: Estimate, height_m: float) -> None:
+        """The beams for rviz, if it listens and it is time."""
+        listeners = self._beam_cloud.get_num_connections(), self._beam_markers.get_num_connections()
+        if not any(listeners) or not self._due("_last_beams_s", self._p.gui_publish_rate):
+            return
+        base = self._p.base_frame_id
+        if listeners[0]:
+            self._beam_cloud.publish(beam_displays.beam_cloud(scan, estimate.cases, height_m, base))
+        if listeners[1]:
+            markers = beam_displays.beam_markers(scan, estimate.cases, estimate.surface_scan, height_m, base)
+            markers.markers.append(beam_displays.status_marker(
+                estimate.map_from_base, self._p.global_frame_id, estimate.state, estimate.reason,
+                estimate.used_share))
+            self._beam_markers.publish(markers)
+
+    def _send_glass_map(self) -> None:
+        """The glass map, if it is news to somebody and it is time."""
+        if self._mcl is None or self._map is None or not self._glass_changed:
+            return
+        period_s = self._p.glass_map_period_s
+        if not self._glass_map.get_num_connections() or 0.0 <= self._now_s - self._last_glass_s < period_s:
+            return
+        self._last_glass_s, self._glass_changed = self._now_s, False
+        stamp_ns = 0 if self._estimate is None else self._estimate.stamp_ns
+        self._glass_map.publish(conversions.glass_map_msg(stamp_ns, self._p.global_frame_id, self._map,
+                                                          self._mcl.glass_map.occupancy()))
 
     def _due(self, last: str, rate_hz: float) -> bool:
         """Whether 1 / rate has passed since the time in the attribute `last`, which then becomes now."""
@@ -423,6 +467,7 @@ class LocalizationNode:
         self._rng = self._p.rng  # a bag that starts over gives the same poses again
         if self._map is not None:
             self._mcl = self._new_core(self._map, *self._restart_pose)
+            self._glass_changed = True
         x, y, yaw = self._restart_pose[0]
         where = "the last pose it was given" if self._simulated else "its last pose"
         rospy.logwarn(f"{why}: the filter starts over at {where}, x {x:.3f} m, y {y:.3f} m, "
@@ -436,11 +481,19 @@ class LocalizationNode:
         self._next_report_s = time.monotonic() + 1.0
         trouble = self._missing()
         if trouble is not None:
-            stamp_ns = 0 if self._estimate is None else self._estimate.stamp_ns
-            self._status.publish(conversions.status_msg(
-                stamp_ns, self._p.global_frame_id, "UNKNOWN" if self._estimate is None else "UNCERTAIN",
-                trouble, float("nan")))
+            self._say_trouble(trouble)
         self._diagnostics.publish(self._estimate, trouble)
+
+    def _say_trouble(self, trouble: str) -> None:
+        """~status, and the words in rviz, while no scan is being used."""
+        stamp_ns, where, state = 0, None, "UNKNOWN"
+        if self._estimate is not None:
+            stamp_ns, where, state = self._estimate.stamp_ns, self._estimate.map_from_base, "UNCERTAIN"
+        frame = self._p.global_frame_id
+        self._status.publish(conversions.status_msg(stamp_ns, frame, state, trouble, float("nan")))
+        if self._beam_markers.get_num_connections():
+            self._beam_markers.publish(MarkerArray([beam_displays.status_marker(where, frame, state, trouble,
+                                                                                float("nan"))]))
 
     def _settled(self) -> bool:
         return time.monotonic() - self._started_s > SETTLING_S

@@ -34,7 +34,8 @@ class LocalizationNodeParams:
     first_map_only: bool = False
     force_update_after_initialpose: bool = False
     force_update_after_set_map: bool = False
-    gui_publish_rate: float = -1.0         # [Hz] of particlecloud and ~beam_cloud; <= 0: no limit
+    gui_publish_rate: float = -1.0         # [Hz] of particlecloud, ~beam_cloud, ~beam_markers; <= 0: no limit
+    glass_map_period_s: float = 2.0        # [s] ~glass_map goes out no more often
     save_pose_rate: float = 0.5            # [Hz]; <= 0: only when the node ends
     std_warn_level_x: float = 0.2          # [m]
     std_warn_level_y: float = 0.2          # [m]
@@ -54,8 +55,8 @@ class LocalizationNodeParams:
         for name, kind in [(f.name, f.type) for f in dataclasses.fields(self)]:
             if kind in (float, "float") and not math.isfinite(getattr(self, name)):
                 raise ValueError(f"~{name} must be finite, got {getattr(self, name)}")
-        for name in ("transform_tolerance", "transform_wait_s", "std_warn_level_x", "std_warn_level_y",
-                     "std_warn_level_yaw"):
+        for name in ("transform_tolerance", "transform_wait_s", "glass_map_period_s", "std_warn_level_x",
+                     "std_warn_level_y", "std_warn_level_yaw"):
             if not getattr(self, name) >= 0.0:
                 raise ValueError(f"~{name} must be >= 0, got {getattr(self, name)}")
 

@@ -14,6 +14,7 @@ from std_msgs.msg import Header
 
 from glass_nav.geometry import angles
 from glass_nav.localization.glass_mcl import BeamCases, Estimate
+from glass_nav.localization.surface_scan import SurfaceScan
 from glass_nav.msg import BeamCases as BeamCasesMsg
 from glass_nav.msg import LocalizationStatus
 from glass_nav.ros import conversions
@@ -136,7 +137,8 @@ def estimate(particles: int = 3) -> Estimate:
     cases = BeamCases(np.array([1, 0, 4], np.uint8), np.array([1.0, np.nan, 3.0]), np.array([0.1, np.nan, 0.0]),
                       np.array([0.9, 0.2, 0.6]))
     poses = np.random.default_rng(0).uniform(-3, 3, (particles, 3))
-    return Estimate(1_000_000_001, np.array([1.0, 2.0, 0.5]), covariance, np.zeros(3), cases, poses,
+    surface = SurfaceScan(np.array([1.1, np.inf, 2.0]), np.array([False, False, True]), True)
+    return Estimate(1_000_000_001, np.array([1.0, 2.0, 0.5]), covariance, np.zeros(3), cases, surface, poses,
                     "LOCALIZED", "for the test", 0.9, True)
 
 
@@ -223,26 +225,40 @@ def test_a_laser_nowhere_is_refused():
         conversions.mounting_from_transform(Transform(Vector3(np.nan, 0.0, 0.0), quaternion(0, 0, 0)))
 
 
-def test_the_beam_cloud_holds_the_answers_with_colour_and_case():
-    scan = conversions.scan_from_msg(scan_message(), upright())
-    msg = sent_and_received(conversions.beam_cloud(scan, estimate().cases, 0.4, "base_link"))
-    assert (msg.header.frame_id, msg.width, msg.height) == ("base_link", 2, 1)
-    assert len(msg.data) == msg.row_step == msg.width * msg.point_step
-    points = np.frombuffer(msg.data, "<f4").reshape(2, -1)
-    columns = {field.name: points[:, field.offset // 4] for field in msg.fields}
-    assert columns["x"] == pytest.approx([0.2 + np.cos(0.5), 0.2 + 2 * np.cos(0.5)])
-    assert columns["y"] == pytest.approx([-np.sin(0.5), 2 * np.sin(0.5)])
-    assert columns["z"] == pytest.approx(0.4)
-    assert columns["case"].tolist() == [1.0, 4.0]
-    assert columns["range"].tolist() == [1.0, 2.0]
-    colour = int(np.ascontiguousarray(columns["rgb"]).view("<u4")[1])
-    assert (colour >> 16, colour >> 8 & 255, colour & 255) == tuple(conversions.CASE_COLOURS[4])
+def surface_scan(cut_m: "list[float]", trusted: bool = True) -> SurfaceScan:
+    """Of a scan of three beams; NaN: not cut."""
+    cut = np.array(cut_m)
+    return SurfaceScan(np.where(np.isnan(cut), [1.0, np.inf, 2.0], cut), ~np.isnan(cut), trusted)
 
 
-def test_a_scan_without_answers_is_an_empty_cloud():
-    scan = conversions.scan_from_msg(scan_message(ranges=[np.nan] * 3), upright())
-    msg = sent_and_received(conversions.beam_cloud(scan, estimate().cases, 0.4, "base_link"))
-    assert (msg.width, msg.data) == (0, b"")
+def test_beams_are_cut_in_the_order_of_the_message_and_flagged():
+    msg = scan_message(ranges=[1.0, np.inf, 2.0], intensities=[7.0, 8.0, 9.0], time_increment=0.001, scan_time=0.1)
+    out = sent_and_received(conversions.surface_scan_msg(msg, surface_scan([np.nan, 0.7, 1.5])))
+    assert out.ranges == pytest.approx([1.0, 0.7, 1.5])
+    assert list(out.intensities) == [0.0, 1.0, 1.0]
+    assert out.header.stamp == msg.header.stamp and out.header.frame_id == "laser"
+    for name in ("angle_min", "angle_max", "angle_increment", "time_increment", "scan_time", "range_min", "range_max"):
+        assert getattr(out, name) == pytest.approx(getattr(msg, name))
+
+
+def test_what_is_not_cut_stays_as_the_driver_wrote_it():
+    wrote = [0.0, -np.inf, 11.0, np.nan, 0.05]  # no answer in old drivers' ways, too near
+    surface = SurfaceScan(np.full(5, np.nan), np.zeros(5, bool), True)
+    out = conversions.surface_scan_msg(scan_message(ranges=wrote), surface)
+    assert np.array_equal(out.ranges, wrote, equal_nan=True)
+    assert out.intensities == [0.0] * 5
+
+
+def test_a_raw_scan_is_told_by_its_intensities():
+    out = conversions.surface_scan_msg(scan_message(), surface_scan([np.nan] * 3, trusted=False))
+    assert out.ranges == [1.0, np.inf, 2.0]
+    assert out.intensities == [-1.0] * 3
+
+
+def test_the_frame_of_a_cut_scan_has_no_slash():
+    msg = scan_message()
+    msg.header.frame_id = "/laser"
+    assert conversions.surface_scan_msg(msg, surface_scan([np.nan] * 3)).header.frame_id == "laser"
 
 
 # -- maps
@@ -284,3 +300,23 @@ def test_maps_survive_the_way_there_and_back():
 def test_what_is_no_map_is_refused(fields, text):
     with pytest.raises(ValueError, match=text.replace("(", r"\(")):
         conversions.map_from_msg(grid_message(**fields))
+
+
+def test_the_glass_map_has_the_geometry_of_the_map():
+    grid_map = GridMap(np.zeros((2, 3), np.int8), 0.0889, np.array([1.0, 2.0, -2.0]))
+    glass = np.array([[0, 100, -1], [-1, 15, 99]])
+    msg = sent_and_received(conversions.glass_map_msg(5_000_000_007, "map", grid_map, glass), OccupancyGrid)
+    drawn = conversions.msg_from_map(grid_map, rospy.Time(5, 7), "map")
+    assert (msg.header.frame_id, msg.header.stamp) == ("map", rospy.Time(5, 7))
+    assert msg.info == sent_and_received(drawn).info
+    assert list(msg.data) == [0, 100, -1, -1, 15, 99]
+
+
+def test_a_glass_map_is_sent_as_the_generated_code_would():
+    grid_map = GridMap(np.zeros((2, 3), np.int8), 0.05, np.zeros(3))
+    packed = conversions.glass_map_msg(7, "map", grid_map, np.arange(-1, 5).reshape(2, 3))
+    plain = OccupancyGrid(packed.header, packed.info, list(range(-1, 5)))
+    written = [BytesIO(), BytesIO()]
+    packed.serialize(written[0])
+    plain.serialize(written[1])
+    assert written[0].getvalue() == written[1].getvalue()
