@@ -1,0 +1,107 @@
+"""true motion -> what the wheels say: wrong radii, a wrong wheel base, slip.
+
+The parts are those of Borenstein, Feng, Measurement and correction of systematic odometry errors in mobile robots
+(1996): systematic ones, drawn once a robot, and others, drawn along the way. Poses and twists as in robot.py.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from glass_nav.geometry import se2
+from glass_nav.simulation.robot import arc
+
+SPIN_S = 0.2  # a wheel that lost its grip takes so long to find it
+DRAWS = 7  # random numbers of a step, used or not: what one step meets does not change the others
+
+
+@dataclass(frozen=True)
+class OdometryParams:
+    """How wrong the wheels are, as standard deviations. With the defaults a drive of some 30 m ends 1 to 3 % of its
+    length beside the truth, which is ordinary for a calibrated indoor robot."""
+    wheel_base_m: float = 0.4
+    wheel_radius_sigma: float = 0.008              # share, both wheels together: a floor's length, worn tyres
+    wheel_mismatch_sigma: float = 0.0003           # share, one wheel against the other: bends what is straight
+    wheel_base_sigma: float = 0.008                # share: turns are told too wide or too narrow
+    slip_m_per_sqrt_m: float = 0.008               # along the way, also sideways of an omnidirectional base
+    slip_rad_per_sqrt_m: float = 0.005
+    slip_rad_per_sqrt_rad: float = 0.015
+    slip_event_per_m: float = 0.01                 # how often a wheel spins on its spot
+    slip_event_max_m: float = 0.04                 # how far at most
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if not 0.0 <= value < math.inf:
+                raise ValueError(f"{field.name} of the odometry must be >= 0 and finite, got {value}")
+        if self.wheel_base_m == 0.0:
+            raise ValueError(f"wheel_base_m of the odometry must be > 0 m, got {self.wheel_base_m}")
+
+
+EXACT = OdometryParams(0.4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Odometry:
+    """Sums up what the wheels of one robot say; the frame odom begins where it begins."""
+
+    def __init__(self, p: OdometryParams, kind: str, rng: np.random.Generator) -> None:
+        """
+        Args:
+            kind: of the base, "diff" or "omni".
+            rng: this robot's wheels and all that happens to them.
+        """
+        self._p, self._kind, self._rng = p, kind, rng
+        radius, mismatch, base = rng.normal(size=3) * [p.wheel_radius_sigma, p.wheel_mismatch_sigma,
+                                                       p.wheel_base_sigma]
+        forward, turn = 1.0 + radius, (1.0 + radius) / (1.0 + base)
+        # (3, 3) twist told by twist made. Diff: each wheel tells its own radius; omni: three wheels, whose mismatch
+        # skews forward motion to the left and back.
+        half_m = 0.5 * p.wheel_base_m
+        if kind == "diff":
+            self._told_by_made = np.array([[forward, 0.0, mismatch * half_m], [0.0, 0.0, 0.0],
+                                           [mismatch / half_m, 0.0, turn]])
+        else:
+            self._told_by_made = np.array([[forward, mismatch, 0.0], [-mismatch, forward, 0.0],
+                                           [mismatch / half_m, 0.0, turn]])
+        self.odom_from_base = np.zeros(3)
+        self.velocity = np.zeros(3)  # as told: forward, left [m/s], turn [rad/s]
+        self._spin, self._spin_left_s = np.zeros(3), 0.0  # velocity told by a wheel that spins, and until when
+
+    def step(self, twist: np.ndarray, dt_s: float) -> None:
+        """The base made this twist (3,) in this time."""
+        p = self._p
+        draws = self._rng.random(DRAWS)
+        normals = _normal(draws[:2], draws[2:4])  # 4 of them
+        way_m, turn_rad = math.hypot(twist[0], twist[1]), abs(float(twist[2]))
+        told = self._told_by_made @ twist
+        told[0] += p.slip_m_per_sqrt_m * math.sqrt(way_m) * normals[0]
+        if self._kind == "omni":
+            told[1] += p.slip_m_per_sqrt_m * math.sqrt(way_m) * normals[1]
+        told[2] += (p.slip_rad_per_sqrt_m * math.sqrt(way_m) * normals[2]
+                    + p.slip_rad_per_sqrt_rad * math.sqrt(turn_rad) * normals[3])
+        if draws[4] < p.slip_event_per_m * way_m:
+            self._spin, self._spin_left_s = self._spinning(draws[5], draws[6]) / SPIN_S, SPIN_S
+        spun_s = min(dt_s, self._spin_left_s)
+        told += spun_s * self._spin
+        self._spin_left_s -= spun_s
+        self.odom_from_base = se2.compose(self.odom_from_base, arc(told))
+        self.velocity = told / dt_s
+
+    def _spinning(self, how_far: float, which: float) -> np.ndarray:
+        """(3,) what one wheel tells that turns on its spot; both draws are of [0, 1)."""
+        extra_m = self._p.slip_event_max_m * how_far
+        turn = math.copysign(extra_m / self._p.wheel_base_m, which - 0.5)
+        if self._kind == "diff":
+            return np.array([0.5 * extra_m, 0.0, turn])
+        direction = 2.0 * math.pi * which
+        return np.array([0.5 * extra_m * math.cos(direction), 0.5 * extra_m * math.sin(direction), turn])
+
+
+def _normal(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """2 N normal numbers of 2 N uniform ones (Box, Muller, 1958): a fixed number of draws, the same in every numpy."""
+    radius = np.sqrt(-2.0 * np.log1p(-a))
+    return np.concatenate([radius * np.cos(2.0 * np.pi * b), radius * np.sin(2.0 * np.pi * b)])

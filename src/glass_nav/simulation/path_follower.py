@@ -1,0 +1,183 @@
+"""waypoints -> velocity commands: pure pursuit, which steers for a point of the path a little way ahead.
+
+Coulter, Implementation of the Pure Pursuit Path Tracking Algorithm, CMU-RI-TR-92-01 (1992). Ours: the point ahead
+runs on beyond the end, so that the steering stays calm there; an omnidirectional base drives to it directly.
+W waypoints; poses, velocities as in robot.py.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, List, Tuple
+
+import numpy as np
+
+from glass_nav.geometry import angles
+from glass_nav.simulation.robot import RobotParams
+
+TURN_ON_THE_SPOT_RAD = 1.0  # a point farther off to the side is turned to first
+CREEP_M_S = 0.02            # so that braking arrives
+
+
+class PathError(ValueError):
+    """A path that cannot be driven; one line."""
+
+
+@dataclass(frozen=True)
+class FollowerParams:
+    """How a path is driven."""
+    speed_m_s: float = 0.6
+    lookahead_m: float = 0.5               # corners are cut by about a quarter of it
+    lateral_acceleration_m_s2: float = 0.4  # slower in bends
+
+    def __post_init__(self) -> None:
+        for name, unit in (("speed_m_s", "m/s"), ("lookahead_m", "m"), ("lateral_acceleration_m_s2", "m/s^2")):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise ValueError(f"{name} of the path follower must be > 0 {unit} and finite, "
+                                 f"got {getattr(self, name)}")
+
+
+class PathFollower:
+    """Commands a base along a path, from its start to its end, and then to stand."""
+
+    def __init__(self, waypoints_m: np.ndarray, robot: RobotParams, p: FollowerParams = FollowerParams()) -> None:
+        """
+        Args:
+            waypoints_m: (W, 2) in the frame map; points that repeat the one before are left out.
+
+        Raises:
+            PathError: fewer than two different points, or one that is not finite.
+        """
+        points = _distinct(waypoints_m)
+        self._p, self._robot = p, robot
+        self._points = points
+        self._lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        self._directions = np.diff(points, axis=0) / self._lengths[:, None]
+        self._starts = np.concatenate([[0.0], np.cumsum(self._lengths)])  # way [m] from the first point to each
+        self.length_m = float(self._starts[-1])
+        self.progress_m = 0.0
+        self.done = False
+
+    @property
+    def start(self) -> np.ndarray:
+        """(3,) pose on the first point, with a view to the second."""
+        x, y = self._directions[0]
+        return np.array([self._points[0, 0], self._points[0, 1], math.atan2(y, x)])
+
+    def command(self, map_from_base: np.ndarray) -> np.ndarray:
+        """(3,) velocity that brings a base at that pose on along the path; zero at its end."""
+        self.progress_m = self._advanced(np.asarray(map_from_base[:2], float))
+        remaining_m = self.length_m - self.progress_m
+        self.done = self.done or remaining_m < 0.01
+        if self.done:
+            return np.zeros(3)
+        to_point = self._at(self.progress_m + self._p.lookahead_m) - map_from_base[:2]
+        distance_m = max(float(np.linalg.norm(to_point)), 1e-6)
+        bearing = float(angles.wrap(math.atan2(to_point[1], to_point[0]) - map_from_base[2]))
+        braking = math.sqrt(2.0 * 0.7 * self._robot.max_acceleration_m_s2 * remaining_m) + CREEP_M_S
+        speed = min(self._p.speed_m_s, self._robot.max_speed_m_s, braking)
+        if self._robot.kind == "omni":
+            return self._sliding(bearing, speed)
+        return self._steering(bearing, distance_m, speed)
+
+    def _steering(self, bearing: float, distance_m: float, speed: float) -> np.ndarray:
+        """Along the arc through the point, or first a turn on the spot."""
+        if abs(bearing) > TURN_ON_THE_SPOT_RAD:
+            return np.array([0.0, 0.0, self._turn(bearing)])
+        curvature = 2.0 * math.sin(bearing) / distance_m
+        bend = max(abs(curvature), 1e-6)
+        speed = min(speed, self._robot.max_turn_rad_s / bend,
+                    math.sqrt(self._p.lateral_acceleration_m_s2 / bend))
+        return np.array([speed, 0.0, speed * curvature])
+
+    def _sliding(self, bearing: float, speed: float) -> np.ndarray:
+        """Straight to the point, turning towards it meanwhile."""
+        x, y = self._direction(self.progress_m)
+        ahead = self._direction(self.progress_m + self._p.lookahead_m)
+        speed *= max(0.3, float(x * ahead[0] + y * ahead[1]))  # slower before a corner
+        return np.array([speed * math.cos(bearing), speed * math.sin(bearing), 0.5 * self._turn(bearing)])
+
+    def _turn(self, bearing: float) -> float:
+        """Turn rate that can still be braked within the angle."""
+        rate = math.sqrt(0.7 * 2.0 * self._robot.max_turn_acceleration_rad_s2 * abs(bearing))
+        return math.copysign(min(rate, self._robot.max_turn_rad_s), bearing)
+
+    def _advanced(self, point_m: np.ndarray) -> float:
+        """Way to the nearest point of the path that is not behind, nor far ahead: a path may cross itself."""
+        window_m = 2.0 * self._p.lookahead_m
+        first, last = self._segment(self.progress_m), self._segment(self.progress_m + window_m)
+        parts = slice(first, last + 1)
+        along = ((point_m - self._points[:-1][parts]) * self._directions[parts]).sum(axis=1)
+        low = np.maximum(self.progress_m - self._starts[:-1][parts], 0.0)
+        along = np.clip(along, low, np.maximum(self._lengths[parts], low))
+        nearest = self._points[:-1][parts] + along[:, None] * self._directions[parts]
+        best = int(np.argmin(((nearest - point_m) ** 2).sum(axis=1)))
+        return min(float(self._starts[first + best] + along[best]), self.length_m)
+
+    def _segment(self, way_m: float) -> int:
+        return int(np.clip(np.searchsorted(self._starts, way_m, side="right") - 1, 0, len(self._lengths) - 1))
+
+    def _at(self, way_m: float) -> np.ndarray:
+        index = self._segment(way_m)
+        return self._points[index] + (way_m - self._starts[index]) * self._directions[index]
+
+    def _direction(self, way_m: float) -> np.ndarray:
+        return self._directions[self._segment(way_m)]
+
+
+def load(path: Path) -> np.ndarray:
+    """Waypoints (W, 2) [m] of a file: yaml, a list of [x, y]; or lines of x and y, with a comma or a blank between.
+
+    Raises:
+        PathError: no such file, or something else in it.
+    """
+    try:
+        text = path.read_text()
+    except (OSError, UnicodeDecodeError) as err:
+        reason = err.strerror if isinstance(err, OSError) and err.strerror else str(err)
+        raise PathError(f"{path}: cannot be read: {reason}") from err
+    rows = _yaml_rows(path, text) if path.suffix in (".yaml", ".yml") else _lines(text)
+    points: List[Tuple[float, float]] = []
+    for number, row in rows:
+        try:
+            x, y = (float(value) for value in row)
+        except (TypeError, ValueError) as err:
+            raise PathError(f"{path}: waypoint {number} must be x and y in m, got {row!r}") from err
+        points.append((x, y))
+    try:
+        return _distinct(np.array(points).reshape(-1, 2))
+    except PathError as err:
+        raise PathError(f"{path}: {err}") from err
+
+
+def _yaml_rows(path: Path, text: str) -> "List[Tuple[int, Any]]":
+    import yaml
+
+    try:
+        rows = yaml.safe_load(text)
+    except yaml.YAMLError as err:
+        raise PathError(f"{path}: is no yaml: {' '.join(str(err).split())}") from err
+    if not isinstance(rows, list):
+        raise PathError(f"{path}: must be a list of waypoints [x, y] in m, got {type(rows).__name__}")
+    return list(enumerate(rows, 1))
+
+
+def _lines(text: str) -> "List[Tuple[int, Any]]":
+    lines = [line.partition("#")[0].replace(",", " ").split() for line in text.splitlines()]
+    return [(number, words) for number, words in enumerate(filter(None, lines), 1)]
+
+
+def _distinct(waypoints_m: np.ndarray) -> np.ndarray:
+    points = np.asarray(waypoints_m, float)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise PathError(f"a path needs waypoints (W, 2), got {points.shape}")
+    if not np.all(np.isfinite(points)):
+        bad = int(np.nonzero(~np.isfinite(points).all(axis=1))[0][0])
+        raise PathError(f"waypoint {bad + 1} of the path is not finite: {points[bad].tolist()}")
+    keep = np.ones(len(points), bool)
+    keep[1:] = np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-6
+    if keep.sum() < 2:
+        raise PathError(f"a path needs 2 different waypoints, got {int(keep.sum())}")
+    return points[keep]
