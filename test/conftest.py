@@ -88,6 +88,8 @@ class RoomBag:
     scan_topics: Tuple[str, ...] = ("/scan",)
     frame_prefix: str = ""        # "/" as old drivers write it
     compressed: bool = False
+    true_beams: Tuple[Tuple[str, str], ...] = ()  # topics and their types, TrueBeams or BeamCases; all beams diffuse
+    true_fields: Callable[[int, Dict[str, Any]], Optional[Dict[str, Any]]] = lambda index, fields: fields
     scan_fields: Callable[[int, Dict[str, Any]], Optional[Dict[str, Any]]] = lambda index, fields: fields
     start_ns: int = 1_000_000_000_000
 
@@ -117,6 +119,8 @@ class RoomBag:
 
         store = get_typestore(Stores.ROS1_NOETIC)
         store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf2_msgs/msg/TFMessage"))
+        for name in ("TrueBeams", "BeamCases"):
+            store.register(get_types_from_msg((REPO / "msg" / f"{name}.msg").read_text(), f"glass_nav/msg/{name}"))
         types = store.types
         writer = Writer(self.path)
         if self.compressed:
@@ -203,6 +207,17 @@ class RoomBag:
                     ranges=np.asarray(fields["ranges"], np.float32), intensities=np.zeros(0, np.float32))
                 for topic in self.scan_topics:
                     send(topic, "sensor_msgs/msg/LaserScan", stamp_ns, message)
+                truth = self.true_fields(index, {
+                    "stamp_ns": fields["stamp_ns"], "cases": np.ones(self.beams, np.uint8),
+                    "crossing": np.full(self.beams, np.nan)})
+                for topic, name in self.true_beams if truth is not None else ():
+                    nothing = np.zeros(0, np.float32)
+                    rest = ({"exact": np.asarray(fields["ranges"], np.float32),
+                             "crossing": np.asarray(truth["crossing"], np.float32)} if name == "TrueBeams"
+                            else {"expected": nothing, "residual": nothing, "weight": nothing})
+                    kind = f"glass_nav/msg/{name}"
+                    send(topic, kind, stamp_ns, types[kind](
+                        header=header(truth["stamp_ns"], "laser"), cases=np.asarray(truth["cases"], np.uint8), **rest))
                 if self.ground_truth:
                     there = pose(true)
                     if self.truth_type == "PoseWithCovarianceStamped":

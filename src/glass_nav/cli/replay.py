@@ -6,7 +6,7 @@ import argparse
 import platform
 import sys
 from pathlib import Path
-from typing import Callable, Dict, Optional, Tuple
+from typing import Any, Callable, Dict, List, Optional, Tuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from glass_nav.cli.progress import Progress
 from glass_nav.cli.replay_params import Frames, ReplayParams
 from glass_nav.cli.replay_run import Window
 from glass_nav.evaluation import pictures, replay_result
+from glass_nav.evaluation.case_scores import NEAR_M
 from glass_nav.evaluation.replay_result import ReplayResult
 from glass_nav.localization.glass_mcl import GlassMcl
 from glass_nav.localization.start_pose import StartPose
@@ -24,7 +25,9 @@ from glass_nav.recording.recording import LogOptions, Recording
 from glass_nav.world import map_file
 
 DESCRIPTION = """Runs the localization on a recorded log, every scan of it, and writes metrics.json,
-trajectory.tum, per_scan.csv, beam_cases.npz and trajectory.png. Needs no roscore."""
+trajectory.tum, per_scan.csv, beam_cases.npz and trajectory.png; where the log has the truth about its beams, as
+simulated ones do, also the scores of the cases and cases.png. Needs no roscore."""
+CASE_NAMES = ("uncertain", "diffuse", "specular", "first penetration", "second penetration")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,6 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="poses in the map: a PoseStamped, PoseWithCovarianceStamped or Odometry topic, a TUM "
                              "file, or MRPT's _GT.txt; default: /ground_truth of a bag, LOG_GT.txt beside a "
                              "rawlog; none: no ground truth")
+    parser.add_argument("--true-beams", metavar="TOPIC",
+                        help="true cases: glass_nav/TrueBeams, or a glass_nav/BeamCases; default: the only topic of "
+                             "the first, or true_cases of the second; none: do not score the cases")
     parser.add_argument("--params", type=Path, metavar="FILE",
                         help="yaml of parameters, names as for the node; default: the node's defaults")
     parser.add_argument("--seed", type=int, default=0, help="of the filter's random numbers (default 0)")
@@ -60,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     part.add_argument("--duration", type=float, metavar="S", help="seconds from there")
     part.add_argument("--every", type=int, default=1, metavar="N", help="only each N-th scan")
     part.add_argument("--max-scans", type=int, metavar="N")
-    parser.add_argument("--no-picture", action="store_true", help="do not draw trajectory.png")
+    parser.add_argument("--no-picture", action="store_true", help="do not draw trajectory.png and cases.png")
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
@@ -106,6 +112,8 @@ def main(arguments: argparse.Namespace) -> None:
     if not arguments.no_picture:
         image = pictures.MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid)
         pictures.draw_trajectory(arguments.out / "trajectory.png", image, result, recording.name)
+        if result.case_scores is not None:
+            pictures.draw_cases(arguments.out / "cases.png", image, result, recording.name)
     for reason, count in result.refusals.most_common():
         _say(f"{count} scans refused: {reason}")
     print(table(result))
@@ -132,10 +140,35 @@ def table(result: ReplayResult) -> str:
                      f"median {figures['yaw_median_deg']:.2f} deg  p95 {figures['yaw_p95_deg']:.2f} deg")
         lines.append(f"lost            {100 * figures['lost_share']:.1f} % of the scans more than 0.5 m off, "
                      f"{100 * figures['lost_1m_share']:.1f} % more than 1 m")
-    names = ("uncertain", "diffuse", "specular", "first penetration", "second penetration")
     lines.append("beam cases      " + "  ".join(
-        f"{name} {100 * figures['case_share'][str(case)]:.1f} %" for case, name in enumerate(names)))
-    return "\n".join(lines)
+        f"{name} {100 * figures['case_share'][str(case)]:.1f} %" for case, name in enumerate(CASE_NAMES)))
+    return "\n".join(lines + _case_lines(figures["cases"]) + _surface_lines(figures["scan_surfaces"]))
+
+
+def _case_lines(scores: Optional[Dict[str, Any]]) -> List[str]:
+    if scores is None:
+        return []
+    lines = [f"cases told      {_figure(scores['accuracy'])} of {scores['beams']} beams right, "
+             f"{_figure(scores['accuracy_answered'])} of those that answered; macro F1 {_figure(scores['macro_f1'])}; "
+             f"{_figure(scores['used_share'])} used",
+             f"  {'':22s}{'true':>9s}{'told':>9s}{'precision':>11s}{'recall':>8s}{'F1':>8s}"]
+    for case, name in enumerate(CASE_NAMES):
+        share, told = (100 * (scores[key][case] or 0.0) for key in ("true_share", "told_share"))
+        precision, recall, f1 = (_figure(scores[key][case]) for key in ("precision", "recall", "f1"))
+        lines.append(f"  {case} {name:20s}{share:7.1f} %{told:7.1f} %{precision:>11s}{recall:>8s}{f1:>8s}")
+    return lines
+
+
+def _surface_lines(scores: Optional[Dict[str, Any]]) -> List[str]:
+    if scores is None:
+        return []
+    return [f"scan_surfaces   {_figure(scores['cut_at_pane_share'])} of {scores['at_pane']} beams that passed or were "
+            f"mirrored at a pane cut within {NEAR_M:g} m of it, {_figure(scores['cut_wrongly_share'], 4)} of the "
+            f"others cut; pose trusted in {_figure(scores['trusted_share'])} of the scans"]
+
+
+def _figure(value: Optional[float], digits: int = 3) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
 
 
 def _metres(value: Optional[float]) -> str:
@@ -154,7 +187,7 @@ def _log_options(arguments: argparse.Namespace, frames: Frames) -> LogOptions:
     pose = arguments.laser_pose
     return LogOptions(arguments.scan_topic, arguments.odom_topic, arguments.base_frame or base_frame,
                       arguments.odom_frame or odom_frame, None if pose is None else (pose[0], pose[1], pose[2]),
-                      arguments.ground_truth)
+                      arguments.ground_truth, arguments.true_beams)
 
 
 def _start(mcl: GlassMcl, recording: Recording, arguments: argparse.Namespace,

@@ -9,10 +9,15 @@ from typing import Callable, Iterable, Iterator, List, Optional
 
 import numpy as np
 
-from glass_nav.evaluation.replay_result import NO_BEAM, ReplayResult
+from glass_nav.evaluation import case_scores
+from glass_nav.evaluation.case_scores import CaseScores, SurfaceScores
+from glass_nav.evaluation.replay_result import NO_BEAM, BeamExample, ReplayResult
+from glass_nav.geometry import se2
 from glass_nav.localization.glass_mcl import Estimate, GlassMcl
-from glass_nav.recording.recording import Entry, Recording, RecordingError, Refusal
-from glass_nav.sensing.scan import ScanError
+from glass_nav.recording.recording import BeamTruth, Entry, Recording, RecordingError, Refusal
+from glass_nav.sensing.scan import Scan, ScanError
+
+EXAMPLES = 3  # scans whose beams are kept for the picture, spread over the log
 
 
 @dataclass(frozen=True)
@@ -79,9 +84,11 @@ def run(recording: Recording, mcl: GlassMcl, start: Callable[[int], None], seed:
         RecordingError: not one scan of the log can be used.
     """
     began = time.perf_counter()
+    window = Window() if window is None else window
     rows: List[_Row] = []
     refusals: "Counter[str]" = Counter()
-    for entry in (Window() if window is None else window).of(recording):
+    scores = _Scores(recording, window.expected(len(recording)))
+    for entry in window.of(recording):
         if isinstance(entry, Refusal):
             refusals[entry.reason] += 1
         else:
@@ -90,25 +97,70 @@ def run(recording: Recording, mcl: GlassMcl, start: Callable[[int], None], seed:
                     start(entry.scan.stamp_ns)
                 before = time.process_time()
                 estimate = mcl.update(entry.scan, entry.odom_from_base)
-                rows.append(_Row(entry.odom_from_base, estimate, 1e3 * (time.process_time() - before)))
+                cpu_ms = 1e3 * (time.process_time() - before)
+                rows.append(_Row(entry.odom_from_base, estimate, cpu_ms, scores.take(entry.scan, estimate)))
             except ScanError as err:
                 refusals[str(err).partition(": ")[2]] += 1
         step_done()
     if not rows:
         raise RecordingError(f"{recording.name}: {_nothing_usable(refusals)}")
-    return _result(rows, refusals, recording, time.perf_counter() - began, seed)
+    return _result(rows, refusals, recording, scores, time.perf_counter() - began, seed)
+
+
+class _Scores:
+    """What the truth about the beams, where the log has it, says of the cases and of scan_surfaces."""
+
+    def __init__(self, recording: Recording, expected_scans: int) -> None:
+        self.cases: Optional[CaseScores] = None        # None: no truth
+        self.surfaces: Optional[SurfaceScores] = None
+        self.examples: List[BeamExample] = []
+        self._recording = recording
+        self._rest = iter(() if recording.beam_truth is None else recording.beam_truth)
+        self._next = next(self._rest, None)
+        self._scans = 0
+        self._example_at = [int((number + 0.5) / EXAMPLES * expected_scans) for number in range(EXAMPLES)]
+
+    def take(self, scan: Scan, estimate: Estimate) -> Optional[np.ndarray]:
+        """Score one scan; its true cases (B,), None where there are none. Both go by ascending stamps."""
+        self._scans += 1
+        while self._next is not None and self._next.stamp_ns < scan.stamp_ns:
+            self._next = next(self._rest, None)
+        if self._next is None or self._next.stamp_ns != scan.stamp_ns:
+            return None
+        truth = self._next
+        if len(truth.case) != len(scan):
+            raise RecordingError(f"{self._recording.name}: the truth at {scan.stamp_ns * 1e-9:.3f} s is about "
+                                 f"{len(truth.case)} beams, the scan has {len(scan)}")
+        found = case_scores.of_cases(truth.case, estimate.cases.case, scan.answered)
+        self.cases = found if self.cases is None else self.cases + found
+        if truth.crossing_m is not None:
+            cut = estimate.surface_scan
+            surfaces = case_scores.of_surfaces(truth.crossing_m, cut.ranges_m, cut.cut, cut.trusted)
+            self.surfaces = surfaces if self.surfaces is None else self.surfaces + surfaces
+        if self._example_at and self._scans > self._example_at[0]:
+            del self._example_at[0]
+            self.examples.append(_example(scan, estimate, truth))
+        return truth.case
+
+
+def _example(scan: Scan, estimate: Estimate, truth: BeamTruth) -> BeamExample:
+    map_from_laser = se2.compose(estimate.map_from_base, scan.base_from_laser)
+    return BeamExample(scan.stamp_ns, map_from_laser[:2],
+                       se2.transform_points(estimate.map_from_base, scan.points_in_base()), truth.case,
+                       estimate.cases.case)
 
 
 class _Row:
     """What is kept of one scan: not the particles themselves, a long log would not fit."""
 
-    def __init__(self, odom_from_base: np.ndarray, estimate: Estimate, cpu_ms: float) -> None:
+    def __init__(self, odom_from_base: np.ndarray, estimate: Estimate, cpu_ms: float,
+                 true_case: Optional[np.ndarray]) -> None:
         self.odom_from_base, self.cpu_ms = odom_from_base, cpu_ms
         self.stamp_ns, self.map_from_base = estimate.stamp_ns, estimate.map_from_base
         self.deviation = np.sqrt(np.maximum(np.diag(estimate.covariance), 0.0))
         self.state, self.reason = estimate.state, estimate.reason
         self.used_share, self.updated = estimate.used_share, estimate.updated
-        self.particles, self.case = len(estimate.particles), estimate.cases.case
+        self.particles, self.case, self.true_case = len(estimate.particles), estimate.cases.case, true_case
 
 
 def _nothing_usable(refusals: "Counter[str]") -> str:
@@ -118,11 +170,14 @@ def _nothing_usable(refusals: "Counter[str]") -> str:
     return f"none of its {sum(refusals.values())} scans can be used; {most}"
 
 
-def _result(rows: List[_Row], refusals: "Counter[str]", recording: Recording, wall_s: float,
+def _result(rows: List[_Row], refusals: "Counter[str]", recording: Recording, scores: _Scores, wall_s: float,
             seed: int) -> ReplayResult:
     cases = np.full((len(rows), max(len(row.case) for row in rows)), NO_BEAM, np.uint8)
-    for to, row in zip(cases, rows):
-        to[:len(row.case)] = row.case
+    true_cases = None if scores.cases is None else cases.copy()
+    for index, row in enumerate(rows):
+        cases[index, :len(row.case)] = row.case
+        if true_cases is not None and row.true_case is not None:
+            true_cases[index, :len(row.true_case)] = row.true_case
     return ReplayResult(
         stamps_ns=np.array([row.stamp_ns for row in rows], np.int64),
         map_from_base=np.array([row.map_from_base for row in rows], float),
@@ -134,4 +189,5 @@ def _result(rows: List[_Row], refusals: "Counter[str]", recording: Recording, wa
         updated=np.array([row.updated for row in rows], bool),
         particles=np.array([row.particles for row in rows], int),
         cpu_ms=np.array([row.cpu_ms for row in rows], float),
-        cases=cases, refusals=refusals, reference=recording.ground_truth, wall_s=wall_s, seed=seed)
+        cases=cases, refusals=refusals, reference=recording.ground_truth, wall_s=wall_s, seed=seed,
+        true_cases=true_cases, case_scores=scores.cases, surface_scores=scores.surfaces, examples=scores.examples)

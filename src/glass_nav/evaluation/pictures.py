@@ -9,7 +9,7 @@ from typing import Any, Optional, Tuple
 import numpy as np
 
 from glass_nav.evaluation.pose_errors import LOST_M
-from glass_nav.evaluation.replay_result import ReplayResult
+from glass_nav.evaluation.replay_result import BeamExample, ReplayResult
 from glass_nav.geometry import se2
 
 MARGIN_M = 3.0         # of map around the way of the robot
@@ -20,6 +20,9 @@ ERROR_COLOURS = ("#1b3a8a", "#8a2d9c", "#e0264f", "#ff8c00")  # small to large, 
 RIBBON = 0.08          # share of the error axis below 0, for the states
 STATE_COLOURS = {"LOCALIZED": "#2ca02c", "UNCERTAIN": "#ffbf00", "LOST": "#d62728",
                  "GLOBAL_SEARCH": "#9467bd", "UNKNOWN": "#7f7f7f"}
+
+CASE_NAMES = ("0 uncertain", "1 diffuse", "2 specular", "3 behind one pane", "4 behind two panes")
+CASE_COLOURS = ("#969696", "#009e73", "#cc79a7", "#56b4e9", "#0072b2")  # as in rviz: Okabe and Ito's
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,67 @@ def draw_trajectory(path: Path, grid: MapImage, result: ReplayResult, title: str
     above.set_title(f"{title}\n{_figures(result)}", fontsize=11)
     _draw_errors(below, result)
     figure.savefig(path)
+
+
+def draw_cases(path: Path, grid: MapImage, result: ReplayResult, title: str) -> None:
+    """Left: what beams of each true case were told to be. Right: the beams of a few scans, true above, told below.
+
+    Needs result.case_scores.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    assert result.case_scores is not None
+    figures = result.case_scores.metrics()
+    columns = len(result.examples)
+    figure = Figure(figsize=(5.5 + 4.2 * columns, 8.4 if columns else 6.0), dpi=100, constrained_layout=True)
+    FigureCanvasAgg(figure)
+    parts = figure.add_gridspec(2, columns + 1, width_ratios=[5.5] + [4.2] * columns)
+    _draw_confusion(figure.add_subplot(parts[:, 0]), result.case_scores.confusion)
+    for column, example in enumerate(result.examples, 1):
+        for row, (name, case) in enumerate((("true", example.true_case), ("told", example.told_case))):
+            axes = figure.add_subplot(parts[row, column])
+            _draw_beams(axes, grid, example, case)
+            seconds = (example.stamp_ns - result.stamps_ns[0]) * 1e-9
+            axes.set_title(f"{name}, {seconds:.1f} s", fontsize=10)
+    accuracy, f1 = (f"{value:.3f}" if value is not None else "-" for value in (figures["accuracy"],
+                                                                               figures["macro_f1"]))
+    figure.suptitle(f"{title}\n{figures['beams']} beams, accuracy {accuracy}, macro F1 {f1}", fontsize=11)
+    figure.savefig(path)
+
+
+def _draw_confusion(axes: Any, confusion: np.ndarray) -> None:
+    share = confusion / np.maximum(confusion.sum(axis=1, keepdims=True), 1)
+    axes.imshow(share, cmap="Blues", vmin=0.0, vmax=1.0)
+    for true, row in enumerate(confusion):
+        for told, count in enumerate(row):
+            axes.text(told, true, f"{100 * share[true, told]:.1f} %\n{count}" if row.any() else "-", ha="center",
+                      va="center", fontsize=8, color="white" if share[true, told] > 0.6 else "black")
+    axes.set_xticks(range(len(CASE_NAMES)))
+    axes.set_xticklabels(CASE_NAMES, rotation=30, ha="right", fontsize=8)
+    axes.set_yticks(range(len(CASE_NAMES)))
+    axes.set_yticklabels(CASE_NAMES, fontsize=8)
+    axes.set_xlabel("told")
+    axes.set_ylabel("true")
+
+
+def _draw_beams(axes: Any, grid: MapImage, example: BeamExample, case: np.ndarray) -> None:
+    from matplotlib.collections import LineCollection
+
+    answered = np.isfinite(example.points_m).all(axis=1)
+    shown = np.concatenate([example.points_m[answered], example.laser_m[None]])
+    low, high = shown.min(axis=0) - 1.0, shown.max(axis=0) + 1.0
+    _draw_map(axes, grid, low, high)
+    ends = example.points_m[answered]
+    rays = np.stack([np.broadcast_to(example.laser_m, ends.shape), ends], axis=1)
+    colours = np.array(CASE_COLOURS)[case[answered]]
+    axes.add_collection(LineCollection(rays, colors=colours, linewidths=0.4, alpha=0.5))
+    axes.scatter(ends[:, 0], ends[:, 1], c=colours, s=5, zorder=3)
+    axes.plot(*example.laser_m, "o", color="#111111", markersize=4)
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_aspect("equal")
+    axes.tick_params(labelsize=7)
 
 
 def _bounds(result: ReplayResult) -> Tuple[np.ndarray, np.ndarray]:

@@ -9,18 +9,29 @@ import csv
 import json
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional
 
 import numpy as np
 
 from glass_nav.evaluation import pose_errors
+from glass_nav.evaluation.case_scores import CaseScores, SurfaceScores
 from glass_nav.evaluation.pose_errors import PoseErrors
 from glass_nav.geometry.trajectory import Trajectory
 
 CASES = (0, 1, 2, 3, 4)  # 0 uncertain, 1 diffuse, 2 specular, 3 first penetration, 4 second
 NO_BEAM = 255            # fills the rows of scans with fewer beams than the widest
+
+
+@dataclass(frozen=True)
+class BeamExample:
+    """The beams of one scan, for a picture."""
+    stamp_ns: int
+    laser_m: np.ndarray    # (2,) where the lidar was by the estimate, in the frame map
+    points_m: np.ndarray   # (B, 2) end points by the estimate, NaN without an answer
+    true_case: np.ndarray  # (B,) uint8
+    told_case: np.ndarray  # (B,) uint8
 
 
 @dataclass(frozen=True)
@@ -41,6 +52,10 @@ class ReplayResult:
     reference: Optional[Trajectory]  # map_from_base
     wall_s: float               # time the whole run took, reading included
     seed: int
+    true_cases: Optional[np.ndarray] = None  # (S, B) as cases, NO_BEAM also where no truth was recorded
+    case_scores: Optional[CaseScores] = None
+    surface_scores: Optional[SurfaceScores] = None
+    examples: List[BeamExample] = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self.stamps_ns)
@@ -66,6 +81,10 @@ class ReplayResult:
             **pose_errors.summary(errors),
             "case_share": {str(case): (float(count) / beams if beams else 0.0)
                            for case, count in zip(CASES, counts)},
+            "scans_with_true_cases": None if self.true_cases is None else int(
+                (self.true_cases != NO_BEAM).any(axis=1).sum()),
+            "cases": None if self.case_scores is None else self.case_scores.metrics(),
+            "scan_surfaces": None if self.surface_scores is None else self.surface_scores.metrics(),
             "state_share": {state: count / len(self) for state, count in sorted(states.items())},
             "cpu_ms_per_scan": float(self.cpu_ms.mean()) if len(self) else None,
             "cpu_ms_per_update": float(self.cpu_ms[self.updated].mean()) if self.updated.any() else None,
@@ -81,8 +100,9 @@ def write(result: ReplayResult, folder: Path, about: Mapping[str, Any]) -> None:
     write_json(folder / "metrics.json", {**result.metrics(), **about})
     _write_tum(folder / "trajectory.tum", result)
     _write_per_scan(folder / "per_scan.csv", result)
-    np.savez_compressed(folder / "beam_cases.npz", stamps_ns=result.stamps_ns.astype(np.int64),
-                        cases=result.cases)
+    true = {} if result.true_cases is None else {"true_cases": result.true_cases}
+    np.savez_compressed(folder / "beam_cases.npz", stamps_ns=result.stamps_ns.astype(np.int64), cases=result.cases,
+                        **true)
 
 
 def write_json(path: Path, values: Mapping[str, Any]) -> None:

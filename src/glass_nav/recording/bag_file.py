@@ -16,7 +16,7 @@ import numpy as np
 from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.recording import frames, trajectory_file
 from glass_nav.recording.frames import FrameError, FrameTree, Transform
-from glass_nav.recording.recording import (Entry, LogOptions, Recording, RecordingError, Refusal, Step,
+from glass_nav.recording.recording import (BeamTruth, Entry, LogOptions, Recording, RecordingError, Refusal, Step,
                                            trajectory_from_samples)
 from glass_nav.sensing.scan import ScanError, scan_from_fields
 
@@ -24,6 +24,8 @@ SCAN = "sensor_msgs/LaserScan"
 ODOMETRY = "nav_msgs/Odometry"
 TF = ("tf2_msgs/TFMessage", "tf/tfMessage")
 POSES = ("geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped", ODOMETRY)
+TRUE_BEAMS, BEAM_CASES = "glass_nav/TrueBeams", "glass_nav/BeamCases"
+LAST_CASE = 4
 BASE_FRAMES = ("base_link", "base_footprint")  # tried in this order when no base frame is given
 LEVEL = math.cos(math.radians(20.0))  # a scan plane tilted further does not show the plan of a floor
 
@@ -43,13 +45,15 @@ def open_log(path: Path, options: LogOptions) -> Recording:
             base_frame = _base_frame(bag, tree, odometry, options)
             _check_laser(bag, scan_topic, tree, base_frame, options)
             truth = _ground_truth(bag, options.ground_truth, notes)
+            truth_topic = _true_beams_topic(bag, options.true_beams, notes)
             scan_count = bag.count(scan_topic)
         except RecordingError as err:  # it may be missing because of the damage
             raise (RecordingError(f"{err}; {bag.damage}") if bag.damage else err) from err
         if bag.damage:
             notes.append(bag.damage)
     entries = _Entries(path, scan_topic, tree, odometry, base_frame, options.laser_pose)
-    return Recording(path.name, scan_count, entries, truth, notes)
+    beam_truth = None if truth_topic is None else _TrueBeams(path, truth_topic)
+    return Recording(path.name, scan_count, entries, truth, notes, beam_truth)
 
 
 class _Bag:
@@ -236,6 +240,24 @@ def _ground_truth(bag: _Bag, source: Optional[str], notes: List[str]) -> Optiona
     return _trajectory(bag, topic)[0]
 
 
+def _true_beams_topic(bag: _Bag, wanted: Optional[str], notes: List[str]) -> Optional[str]:
+    if wanted == "none":
+        return None
+    if wanted is not None:
+        topic = bag.check_topic(wanted, TRUE_BEAMS, BEAM_CASES)
+    else:
+        found = bag.topics_of(TRUE_BEAMS) + [topic for topic in bag.topics_of(BEAM_CASES)
+                                             if topic.rpartition("/")[2] == "true_cases"]
+        if not found:
+            return None
+        if len(found) > 1 and "/true_beams" not in found:
+            raise RecordingError(f"{bag.path}: {len(found)} topics with the truth about beams ({', '.join(found)}), "
+                                 "choose one with --true-beams")
+        topic = found[0] if len(found) == 1 else "/true_beams"
+    notes.append(f"true cases from {topic}")
+    return topic
+
+
 def _trajectory(bag: _Bag, topic: str) -> "Tuple[Trajectory, str]":
     """The poses on a topic, and the frame that they place (Odometry says it)."""
     stamps: List[int] = []
@@ -297,6 +319,26 @@ class _Entries:
         except ScanError as err:
             return Refusal(stamp_ns, str(err).partition(": ")[2])
         return Step(scan, odom_from_base)
+
+
+class _TrueBeams:
+    """Iterates the truth of a bag, opening it anew each time."""
+
+    def __init__(self, path: Path, topic: str) -> None:
+        self._path, self._topic = path, topic
+
+    def __iter__(self) -> Iterator[BeamTruth]:
+        with _Bag(self._path) as bag:
+            for _, message in bag.messages(self._topic):
+                stamp_ns, case = _stamp_ns(message.header), np.array(message.cases, np.uint8)
+                if case.size and case.max() > LAST_CASE:
+                    raise RecordingError(f"{self._path}: {self._topic} at {stamp_ns * 1e-9:.3f} s: cases must be 0 to "
+                                         f"{LAST_CASE}, got {case.max()}")
+                crossing = getattr(message, "crossing", None)
+                if crossing is not None and len(crossing) != len(case):
+                    raise RecordingError(f"{self._path}: {self._topic} at {stamp_ns * 1e-9:.3f} s: {len(case)} cases, "
+                                         f"but {len(crossing)} crossings")
+                yield BeamTruth(stamp_ns, case, None if crossing is None else np.array(crossing, float))
 
 
 def _stamp_ns(header: Any) -> int:

@@ -32,6 +32,14 @@ class Refusal:
 Entry = Union[Step, Refusal]
 
 
+@dataclass(frozen=True)
+class BeamTruth:
+    """What each beam of one scan truly met, as a simulator knows it."""
+    stamp_ns: int
+    case: np.ndarray                  # (B,) uint8: 0..4
+    crossing_m: Optional[np.ndarray]  # (B,) range of the first pane passed or mirrored at, NaN: none; None: not told
+
+
 @dataclass
 class Recording:
     """One log, opened. Iterating reads it from the start, every time the same."""
@@ -40,6 +48,7 @@ class Recording:
     entries: Iterable[Entry]  # in the order of the log
     ground_truth: Optional[Trajectory] = None  # map_from_base
     notes: List[str] = field(default_factory=list)  # what was chosen or found odd, a line each
+    beam_truth: Optional[Iterable[BeamTruth]] = None  # by ascending stamps; read as it is iterated, like the entries
 
     def __len__(self) -> int:
         return self.scan_count
@@ -50,7 +59,8 @@ class Recording:
     def in_memory(self) -> "Recording":
         """The same with all entries read, for more than one run over it."""
         entries = list(self.entries)
-        return Recording(self.name, len(entries), entries, self.ground_truth, self.notes)
+        truth = None if self.beam_truth is None else list(self.beam_truth)
+        return Recording(self.name, len(entries), entries, self.ground_truth, self.notes, truth)
 
 
 @dataclass(frozen=True)
@@ -62,6 +72,7 @@ class LogOptions:
     odom_frame: Optional[str] = None
     laser_pose: Optional[Tuple[float, float, float]] = None  # base_from_laser instead of tf's
     ground_truth: Optional[str] = None  # a topic or a file; "none": do not look for one
+    true_beams: Optional[str] = None    # a topic; "none": do not look for one
 
 
 def trajectory_from_samples(stamps_ns: "List[int]", poses: "List[Tuple[float, float, float]]") -> Trajectory:

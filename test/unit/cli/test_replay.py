@@ -247,6 +247,74 @@ def test_the_script_runs_by_itself(room_bag, room_map, tmp_path):
     assert figures(tmp_path)["scans"] == 2
 
 
+TRUE_BEAMS = {"true_beams": (("/true_beams", "TrueBeams"),)}
+
+
+def test_a_log_with_the_truth_about_its_beams_has_its_cases_scored(run, room_bag, tmp_path):
+    code, out, err = run(room_bag(**TRUE_BEAMS).write())
+    assert code == 0
+    assert "glass_nav replay: true cases from /true_beams\n" in err
+    result = figures(tmp_path)
+    cases = result["cases"]
+    assert result["scans_with_true_cases"] == 20
+    assert cases["beams"] == cases["beams_answered"] == 20 * 60
+    assert cases["accuracy"] == pytest.approx(result["case_share"]["1"])  # a room without glass: all are diffuse
+    assert cases["accuracy"] > 0.95
+    assert cases["recall"][1] == cases["accuracy"]
+    assert cases["macro_f1_cases"] == [1]
+    assert result["scan_surfaces"]["at_pane"] == 0
+    assert result["scan_surfaces"]["others"] == 20 * 60
+    assert result["scan_surfaces"]["scans"] == 20
+    lines = out.splitlines()
+    assert any(line.startswith(f"cases told      {cases['accuracy']:.3f} of 1200 beams right, ") for line in lines)
+    assert any(line.startswith("  1 diffuse ") and line.endswith(f"{cases['f1'][1]:.3f}") for line in lines)
+    assert any(line.startswith("scan_surfaces   - of 0 beams that passed or were mirrored at a pane cut within 0.15 m "
+                               "of it, ") for line in lines)
+    assert (tmp_path / "out" / "cases.png").stat().st_size > 10_000
+    with np.load(tmp_path / "out" / "beam_cases.npz") as told:
+        np.testing.assert_array_equal(told["true_cases"], np.ones((20, 60), np.uint8))
+
+
+def test_scans_without_truth_are_left_out_of_the_scores(run, room_bag, tmp_path):
+    bag = room_bag(true_beams=(("/true_cases", "BeamCases"),),
+                   true_fields=lambda index, fields: fields if index % 2 else None)
+    assert run(bag.write(), "--no-picture")[0] == 0
+    result = figures(tmp_path)
+    assert result["scans_with_true_cases"] == 10
+    assert result["cases"]["beams"] == 10 * 60
+    assert result["scan_surfaces"] is None
+    assert not (tmp_path / "out" / "cases.png").exists()
+    with np.load(tmp_path / "out" / "beam_cases.npz") as told:
+        assert (told["true_cases"][::2] == 255).all()
+        assert (told["true_cases"][1::2] == 1).all()
+
+
+def test_only_part_of_a_log_is_scored_against_its_own_truth(run, room_bag, tmp_path):
+    def third_differs(index, fields):
+        return {**fields, "cases": np.full(60, 4)} if index == 6 else fields
+
+    assert run(room_bag(**TRUE_BEAMS, true_fields=third_differs).write(), "--no-picture", "--start", 0.3, "--every", 3,
+               "--max-scans", 4)[0] == 0
+    assert figures(tmp_path)["cases"]["true_share"] == [0.0, 0.75, 0.0, 0.0, 0.25]  # scans 3, 6, 9, 12
+
+
+def test_the_truth_is_not_looked_at_when_it_is_not_wanted(run, room_bag, tmp_path):
+    code, out, _ = run(room_bag(**TRUE_BEAMS).write(), "--true-beams", "none")
+    assert code == 0
+    assert figures(tmp_path)["cases"] is figures(tmp_path)["scans_with_true_cases"] is None
+    assert "cases told" not in out
+    assert not (tmp_path / "out" / "cases.png").exists()
+
+
+def test_truth_about_other_beams_is_refused(run, room_bag):
+    bag = room_bag(**TRUE_BEAMS, true_fields=lambda index, fields: {
+        **fields, "cases": np.ones(50), "crossing": np.ones(50)})
+    code, _, err = run(bag.write())
+    assert code == 3
+    assert err.splitlines()[-1] == ("glass_nav replay: room.bag: the truth at 1000.000 s is about 50 beams, the scan "
+                                    "has 60")
+
+
 @pytest.mark.parametrize("text, reason", [
     ("- 1\n", "must hold names and values, got list"), ("a: [\n", "is no yaml: "),
     ("max_particles: many\n", "~max_particles must be int, got 'many'")])

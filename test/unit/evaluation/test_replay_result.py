@@ -7,9 +7,9 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from glass_nav.evaluation import pictures, replay_result
+from glass_nav.evaluation import case_scores, pictures, replay_result
 from glass_nav.evaluation.pictures import MapImage
-from glass_nav.evaluation.replay_result import NO_BEAM, ReplayResult
+from glass_nav.evaluation.replay_result import NO_BEAM, BeamExample, ReplayResult
 from glass_nav.geometry.trajectory import Trajectory
 
 
@@ -107,7 +107,7 @@ def test_a_picture_is_drawn_whatever_came_out(tmp_path, changes, recwarn):
 
 def test_a_single_scan_has_a_picture_and_figures(tmp_path):
     result = a_result()
-    one = ReplayResult(**{name: (value[:1] if name not in ("refusals", "reference", "wall_s", "seed") else value)
+    one = ReplayResult(**{name: (value[:1] if isinstance(value, (np.ndarray, list)) else value)
                           for name, value in vars(result).items()})
     pictures.draw_trajectory(tmp_path / "way.png", GRID, one, "a log")
     assert one.metrics()["log_duration_s"] == 0.0
@@ -130,3 +130,47 @@ def test_the_wall_in_the_picture_is_where_the_map_has_it(tmp_path):
     assert 0 < len(rows)
     thick = np.split(rows, np.nonzero(np.diff(rows) > 1)[0] + 1)
     assert len([part for part in thick if len(part) > 5]) == 1
+
+
+def test_the_scores_are_among_the_metrics_and_the_true_cases_among_the_files(tmp_path):
+    cases = np.array([[1, 1], [3, 0], [1, 2], [1, NO_BEAM]], np.uint8)
+    true = np.array([[1, 1], [3, 3], [NO_BEAM] * 2, [1, NO_BEAM]], np.uint8)
+    known = true != NO_BEAM
+    scores = case_scores.of_cases(true[known], cases[known], np.ones(5, bool))
+    surfaces = case_scores.of_surfaces(np.array([2.0, np.nan]), np.array([2.0, 9.0]), np.array([True, False]), True)
+    result = a_result(true_cases=true, case_scores=scores, surface_scores=surfaces)
+    figures = result.metrics()
+    assert figures["scans_with_true_cases"] == 3
+    assert figures["cases"]["accuracy"] == 0.8
+    assert figures["scan_surfaces"]["cut_at_pane_share"] == 1.0
+    replay_result.write(result, tmp_path, {})
+    assert json.loads((tmp_path / "metrics.json").read_text())["cases"] == figures["cases"]
+    with np.load(tmp_path / "beam_cases.npz") as written:
+        np.testing.assert_array_equal(written["true_cases"], true)
+    assert a_result().metrics()["cases"] is a_result().metrics()["scan_surfaces"] is None
+    assert a_result().metrics()["scans_with_true_cases"] is None
+
+
+def test_beams_have_the_colours_of_their_true_and_of_their_told_cases(tmp_path):
+    from PIL import Image
+
+    ends = np.array([[3.0, 0.0], [0.0, 3.0], [np.nan, np.nan]])
+    example = BeamExample(10**18, np.zeros(2), ends, np.array([4, 4, 0], np.uint8), np.array([2, 2, 0], np.uint8))
+    scores = case_scores.of_cases(np.array([4, 4, 0]), np.array([2, 2, 0]), np.array([True, True, False]))
+    pictures.draw_cases(tmp_path / "cases.png", GRID, a_result(case_scores=scores, examples=[example]), "a log")
+    with Image.open(tmp_path / "cases.png") as image:
+        pixels = np.asarray(image.convert("RGB")).astype(int)
+
+    def rows_of(colour):
+        wanted = [int(colour[i:i + 2], 16) for i in (1, 3, 5)]
+        return np.nonzero((np.abs(pixels - wanted).max(axis=2) < 3).any(axis=1))[0]
+
+    true, told = rows_of(pictures.CASE_COLOURS[4]), rows_of(pictures.CASE_COLOURS[2])
+    assert len(true)
+    assert len(told)
+    assert true.max() < told.min()  # the truth above
+
+
+def test_cases_without_examples_have_a_picture_too(tmp_path):
+    pictures.draw_cases(tmp_path / "cases.png", GRID, a_result(case_scores=case_scores.none_yet()), "a log")
+    assert (tmp_path / "cases.png").stat().st_size > 5_000

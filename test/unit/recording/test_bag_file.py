@@ -271,3 +271,62 @@ def test_a_real_bag_gives_every_scan(data_dir: Path):
     recording = open_log(data_dir / "logs" / "olin_mac" / "olin_mac.bag")
     assert len(steps(recording)) == 357
     assert recording.ground_truth.covers(np.array([step.scan.stamp_ns for step in recording]), 10**6).all()
+
+
+def half_glass(index, fields):
+    """Beams 0 to 9 through a pane at 1.5 m, the others diffuse."""
+    crossing = np.where(np.arange(60) < 10, 1.5, np.nan)
+    return {**fields, "cases": np.where(np.arange(60) < 10, 3, 1), "crossing": crossing}
+
+
+def test_the_truth_about_the_beams_is_read_scan_by_scan(room_bag):
+    bag = room_bag(true_beams=(("/true_beams", "TrueBeams"),), true_fields=half_glass)
+    recording = open_log(bag.write())
+    assert recording.notes[-1] == "true cases from /true_beams"
+    for _ in range(2):  # from the start, every time the same
+        truth = list(recording.beam_truth)
+        assert [each.stamp_ns for each in truth] == bag.stamps_ns.tolist()
+        assert truth[7].case.dtype == np.uint8
+        np.testing.assert_array_equal(truth[7].case, [3] * 10 + [1] * 50)
+        np.testing.assert_array_equal(truth[7].crossing_m, [1.5] * 10 + [np.nan] * 50)
+    assert recording.in_memory().beam_truth[7].stamp_ns == bag.stamps_ns[7]
+
+
+def test_true_cases_of_another_simulator_have_no_crossings(room_bag):
+    recording = open_log(room_bag(true_beams=(("/sim/true_cases", "BeamCases"), ("/beam_cases", "BeamCases"))).write())
+    assert recording.notes[-1] == "true cases from /sim/true_cases"  # the other one is what a localizer told
+    truth = next(iter(recording.beam_truth))
+    assert truth.crossing_m is None
+    assert truth.case.tolist() == [1] * 60
+
+
+@pytest.mark.parametrize("topics, option", [
+    ((), None), ((("/beam_cases", "BeamCases"),), None), ((("/true_beams", "TrueBeams"),), "none")])
+def test_without_truth_about_the_beams_there_is_none(room_bag, topics, option):
+    recording = open_log(room_bag(true_beams=topics).write(), LogOptions(true_beams=option))
+    assert recording.beam_truth is None
+    assert recording.in_memory().beam_truth is None
+
+
+def test_the_topic_of_the_truth_can_be_chosen(room_bag):
+    topics = (("/a", "TrueBeams"), ("/b", "TrueBeams"))
+    path = room_bag(true_beams=topics).write()
+    assert refusal(path) == ("room.bag: 2 topics with the truth about beams (/a, /b), choose one with --true-beams")
+    assert open_log(path, LogOptions(true_beams="b")).notes[-1] == "true cases from /b"
+    assert refusal(path, LogOptions(true_beams="/scan")) == (
+        "room.bag: /scan is sensor_msgs/LaserScan, expected glass_nav/TrueBeams or glass_nav/BeamCases")
+    path.unlink()
+    assert open_log(room_bag(true_beams=(*topics, ("/true_beams", "TrueBeams"))).write()).notes[-1] == (
+        "true cases from /true_beams")
+
+
+@pytest.mark.parametrize("changes, text", [
+    ({"cases": [1, 9, 2]}, "room.bag: /true_beams at 1000.300 s: cases must be 0 to 4, got 9"),
+    ({"crossing": [1.0]}, "room.bag: /true_beams at 1000.300 s: 60 cases, but 1 crossings")])
+def test_truth_that_is_none_is_refused(room_bag, changes, text):
+    bag = room_bag(true_beams=(("/true_beams", "TrueBeams"),),
+                   true_fields=lambda index, fields: {**fields, **(changes if index == 3 else {})})
+    recording = open_log(bag.write())
+    with pytest.raises(RecordingError) as caught:
+        list(recording.beam_truth)
+    assert str(caught.value).replace(f"{bag.path.parent}/", "") == text
