@@ -1,0 +1,79 @@
+"""Building -> GridMap: what a mapper with a lidar drew before anything changed.
+
+The mapper drove all paths and looked into the rooms of the points `seen`. Everything that can be reached from there
+without crossing a surface is free, every surface that borders on it is occupied, glass like any wall. The rest is
+unknown: the inside of walls and furniture, the far side of walls, rooms that nobody saw, outside. H rows, W columns.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Tuple
+
+import numpy as np
+from scipy import ndimage
+
+from glass_nav.simulation.building import OPAQUE, Building
+from glass_nav.world.grid_map import UNKNOWN, GridMap
+
+MARGIN_M = 1.0     # of unknown cells around the building
+RESOLUTION_M = 0.05
+STEPS_PER_CELL = 10
+
+
+def draw(building: Building, resolution_m: float = RESOLUTION_M) -> GridMap:
+    """The map of a building: mapped things only, those that are gone included.
+
+    Args:
+        building: open to the outside, the outside within MARGIN_M counts as seen.
+        resolution_m: edge of a cell, > 0.
+    """
+    if not (np.isfinite(resolution_m) and resolution_m > 0.0):
+        raise ValueError(f"a map needs resolution > 0 m, got {resolution_m}")
+    from_m, to_m = _mapped_lines(building)
+    seeds = np.concatenate([building.start[None, :2], building.seen_m, *(
+        _points(path[:-1], path[1:], resolution_m) for path in building.paths.values())])
+    ends = np.concatenate([from_m, to_m, seeds])
+    low = np.floor((ends.min(axis=0) - MARGIN_M) / resolution_m).astype(int)
+    columns, rows = np.ceil((ends.max(axis=0) + MARGIN_M) / resolution_m).astype(int) - low
+    grid = GridMap(np.full((rows, columns), UNKNOWN, np.int8), resolution_m, np.append(low * resolution_m, 0.0))
+    surface = np.zeros((rows, columns), bool)
+    surface[grid.cells(_points(from_m, to_m, resolution_m / STEPS_PER_CELL))] = True
+    regions, _ = ndimage.label(~surface)  # of cells that share an edge
+    reached = np.unique(regions[grid.cells(seeds)])
+    free = np.isin(regions, reached[reached > 0])
+    grid.occupancy[free] = 0
+    grid.occupancy[surface & ndimage.binary_dilation(free, np.ones((3, 3), bool))] = 100
+    return grid
+
+
+def is_drawn(building: Building, points_m: np.ndarray) -> np.ndarray:
+    """(...) bool: at the point (..., 2) or in a cell next to it the map of the building has a surface."""
+    grid, near = _near_surfaces(building)
+    rows, columns = grid.cells(points_m)
+    inside = grid.contains(rows, columns)
+    return inside & near[np.where(inside, rows, 0), np.where(inside, columns, 0)]
+
+
+@lru_cache(maxsize=16)
+def _near_surfaces(building: Building) -> Tuple[GridMap, np.ndarray]:
+    """The map, and (H, W) bool: occupied there or in one of the 8 cells around."""
+    grid = draw(building)
+    return grid, ndimage.binary_dilation(grid.occupied, np.ones((3, 3), bool))
+
+
+def _mapped_lines(building: Building) -> Tuple[np.ndarray, np.ndarray]:
+    """Ends (L, 2), (L, 2) of what is drawn; a glazing is one line."""
+    surfaces = building.surfaces
+    opaque = surfaces.mapped & (surfaces.kind == OPAQUE)
+    glass = np.array([part.line_m for part in (*building.panes, *building.mirrors)], float).reshape(-1, 2, 2)
+    return (np.concatenate([surfaces.from_m[opaque], glass[:, 0]]),
+            np.concatenate([surfaces.to_m[opaque], glass[:, 1]]))
+
+
+def _points(from_m: np.ndarray, to_m: np.ndarray, step_m: float) -> np.ndarray:
+    """(N, 2) points along all the lines, both ends included, no further apart than step_m."""
+    steps = np.ceil(np.hypot(*(to_m - from_m).T) / step_m).astype(int) + 1
+    line = np.repeat(np.arange(len(steps)), steps + 1)
+    number = np.arange(len(line)) - np.repeat(np.cumsum(steps + 1) - (steps + 1), steps + 1)
+    return from_m[line] + (number / steps[line])[:, None] * (to_m - from_m)[line]

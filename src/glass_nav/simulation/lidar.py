@@ -1,0 +1,335 @@
+"""Building, lidar, pose -> one scan and the truth about each of its beams.
+
+Every beam has several ways back: from each pane on its way, from what stands behind them, and by a mirror image in the
+first or the second glazing. Each way has an echo power (reference figures: Fresnel for panes, Lambert for what is
+diffuse, distances squared); what is above the detection floor competes, and the lidar reports the first, the strongest
+or the last. Not modelled: two mirrors on one way, beams wider than a line, the robot's own body.
+
+B beams, K panes on a way; ranges in m, inf where there is nothing.
+"""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass, fields
+from typing import Dict, List, Tuple
+
+import numpy as np
+
+from glass_nav.geometry import angles
+from glass_nav.simulation import building_map, glass, people
+from glass_nav.simulation.building import MIRROR, OPAQUE, Building, Surfaces, joined
+
+ECHOES = ("first", "strongest", "last")
+VISIBILITIES = ("logistic", "lobe")
+UNCERTAIN, DIFFUSE, MIRRORED, BEHIND_ONE, BEHIND_TWO = 0, 1, 2, 3, 4  # true cases
+FLOOR_REFLECTANCE = 0.1  # what a lidar still sees at its largest range, face on
+USUAL_DIRT = 0.004       # of a pane; dirty_share is the model's for this
+LARGEST_PANES = 8        # of one way that are looked at, two for each double glazing
+NEAR_M = 1e-6            # a mirrored way does not meet its mirror
+ENDS = 1e-9              # share by which a surface is longer than it is: no beam slips through a corner
+
+
+@dataclass(frozen=True)
+class LidarModel:
+    """A 2D lidar and how it sees glass."""
+    beams: int = 541
+    field_of_view_rad: float = 1.5 * np.pi
+    range_min_m: float = 0.1
+    range_max_m: float = 25.0
+    noise_m: float = 0.015        # sigma of a range
+    dropout: float = 0.005        # share of the beams that come back and are lost
+    echo: str = "strongest"       # which one is reported: one of ECHOES
+    visibility: str = "logistic"  # of panes: "logistic" share of beams by incidence, or "lobe" power by incidence
+    half_rad: float = np.deg2rad(16.5)   # logistic: half of the beams return from a clean pane
+    width_rad: float = np.deg2rad(2.5)   # logistic: 12 to 88 percent within two widths to either side
+    dirty_share: float = 0.12     # logistic: of a usual pane, the share of spots that return a beam at any incidence
+    specular: float = 1.0         # A: power of a pane face on at 1 m; a white wall has 1
+    lobe_rad: float = np.deg2rad(5.0)    # lobe: theta_s
+    coating: float = 1.0          # factor on that of every pane of the building
+
+    def __post_init__(self) -> None:
+        if isinstance(self.beams, bool) or not isinstance(self.beams, (int, np.integer)) or self.beams < 2:
+            raise ValueError(f"lidar beams must be a whole number >= 2, got {self.beams!r}")
+        for name, known in (("echo", ECHOES), ("visibility", VISIBILITIES)):
+            if getattr(self, name) not in known:
+                raise ValueError(f"lidar {name} must be one of {', '.join(known)}, got {getattr(self, name)!r}")
+        if not 0.0 < self.field_of_view_rad <= 2.0 * np.pi:
+            raise ValueError(f"lidar field_of_view_rad must be > 0 and <= 2 pi, got {self.field_of_view_rad}")
+        if not 0.0 <= self.range_min_m < self.range_max_m < np.inf:
+            raise ValueError("lidar ranges must be 0 <= range_min_m < range_max_m, finite, got "
+                             f"{self.range_min_m} and {self.range_max_m}")
+        for name in ("dropout", "dirty_share"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ValueError(f"lidar {name} must be 0 to 1, got {getattr(self, name)}")
+        for name in ("noise_m", "specular", "half_rad"):
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise ValueError(f"lidar {name} must be >= 0, got {getattr(self, name)}")
+        for name in ("width_rad", "lobe_rad", "coating"):
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise ValueError(f"lidar {name} must be > 0, got {getattr(self, name)}")
+
+    @property
+    def angles_rad(self) -> np.ndarray:
+        """(B,) directions in the laser's frame, counter-clockwise, the middle ahead; all round, none twice."""
+        half = self.field_of_view_rad / 2.0
+        all_round = self.field_of_view_rad > 2.0 * np.pi - 1e-9
+        return np.linspace(-half, half, self.beams, endpoint=not all_round)
+
+
+PRESETS: Dict[str, LidarModel] = {
+    "sensitive": LidarModel(),
+    "weak": LidarModel(half_rad=np.deg2rad(4.0), width_rad=np.deg2rad(0.8), dirty_share=0.01, noise_m=0.02),
+    "coated": LidarModel(coating=4.0),
+}
+
+
+def preset(name: str) -> LidarModel:
+    """The model of this name.
+
+    Raises:
+        ValueError: there is none.
+    """
+    if name not in PRESETS:
+        near = difflib.get_close_matches(str(name), list(PRESETS), n=1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise ValueError(f"unknown lidar preset {name!r}, known are {', '.join(PRESETS)}{hint}")
+    return PRESETS[name]
+
+
+@dataclass(frozen=True)
+class TrueScan:
+    """What the lidar says, and what each beam did in terms of the map.
+
+    Cases: 1 ended at the first mapped surface on its way; 3 and 4 passed one and two mapped panes and ended at the
+    second and third mapped surface; 2 was mirrored at the first mapped surface, then ended at the first mapped one on
+    the mirrored way; 0 all else. The sheets of a double glazing are one surface.
+    """
+    ranges_m: np.ndarray    # (B,) REP 117: inf no answer, -inf nearer than range_min
+    case: np.ndarray        # (B,) uint8
+    exact_m: np.ndarray     # (B,) length of the way without noise, NaN: no answer
+    crossing_m: np.ndarray  # (B,) where it passed or was mirrored at the first mapped pane, NaN: neither
+
+
+@dataclass(frozen=True)
+class _Ways:
+    """What B rays meet up to the first opaque surface. Panes by ascending range, inf where there is none."""
+    pane_m: np.ndarray        # (B, K)
+    pane: np.ndarray          # (B, K) index of the surface
+    cos: np.ndarray           # (B, K) of the incidence
+    met: np.ndarray           # (B, K) bool: there is this pane
+    pane_mapped: np.ndarray   # (B, K) bool
+    passed: np.ndarray        # (B, K) int: mapped glazings on the way to this pane
+    end_m: np.ndarray         # (B,)
+    end_power: np.ndarray     # (B,) of the opaque surface at 1 m, panes not counted: rho cos
+    end_mapped: np.ndarray    # (B,) bool
+    end_passed: np.ndarray    # (B,) int: mapped glazings on the way to it
+    missing_m: np.ndarray     # (B,) where something mapped is no longer
+
+
+@dataclass(frozen=True)
+class _Echoes:
+    """One way back for each beam."""
+    power: np.ndarray       # (B,) 0: none
+    range_m: np.ndarray     # (B,)
+    case: np.ndarray        # (B,)
+    crossing_m: np.ndarray  # (B,) NaN: none
+
+
+def scan(model: LidarModel, building: Building, map_from_laser: np.ndarray, time_s: float,
+         rng: np.random.Generator) -> TrueScan:
+    """One turn of the lidar, all beams at one moment.
+
+    Args:
+        model: the lidar.
+        building: its people walk, everything else stands.
+        map_from_laser: (3,) pose.
+        time_s: since the start of the building's clock.
+        rng: noise, dropouts, which spots of a pane are seen.
+    """
+    map_from_laser = np.asarray(map_from_laser, float)
+    surfaces = joined(building.surfaces, people.surfaces(building.people, time_s, map_from_laser[:2]))
+    cos, sin = angles.cos_sin(map_from_laser[2] + model.angles_rad)
+    ray = np.stack([cos, sin], axis=-1)
+    direct = _ways(building, surfaces, map_from_laser[None, :2], ray)
+    reflected, passing = _pane_light(model, surfaces, direct)
+    first_m = np.where(direct.pane_mapped, direct.pane_m, np.inf).min(axis=1, initial=np.inf)  # first mapped pane
+    echoes = _direct_echoes(model, surfaces, direct, passing, first_m, rng)
+    echoes += _mirrored_echoes(model, building, surfaces, map_from_laser[:2], ray, direct, reflected, passing, first_m,
+                               rng)
+    return _reported(model, echoes, first_m, rng)
+
+
+def _reported(model: LidarModel, echoes: List[_Echoes], first_m: np.ndarray, rng: np.random.Generator) -> TrueScan:
+    power, range_m, case, crossing_m = (np.stack([getattr(echo, field.name) for echo in echoes], axis=1)
+                                        for field in fields(_Echoes))  # (B, ways)
+    heard = (power > FLOOR_REFLECTANCE / model.range_max_m ** 2) & (range_m <= model.range_max_m)
+    rank = {"first": -range_m, "last": range_m, "strongest": power}[model.echo]
+    best = np.argmax(np.where(heard, rank, -np.inf), axis=1)
+    beams = np.arange(len(best))
+    exact_m = range_m[beams, best]
+    noise_m = model.noise_m * rng.standard_normal(len(beams))
+    lost = rng.random(len(beams)) < model.dropout
+    with np.errstate(invalid="ignore"):
+        measured_m = exact_m + noise_m
+    near = heard[beams, best] & ~lost & (measured_m < model.range_min_m)
+    answered = heard[beams, best] & ~lost & ~near & (measured_m <= model.range_max_m)
+    passed_m = np.where(first_m <= model.range_max_m, first_m, np.nan)  # by what did not come back
+    return TrueScan(np.where(answered, measured_m, np.where(near, -np.inf, np.inf)),
+                    np.where(answered, case[beams, best], UNCERTAIN).astype(np.uint8),
+                    np.where(answered, exact_m, np.nan),
+                    np.where(answered, crossing_m[beams, best], passed_m))
+
+
+def _direct_echoes(model: LidarModel, surfaces: Surfaces, direct: _Ways, passing: np.ndarray, first_m: np.ndarray,
+                   rng: np.random.Generator) -> List[_Echoes]:
+    """From every pane on the way and from the end of it; passing (B, K + 1) is the light that comes so far."""
+    behind = np.array([DIFFUSE, BEHIND_ONE, BEHIND_TWO, UNCERTAIN])
+    pane_power = _pane_power(model, surfaces, direct, rng)
+    echoes = []
+    for k in range(direct.pane_m.shape[1] + 1):
+        at_end = k == direct.pane_m.shape[1]
+        range_m = direct.end_m if at_end else direct.pane_m[:, k]
+        mapped = direct.end_mapped if at_end else direct.pane_mapped[:, k]
+        passed = direct.end_passed if at_end else direct.passed[:, k]
+        power = (direct.end_power if at_end else pane_power[:, k]) * passing[:, k] ** 2 / range_m ** 2
+        known = mapped & (direct.missing_m >= range_m)
+        echoes.append(_Echoes(power, range_m, np.where(known, behind[np.minimum(passed, 3)], UNCERTAIN),
+                              np.where(passed > 0, first_m, np.nan)))
+    return echoes
+
+
+def _mirrored_echoes(model: LidarModel, building: Building, surfaces: Surfaces, origin_m: np.ndarray, ray: np.ndarray,
+                     direct: _Ways, reflected: np.ndarray, passing: np.ndarray, first_m: np.ndarray,
+                     rng: np.random.Generator) -> List[_Echoes]:
+    """By the mirror image in the first and in the second glazing."""
+    glazing = np.where(direct.met, surfaces.glazing[direct.pane], -1)
+    echoes: List[_Echoes] = []
+    for mirror in range(2):
+        if not glazing.shape[1]:
+            break
+        other = direct.met & (glazing != glazing[:, :1])
+        at = np.zeros(len(ray), int) if mirror == 0 else np.argmax(other, axis=1)  # (B,) which pane mirrors
+        rows = np.flatnonzero(direct.met[:, 0] if mirror == 0 else other.any(axis=1))
+        if not len(rows):
+            break
+        at = at[rows]
+        to_mirror_m = direct.pane_m[rows, at]
+        index = direct.pane[rows, at]
+        line = surfaces.to_m[index] - surfaces.from_m[index]
+        line /= np.hypot(line[:, 0], line[:, 1])[:, None]
+        mirrored_ray = 2.0 * (ray[rows] * line).sum(axis=1)[:, None] * line - ray[rows]
+        ways = _ways(building, surfaces, origin_m + to_mirror_m[:, None] * ray[rows], mirrored_ray)
+        _, on_way = _pane_light(model, surfaces, ways)
+        pane_power = _pane_power(model, surfaces, ways, rng)
+        light = passing[rows, at] * reflected[rows, at]
+        before = direct.passed[rows, at]  # mapped glazings on the way to the mirror
+        known = direct.pane_mapped[rows, at] & (before == 0) & (direct.missing_m[rows] >= to_mirror_m)
+        crossed_m = np.where((before > 0) | direct.pane_mapped[rows, at], first_m[rows], np.nan)
+        for k in range(ways.pane_m.shape[1] + 1):
+            at_end = k == ways.pane_m.shape[1]
+            further_m = ways.end_m if at_end else ways.pane_m[:, k]
+            mapped = ways.end_mapped if at_end else ways.pane_mapped[:, k]
+            passed = ways.end_passed if at_end else ways.passed[:, k]
+            range_m = to_mirror_m + further_m
+            power = (ways.end_power if at_end else pane_power[:, k]) * (light * on_way[:, k]) ** 2 / range_m ** 2
+            case = np.where(known & mapped & (passed == 0) & (ways.missing_m >= further_m), MIRRORED, UNCERTAIN)
+            later_m = np.where(ways.pane_mapped, ways.pane_m, np.inf).min(axis=1, initial=np.inf)
+            crossing_m = np.where(np.isnan(crossed_m) & (passed > 0), to_mirror_m + later_m, crossed_m)
+            echoes.append(_Echoes(_spread(power, rows, len(ray), 0.0), _spread(range_m, rows, len(ray), np.inf),
+                                  _spread(case, rows, len(ray), UNCERTAIN),
+                                  _spread(crossing_m, rows, len(ray), np.nan)))
+    return echoes
+
+
+def _ways(building: Building, surfaces: Surfaces, origin_m: np.ndarray, ray: np.ndarray) -> _Ways:
+    """Follow rays (B, 2) of length 1 from origins (B, 2) or (1, 2)."""
+    opaque = np.flatnonzero((surfaces.kind == OPAQUE) & surfaces.present)
+    panes = np.flatnonzero((surfaces.kind != OPAQUE) & surfaces.present)
+    missing = np.flatnonzero(surfaces.mapped & ~surfaces.present)
+    end_m, end, end_cos = _nearest(surfaces, opaque, origin_m, ray)
+    end_at = origin_m + np.where(np.isfinite(end_m), end_m, 0.0)[:, None] * ray
+    missing_m, _, _ = _nearest(surfaces, missing, origin_m, ray)
+    if len(missing):
+        missing_at = origin_m + np.where(np.isfinite(missing_m), missing_m, 0.0)[:, None] * ray
+        missing_m = np.where(building_map.is_drawn(building, missing_at), missing_m, np.inf)
+
+    pane_m, cos = _crossings(surfaces, panes, origin_m, ray)  # (B, all panes)
+    pane_m[pane_m >= end_m[:, None]] = np.inf
+    most = min(int(np.isfinite(pane_m).sum(axis=1).max(initial=0)), LARGEST_PANES)
+    order = np.argsort(pane_m, axis=1)[:, :most]
+    pane_m, cos = np.take_along_axis(pane_m, order, axis=1), np.take_along_axis(cos, order, axis=1)
+    met = np.isfinite(pane_m)
+    pane = panes[order] if len(panes) else order
+    at = origin_m[:, None] + np.where(met, pane_m, 0.0)[..., None] * ray[:, None]
+    mapped = met & surfaces.mapped[pane] & building_map.is_drawn(building, at)
+    glazing = surfaces.glazing[pane]
+    opens = np.ones(met.shape, bool)  # the first sheet of its glazing on this way
+    opens[:, 1:] = glazing[:, 1:] != glazing[:, :-1]
+    count = np.cumsum(mapped & opens, axis=1)
+    return _Ways(pane_m, pane, cos, met, mapped, np.maximum(count - mapped, 0), end_m,
+                 surfaces.reflectance[end] * end_cos if len(opaque) else np.zeros(len(ray)),
+                 (surfaces.mapped[end] & building_map.is_drawn(building, end_at)) if len(opaque)
+                 else np.zeros(len(ray), bool),
+                 count[:, -1] if most else np.zeros(len(ray), int), missing_m)
+
+
+def _nearest(surfaces: Surfaces, chosen: np.ndarray, origin_m: np.ndarray,
+             ray: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Range to the nearest of the chosen surfaces, its index and cos of the incidence, all (B,)."""
+    if not len(chosen):
+        return np.full(len(ray), np.inf), np.zeros(len(ray), int), np.zeros(len(ray))
+    range_m, cos = _crossings(surfaces, chosen, origin_m, ray)
+    best = np.argmin(range_m, axis=1)
+    beams = np.arange(len(ray))
+    return range_m[beams, best], chosen[best], cos[beams, best]
+
+
+def _crossings(surfaces: Surfaces, chosen: np.ndarray, origin_m: np.ndarray,
+               ray: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Ranges at which rays cross the chosen surfaces, inf: not, and cos of the incidence; both (B, chosen)."""
+    from_m = surfaces.from_m[chosen]
+    line = surfaces.to_m[chosen] - from_m
+    to_x, to_y = (from_m[:, axis] - origin_m[:, axis:axis + 1] for axis in range(2))
+    across = ray[:, :1] * line[:, 1] - ray[:, 1:] * line[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        range_m = (to_x * line[:, 1] - to_y * line[:, 0]) / across
+        share = (to_x * ray[:, 1:] - to_y * ray[:, :1]) / across
+        met = (range_m > NEAR_M) & (share >= -ENDS) & (share <= 1.0 + ENDS)
+    cos = np.abs(across) / np.hypot(line[:, 0], line[:, 1])
+    return np.where(met, range_m, np.inf), np.minimum(cos, 1.0)
+
+
+def _pane_light(model: LidarModel, surfaces: Surfaces, ways: _Ways) -> Tuple[np.ndarray, np.ndarray]:
+    """Share of the light that each pane (B, K) mirrors, of a glazing all its sheets; and the share that comes as far as
+    pane k, or for k = K through them all (B, K + 1)."""
+    coating = surfaces.coating[ways.pane] * model.coating
+    is_mirror = surfaces.kind[ways.pane] == MIRROR
+    _, through = glass.sheet(ways.cos, coating, surfaces.thickness_m[ways.pane])
+    through = np.where(ways.met, np.where(is_mirror, 0.0, through), 1.0)
+    reflected = np.where(is_mirror, surfaces.reflectance[ways.pane],
+                         glass.reflectance(ways.cos, coating, surfaces.sheets[ways.pane]))
+    start = np.ones((len(through), 1))
+    return reflected, np.cumprod(np.concatenate([start, through], axis=1), axis=1)
+
+
+def _pane_power(model: LidarModel, surfaces: Surfaces, ways: _Ways, rng: np.random.Generator) -> np.ndarray:
+    """Power (B, K) of what each pane itself sends back to the lidar, at 1 m."""
+    incidence_rad = np.arccos(ways.cos)
+    dirt = surfaces.dirt[ways.pane]
+    if model.visibility == "lobe":
+        speckle = rng.exponential(size=ways.cos.shape)  # of coherent light on dust: the power is exponential
+        power = model.specular * np.exp(-(incidence_rad / model.lobe_rad) ** 2) + dirt * ways.cos * speckle
+    else:
+        seen = glass.visibility(incidence_rad, model.half_rad, model.width_rad)
+        dirty = np.minimum(model.dirty_share * dirt / USUAL_DIRT * ways.cos, 1.0)
+        spot = rng.random(ways.cos.shape) < dirty + (1.0 - dirty) * seen
+        power = np.where(spot, model.specular, 0.0) + dirt * ways.cos
+    return np.where(ways.met, power, 0.0)
+
+
+def _spread(values: np.ndarray, rows: np.ndarray, beams: int, rest: float) -> np.ndarray:
+    """(B,) values at their rows, the rest elsewhere."""
+    whole = np.full(beams, rest, float)
+    whole[rows] = values
+    return whole
