@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from typing import List, Optional
+from typing import Any, Dict, List, Optional
 
 DONE, USAGE, BAD_INPUT, INTERRUPTED = 0, 2, 3, 130
 
@@ -19,33 +19,39 @@ def main(argv: Optional[List[str]] = None) -> int:
         0 done, 2 wrong usage, 3 bad input (a line on stderr says what), 130 interrupted.
     """
     try:
-        from glass_nav.cli import replay
+        from glass_nav.cli import replay, simulate
     except ImportError as err:
         if not str(err.name).startswith("glass_nav"):
             raise
         print(f"glass_nav: {err.name or err} is not there: build the package and source its setup.bash",
               file=sys.stderr)
         return BAD_INPUT
+    modules: Dict[str, Any] = {"replay": replay, "simulate": simulate}  # each: see replay.py
     parser = argparse.ArgumentParser(prog="glass_nav", description="Localization in buildings of glass: offline tools.")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     commands.required = True  # as an attribute: the argument came with Python 3.7 only for some callers
-    replay.add_arguments(commands.add_parser("replay", help="run the localization on a recorded log",
-                                             description=replay.DESCRIPTION))
+    for name, module in modules.items():
+        module.add_arguments(commands.add_parser(name, help=module.HELP, description=module.DESCRIPTION))
     try:
         arguments = parser.parse_args(argv)
     except SystemExit as err:  # argparse has written what is wrong
         return int(err.code or 0)
-    wrong = replay.usage_error(arguments)
+    return _run(f"glass_nav {arguments.command}", modules[arguments.command], arguments)
+
+
+def _run(program: str, module: Any, arguments: argparse.Namespace) -> int:
+    """One subcommand, its errors as a line and an exit code."""
+    wrong = module.usage_error(arguments)
     if wrong is not None:
-        print(f"glass_nav replay: {wrong}", file=sys.stderr)
+        print(f"{program}: {wrong}", file=sys.stderr)
         return USAGE
     try:
-        replay.main(arguments)
-    except (ValueError, OSError) as err:  # RecordingError, MapError and ParamError are ValueErrors
-        print(f"glass_nav replay: {_one_line(err)}", file=sys.stderr)
+        module.main(arguments)
+    except (ValueError, OSError) as err:  # RecordingError, MapError, ParamError and others are ValueErrors
+        print(f"{program}: {_one_line(err)}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
-        print("glass_nav replay: interrupted, nothing written", file=sys.stderr)
+        print(f"{program}: interrupted, nothing written", file=sys.stderr)
         return INTERRUPTED
     return DONE
 

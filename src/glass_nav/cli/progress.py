@@ -13,8 +13,8 @@ WIDTH = 30
 class Progress:
     """Counts `total` things; step() once each, finish() at the end."""
 
-    def __init__(self, what: str, total: int, stream: Optional[TextIO] = None) -> None:
-        self._what, self._total = what, total
+    def __init__(self, what: str, total: int, stream: Optional[TextIO] = None, unit: str = "scans") -> None:
+        self._what, self._total, self._unit = what, total, unit
         self._stream = sys.stderr if stream is None else stream
         self._tty = self._stream.isatty()
         self._start = self._shown = time.monotonic()
@@ -38,7 +38,7 @@ class Progress:
     def _show(self, now: float) -> None:
         share = min(self._done / self._total, 1.0) if self._total else 1.0
         left = (now - self._start) * (1.0 - share) / share if share else 0.0
-        text = f"{self._what}: {self._done} of {self._total} scans, {clock(left)} left"
+        text = f"{self._what}: {self._done} of {self._total} {self._unit}, {clock(left)} left"
         if self._tty:
             filled = int(WIDTH * share)
             self._stream.write(f"\r[{'#' * filled}{'.' * (WIDTH - filled)}] {text}\x1b[K")

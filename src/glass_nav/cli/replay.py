@@ -24,6 +24,7 @@ from glass_nav.recording.log_file import open_log
 from glass_nav.recording.recording import LogOptions, Recording
 from glass_nav.world import map_file
 
+HELP = "run the localization on a recorded log"
 DESCRIPTION = """Runs the localization on a recorded log, every scan of it, and writes metrics.json,
 trajectory.tum, per_scan.csv, beam_cases.npz and trajectory.png; where the log has the truth about its beams, as
 simulated ones do, also the scores of the cases and cases.png. Needs no roscore."""

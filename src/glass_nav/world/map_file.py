@@ -39,15 +39,15 @@ def load(path: "Union[str, os.PathLike[str]]") -> GridMap:
     raise MapError(f"{path}: a map is a map_server .yaml or an MRPT .gridmap[.gz]")
 
 
-def save(grid_map: GridMap, path_yaml: "Union[str, os.PathLike[str]]") -> None:
+def save(grid_map: GridMap, path_yaml: "Union[str, os.PathLike[str]]", image_suffix: str = ".pgm") -> None:
     """Write a map_server yaml, and beside it the image of the same name; load() gives an equal map, but for 99 percent,
     which mode scale does not have: it comes back as 98.
 
-    The image is a .pgm in mode trinary, or, for a map with percentages between 0 and 100, a .png in mode
-    scale with the unknown cells transparent.
+    The image has that suffix (.pgm, .png) and is in mode trinary; for a map with percentages between 0 and 100 it is a
+    .png in mode scale with the unknown cells transparent.
     """
     path_yaml = Path(path_yaml)
-    path_image = path_yaml.with_suffix(".pgm")
+    path_image = path_yaml.with_suffix(image_suffix)
     occupancy = grid_map.occupancy.astype(int)
     graded = not np.isin(occupancy, (UNKNOWN, 0, 100)).all()
     free, occupied = (0.002, 0.998) if graded else (0.196, 0.65)  # those of map_saver, or nearly all graded

@@ -1,0 +1,154 @@
+"""glass_nav simulate: a robot drives through a building of walls and glass, and a bag records it. No roscore."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Optional, Union
+
+import numpy as np
+
+from glass_nav.cli.progress import Progress
+from glass_nav.recording.bag_writer import BagWriter
+from glass_nav.simulation import building_file, building_map, lidar, path_follower, shipped_buildings
+from glass_nav.simulation.lidar import ECHOES, LidarModel
+from glass_nav.simulation.building import Building
+from glass_nav.simulation.path_follower import FollowerParams
+from glass_nav.simulation.robot import KINDS, RobotParams
+from glass_nav.simulation.simulation import Frame, Simulation
+from glass_nav.world import map_file
+
+HELP = "drive a robot through a building of glass and record a bag"
+DESCRIPTION = """Drives a robot along a path through a building, and writes a bag of what it records (/scan, /odom, /tf,
+/clock) with the truth beside (/ground_truth, /true_beams: the case of every beam), and the map of the building.
+Needs no roscore. The same seed gives the same bag."""
+CASES = ("uncertain", "diffuse", "specular", "first penetration", "second penetration")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of the subcommand."""
+    parser.add_argument("building", metavar="BUILDING",
+                        help="building.yaml, its folder, or the name of a building of the package: "
+                             f"{', '.join(shipped_buildings.shipped())}")
+    parser.add_argument("--out", required=True, type=Path, metavar="BAG",
+                        help="the bag, such as run.bag; the map goes beside it as run.map.yaml")
+    parser.add_argument("--path", metavar="NAME_OR_FILE",
+                        help="a path of the building, or a file of waypoints: yaml, a list of [x, y], or lines of x,y; "
+                             "default: the building's first path")
+    parser.add_argument("--lidar", default="sensitive", metavar="PRESET",
+                        help=f"{', '.join(lidar.PRESETS)} (default sensitive)")
+    parser.add_argument("--robot", default="diff", choices=KINDS, help="its kind of base (default diff)")
+    parser.add_argument("--seed", type=int, default=0, help="of everything random (default 0)")
+    parser.add_argument("--changed", type=float, default=0.0, metavar="SHARE",
+                        help="0 to 1 of the movable furniture stands elsewhere than on the map (default 0)")
+    parser.add_argument("--rate", type=float, default=10.0, metavar="HZ", help="scans a second (default 10)")
+    parser.add_argument("--beams", type=int, metavar="N", help="of a scan; default: the preset's")
+    parser.add_argument("--echo", choices=ECHOES, help="which echo the lidar reports; default: the preset's")
+    parser.add_argument("--speed", type=float, default=0.6, metavar="M_S", help="m/s along the path (default 0.6)")
+    parser.add_argument("--resolution", type=float, default=0.05, metavar="M", help="cell of the map, m (default 0.05)")
+
+
+def usage_error(arguments: argparse.Namespace) -> Optional[str]:
+    """What is wrong with the options as such, before any file is opened."""
+    if arguments.seed < 0:
+        return f"--seed must be >= 0, got {arguments.seed}"
+    if not 0.0 <= arguments.changed <= 1.0:
+        return f"--changed must be 0 to 1, got {arguments.changed}"
+    if not 0.1 <= arguments.rate <= 1000.0:
+        return f"--rate must be 0.1 to 1000 Hz, got {arguments.rate}"
+    if not 0.0 < arguments.speed < math.inf:
+        return f"--speed must be > 0 m/s, got {arguments.speed}"
+    if not 0.01 <= arguments.resolution <= 1.0:
+        return f"--resolution must be 0.01 to 1 m, got {arguments.resolution}"
+    try:
+        _lidar_model(arguments)
+    except ValueError as err:
+        return str(err)
+    return None
+
+
+def main(arguments: argparse.Namespace) -> None:
+    """Load, drive, write.
+
+    Raises:
+        BuildingError, PathError, SimulationError, RecordingError, OSError: bad input; one line.
+    """
+    building = building_file.load(shipped_buildings.find(arguments.building))
+    simulation = Simulation(building, _lidar_model(arguments), RobotParams(arguments.robot), seed=arguments.seed,
+                            scan_rate_hz=arguments.rate, changed_share=arguments.changed)
+    path, pace = _path(building, arguments.path), FollowerParams(speed_m_s=arguments.speed)
+    follower = simulation.follower(path, pace)
+    arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    tally, shown_m = _Tally(), 0
+    progress = Progress("simulate", math.ceil(follower.length_m), unit="m")
+    try:
+        with BagWriter(arguments.out) as bag:
+            bag.mounting(simulation.stamp_ns, simulation.base_from_laser)
+            for frame in simulation.drive(path, pace):
+                write_frame(bag, frame, simulation.scan_period_s)
+                tally.add(frame)
+                for shown_m in range(shown_m + 1, int(tally.way_m) + 1):
+                    progress.step()
+    finally:
+        progress.finish()
+    path_map = arguments.out.with_suffix(".map.yaml")
+    map_file.save(building_map.draw(building, arguments.resolution), path_map, ".png")
+    print(f"{tally.line()}; written to {arguments.out} and {path_map}")
+
+
+def write_frame(bag: BagWriter, frame: Frame, period_s: float) -> None:
+    """All that was recorded since the frame before, and the truth of this one."""
+    for reading in frame.odometry:
+        bag.odometry(reading.stamp_ns, reading.odom_from_base, reading.velocity)
+    bag.scan(frame.scan, period_s)
+    bag.truth(frame.stamp_ns, frame.map_from_base, frame.truth.case, frame.truth.exact_m, frame.truth.crossing_m)
+
+
+class _Tally:
+    """What a run was, in a line."""
+
+    def __init__(self) -> None:
+        self._began_s = time.perf_counter()
+        self._scans = 0
+        self._cases: "Counter[int]" = Counter()
+        self._first_ns = self._last_ns = 0
+        self._last_m: Optional[np.ndarray] = None
+        self.way_m = 0.0
+
+    def add(self, frame: Frame) -> None:
+        position_m = frame.map_from_base[:2]
+        if self._last_m is None:
+            self._first_ns = frame.stamp_ns
+        else:
+            self.way_m += float(np.hypot(*(position_m - self._last_m)))
+        self._last_m, self._last_ns = position_m, frame.stamp_ns
+        self._scans += 1
+        self._cases.update(frame.truth.case.tolist())
+
+    def line(self) -> str:
+        seconds = (self._last_ns - self._first_ns) * 1e-9
+        times = seconds / max(time.perf_counter() - self._began_s, 1e-9)
+        total = sum(self._cases.values())
+        shares = ", ".join(f"{name} {100.0 * self._cases[case] / total:.1f} %" for case, name in enumerate(CASES))
+        return (f"{self._scans} scans, {self.way_m:.1f} m, {seconds:.1f} s ({times:.0f} times real time); "
+                f"beams: {shares}")
+
+
+def _lidar_model(arguments: argparse.Namespace) -> LidarModel:
+    changes = {name: getattr(arguments, name) for name in ("beams", "echo") if getattr(arguments, name) is not None}
+    return replace(lidar.preset(arguments.lidar), **changes)
+
+
+def _path(building: Building, wanted: Optional[str]) -> "Union[str, np.ndarray]":
+    """A name of the building's, or the waypoints of a file."""
+    if wanted is None:
+        if not building.paths:
+            raise path_follower.PathError(f"{building.name}: has no path; give a file of waypoints with --path")
+        return next(iter(building.paths))
+    if wanted not in building.paths and (Path(wanted).suffix or Path(wanted).is_file()):
+        return path_follower.load(Path(wanted))
+    return wanted

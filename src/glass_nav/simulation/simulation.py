@@ -1,0 +1,203 @@
+"""Building, lidar, robot, wheels -> what a robot records on its way, and the truth about it.
+
+One seed makes all of it: the furniture that moved, the lidar's noise, the robot's wheels. The same seed gives the same
+bytes, and the noise of one part does not depend on what another one draws. Times are simulated; nothing waits.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from dataclasses import dataclass
+from typing import Iterator, List, Optional, Tuple, Union
+
+import numpy as np
+
+from glass_nav.geometry import se2
+from glass_nav.sensing.scan import Scan, scan_from_fields
+from glass_nav.simulation import lidar
+from glass_nav.simulation.building import Building
+from glass_nav.simulation.lidar import LidarModel, TrueScan
+from glass_nav.simulation.odometry import Odometry, OdometryParams
+from glass_nav.simulation.path_follower import FollowerParams, PathError, PathFollower
+from glass_nav.simulation.robot import Obstacles, Robot, RobotParams
+
+START_NS = 1_600_000_000 * 10**9  # of every run: a stamp that looks like one and says nothing about when it was made
+CONTROL_S = 0.02                  # the base gets a command, and the wheels are read, at least so often
+STUCK_S = 5.0                     # a follower that makes no way for so long gives up; a turn on the spot takes 3 s
+LASER = (0.12, 0.0, 0.0)          # in front of the middle
+
+
+class SimulationError(ValueError):
+    """A run that cannot go on; one line."""
+
+
+@dataclass(frozen=True)
+class OdometrySample:
+    """One reading of the wheels."""
+    stamp_ns: int
+    odom_from_base: np.ndarray  # (3,)
+    velocity: np.ndarray        # (3,) forward, left [m/s], turn [rad/s]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One turn of the lidar, and where the robot truly was."""
+    stamp_ns: int
+    map_from_base: np.ndarray   # (3,) truth
+    odom_from_base: np.ndarray  # (3,)
+    scan: Scan
+    truth: TrueScan
+    odometry: Tuple[OdometrySample, ...]  # all readings since the frame before, the last one at stamp_ns
+    blocked: bool               # an obstacle stopped the robot since then
+
+
+class Simulation:
+    """A robot in a building: give it commands, or let it follow a path."""
+
+    def __init__(self, building: Building, lidar_model: LidarModel, robot: RobotParams = RobotParams(),
+                 odometry: OdometryParams = OdometryParams(),
+                 base_from_laser: "Union[Tuple[float, float, float], np.ndarray]" = LASER, seed: int = 0,
+                 scan_rate_hz: float = 10.0, changed_share: float = 0.0, start: Optional[np.ndarray] = None) -> None:
+        """
+        Args:
+            base_from_laser: (3,) where the laser sits.
+            seed: >= 0.
+            changed_share: of the movable things that somebody moved since the map was drawn.
+            start: (3,) map_from_base; the building's own when not given, and drive() begins at its path's start.
+
+        Raises:
+            ValueError: a value out of its range, or no room for the robot at the start.
+        """
+        if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+            raise ValueError(f"seed must be a whole number >= 0, got {seed!r}")
+        if not 0.1 <= scan_rate_hz <= 1000.0:
+            raise ValueError(f"scan rate must be 0.1 to 1000 Hz, got {scan_rate_hz}")
+        if np.shape(base_from_laser) != (3,) or not np.all(np.isfinite(base_from_laser)):
+            raise ValueError(f"the laser's pose on the robot must be finite x, y, yaw, got {base_from_laser}")
+        furniture, wheels, light = np.random.SeedSequence(seed).spawn(3)
+        self.building = building.changed(changed_share, np.random.default_rng(furniture))
+        self.lidar_model, self.scan_period_s = lidar_model, 1.0 / scan_rate_hz
+        self.base_from_laser = np.array(base_from_laser, float)
+        self._lidar_rng = np.random.default_rng(light)
+        surfaces = self.building.surfaces
+        self._obstacles = Obstacles(np.stack([surfaces.from_m, surfaces.to_m], axis=1)[surfaces.present])
+        self._robot_params = robot
+        self._wheels = Odometry(odometry, robot.kind, np.random.default_rng(wheels))
+        self._time_ns = 0  # since the start
+        self._blocked = False
+        self._robot = self._robot_at(building.start if start is None else np.asarray(start, float))
+        self._start_given = start is not None
+        self._readings: List[OdometrySample] = [self.reading]
+
+    @property
+    def stamp_ns(self) -> int:
+        return START_NS + self._time_ns
+
+    @property
+    def map_from_base(self) -> np.ndarray:
+        """(3,) truth, now."""
+        return self._robot.map_from_base
+
+    @property
+    def reading(self) -> OdometrySample:
+        """What the wheels say now."""
+        return OdometrySample(self.stamp_ns, self._wheels.odom_from_base, self._wheels.velocity)
+
+    @property
+    def blocked(self) -> bool:
+        """An obstacle stops the robot, now."""
+        return self._robot.blocked
+
+    def step(self, dt_s: float, command: np.ndarray) -> Frame:
+        """Move for that time and look: move() and look()."""
+        self.move(dt_s, command)
+        return self.look()
+
+    def move(self, dt_s: float, command: np.ndarray) -> None:
+        """Move for a time without a scan.
+
+        Args:
+            dt_s: > 0.
+            command: (3,) velocity: forward, left [m/s], turn [rad/s].
+        """
+        if not 0.0 < dt_s < math.inf:
+            raise ValueError(f"a step must take > 0 s, got {dt_s}")
+        parts = math.ceil(dt_s / CONTROL_S - 1e-6)
+        begin_ns, whole_ns = self._time_ns, round(dt_s * 1e9)
+        for part in range(1, parts + 1):
+            end_ns = begin_ns + whole_ns * part // parts
+            part_s = (end_ns - self._time_ns) * 1e-9
+            self._wheels.step(self._robot.step(command, part_s), part_s)
+            self._time_ns = end_ns
+            self._blocked = self._blocked or self._robot.blocked
+            self._readings.append(self.reading)
+
+    def look(self) -> Frame:
+        """One turn of the lidar, now."""
+        model, stamp_ns = self.lidar_model, self.stamp_ns
+        map_from_laser = se2.compose(self.map_from_base, self.base_from_laser)
+        truth = lidar.scan(model, self.building, map_from_laser, self._time_ns * 1e-9, self._lidar_rng)
+        angles_rad = model.angles_rad
+        ranges_m = truth.ranges_m.astype(np.float32)  # all that a LaserScan holds
+        scan = scan_from_fields(stamp_ns, ranges_m, float(angles_rad[0]), float(angles_rad[1] - angles_rad[0]),
+                                model.range_min_m, model.range_max_m, self.base_from_laser)
+        readings, self._readings = tuple(self._readings), []
+        blocked, self._blocked = self._blocked, False
+        return Frame(stamp_ns, self.map_from_base, self._wheels.odom_from_base, scan, truth,
+                     readings or (self.reading,), blocked)
+
+    def follower(self, path: "Union[str, np.ndarray]", p: FollowerParams = FollowerParams()) -> PathFollower:
+        """For a path of the building by name, or waypoints (W, 2). Puts a robot that has not moved yet at its start.
+
+        Raises:
+            PathError: no such path, or none that can be driven.
+        """
+        if isinstance(path, str):
+            paths = self.building.paths
+            if path not in paths:
+                near = difflib.get_close_matches(path, list(paths), n=1)
+                hint = f"; did you mean {near[0]}?" if near else ""
+                raise PathError(f"{self.building.name}: no path {path!r}, it has {', '.join(paths) or 'none'}{hint}")
+            path = paths[path]
+        follower = PathFollower(path, self._robot_params, p)
+        if self._time_ns == 0 and not self._start_given:
+            self._robot = self._robot_at(follower.start)
+        return follower
+
+    def drive(self, path: "Union[str, np.ndarray]", p: FollowerParams = FollowerParams()) -> Iterator[Frame]:
+        """Follow a path; a frame at once and then one at every turn of the lidar, until the robot stands at the end.
+
+        Raises:
+            PathError: no such path.
+            SimulationError: something stands in the way.
+        """
+        follower = self.follower(path, p)
+        yield self.look()
+        best_m, still_s = 0.0, 0.0
+        while not (follower.done and self._robot.standing):
+            yield self.follow(follower)
+            still_s = 0.0 if follower.progress_m > best_m + 1e-3 or follower.done else still_s + self.scan_period_s
+            best_m = max(best_m, follower.progress_m)
+            if still_s > STUCK_S:
+                x, y, _ = self.map_from_base
+                raise SimulationError(f"{self.building.name}: the robot is stuck at x {x:.2f} m, y {y:.2f} m after "
+                                      f"{follower.progress_m:.1f} of {follower.length_m:.1f} m: something stands in the "
+                                      "way of the path")
+
+    def follow(self, follower: PathFollower) -> Frame:
+        """Along the path until the next turn of the lidar."""
+        parts = max(1, math.ceil(self.scan_period_s / CONTROL_S - 1e-6))
+        for _ in range(parts):  # a command for each control step
+            self.move(self.scan_period_s / parts, follower.command(self.map_from_base))
+        return self.look()
+
+    def _robot_at(self, map_from_base: np.ndarray) -> Robot:
+        if map_from_base.shape != (3,) or not np.all(np.isfinite(map_from_base)):
+            raise ValueError(f"the robot's start must be finite x, y, yaw, got {map_from_base.tolist()}")
+        gap_m, radius_m = self._obstacles.clearance(map_from_base[:2]), self._robot_params.radius_m
+        if gap_m < radius_m:
+            x, y, _ = map_from_base
+            raise SimulationError(f"{self.building.name}: no room for the robot at x {x:.2f} m, y {y:.2f} m: its radius "
+                                  f"is {radius_m:g} m, the nearest obstacle {gap_m:.2f} m away")
+        return Robot(self._robot_params, map_from_base, self._obstacles)
