@@ -1,9 +1,9 @@
 """Beams that passed or ended at walls -> how glassy is each wall cell?
 
-A wall seldom lets a beam through; a pane mostly does, unless it is looked at head on. Every beam that
-was known to cross a surface of the map is evidence, weighed by how often a pane answers at that
-incidence, and kept as log odds per cell. The seed document glass_localization.txt has no such memory
-(its cases are decided scan by scan); the formulation is ours. H rows, W columns, B beams.
+A wall seldom lets a beam through, a pane mostly does unless it is looked at head on, and where a mapped
+thing is gone every beam passes. Every beam that was known to cross a surface of the map is evidence on
+both questions: can it be seen through, and is it still there? Each is kept as log odds per cell. The seed document glass_localization.txt has no such memory (its
+cases are decided scan by scan); the formulation is ours. H rows, W columns, B beams.
 """
 
 from __future__ import annotations
@@ -20,16 +20,21 @@ from glass_nav.world.grid_map import UNKNOWN, GridMap
 _LEAST_COS = 0.3          # a wall seen flatter than that is passed or met by chance
 _BEHIND_M = 0.3          # a beam that goes on for so long has passed
 _ENDED_SIGMAS = 2.5
-_HEAD_ON_SHARE, _HEAD_ON_RAD, _OBLIQUE_SHARE = 0.6, np.radians(18.0), 0.06
+_PANE_ANSWERS = 0.6                # share of the beams that a pane itself sends back, head on; about
+_OBLIQUE_ANSWERS = 0.06            # and from far to the side: dirt, frames
+_WIDE_RAD, _NARROW_RAD = np.radians(18.0), np.radians(6.0)  # lidars differ in how far from head on
+_POROUS_ANSWERS = 0.3              # of what is no straight wall: railings, shelves, plants
+_GONE_ANSWERS = 0.02
 
 
-def answers_of_a_pane(incidence_rad: np.ndarray) -> np.ndarray:
+def answers_of_a_pane(incidence_rad: np.ndarray, width_rad: float = _WIDE_RAD) -> np.ndarray:
     """Share of the beams that come back from clear glass itself, by their angle to its normal [rad].
 
     Between what is measured: 15-degree bins .56 .39 .11 .04 0 0 (URG-04LX) and .47 .09 .08 .10 .14 .10
     (RPLidar) on ordinary windows; a 64-ring lidar 5 m away has .97 .91 .82 .36 .20 .14 per 5 degrees.
     """
-    return _OBLIQUE_SHARE + _HEAD_ON_SHARE * np.exp(-((incidence_rad / _HEAD_ON_RAD) ** 2))
+    head_on = np.exp(-((incidence_rad / width_rad) ** 2))
+    return np.where(np.isnan(incidence_rad), _POROUS_ANSWERS, _OBLIQUE_ANSWERS + _PANE_ANSWERS * head_on)
 
 
 def crossings(measured_m: np.ndarray, references: ReferenceRanges,
@@ -37,7 +42,7 @@ def crossings(measured_m: np.ndarray, references: ReferenceRanges,
     """What a scan says about walls: cell, incidence and passed of GlassMap.learn().
 
     Only beams for which all samples agree: a wall that stands in the beam's way from each of them was passed, not
-    missed at its edge.
+    missed at its edge. A cell without a normal is no pane: nothing is learnt about it.
 
     Args:
         measured_m: (B,) ranges by REP 117.
@@ -51,14 +56,15 @@ def crossings(measured_m: np.ndarray, references: ReferenceRanges,
         across = np.abs((measured_m - first_m[0]) * cos[0] - depth)
         passed = measured_m > farthest + (references.thickness_m[0, 0] + depth) / cos[0] + _BEHIND_M
         ended = (across <= _ENDED_SIGMAS * residuals.sigma_m) & (farthest - nearest < _BEHIND_M / cos[0])
+    incidence = references.pane_incidence[0]
     clear = (cell >= 0) & (cos[0] >= _LEAST_COS) & np.isfinite(measured_m) & np.isfinite(farthest) & (passed | ended)
-    return cell[clear], np.arccos(np.minimum(cos[0][clear], 1.0)), passed[clear]
+    return cell[clear], incidence[clear], passed[clear]
 
 
 @dataclass(frozen=True)
 class GlassEvidence:
     """How much a crossing of a wall of the map says."""
-    glass_prior: float = 0.15          # chance of a wall cell to be glass before any beam crossed it
+    glass_prior: float = 0.15          # chance of a wall cell to be seen through before any beam crossed it
     glass_wall_leak: float = 0.03      # share of the beams that pass a solid wall: errors of map and pose
     glass_memory: float = 6.0          # largest log odds that beams can add up to: a door may be opened
 
@@ -80,22 +86,23 @@ class GlassMap:
         self._shape = grid_map.occupancy.shape
         self._occupied = np.pad(grid_map.occupied, 2).ravel()
         self._stride = self._shape[1] + 4
-        self._log_odds = np.zeros(len(self._occupied), np.float32)  # added by beams; bordered by 2 cells
+        # Log odds that beams added: can be seen through, and is there though it can; bordered by 2 cells.
+        self._log_odds = np.zeros((2, len(self._occupied)), np.float32)
         self._crossed = np.zeros(len(self._occupied), bool)
-        self._prior = float(np.log(evidence.glass_prior / (1.0 - evidence.glass_prior)))
+        self._prior = np.log([[evidence.glass_prior / (1.0 - evidence.glass_prior)], [1.0]])
         self._kernel = self._neighbours()
 
-    def probability(self, cell: np.ndarray) -> np.ndarray:
-        """Chance (...) of being glass for flat cells (...) of the map; the prior for -1."""
-        at = self._bordered(np.maximum(cell, 0))
-        log_odds = np.where(cell >= 0, self._log_odds[at], 0.0)
-        return 1.0 / (1.0 + np.exp(-(self._prior + log_odds)))
+    def probability(self, cell: np.ndarray) -> "Tuple[np.ndarray, np.ndarray]":
+        """Chances (...) of flat cells (...) of the map to be seen through, and to be glass; the priors for -1."""
+        at = self._bordered(np.maximum(cell, 0)).ravel()
+        chances = self._chances(np.where(cell.ravel() >= 0, self._log_odds[:, at], 0.0))
+        return chances[0].reshape(cell.shape), (chances[0] * chances[1]).reshape(cell.shape)
 
     def occupancy(self) -> np.ndarray:
         """(H, W) int8 [percent]: how glassy each wall cell proved; -1 where no beam said anything."""
-        percent = np.rint(100.0 / (1.0 + np.exp(-(self._prior + self._log_odds))))
-        known = np.where(self._crossed, percent, UNKNOWN).astype(np.int8)
-        return known.reshape(-1, self._stride)[2:-2, 2:-2].copy()
+        percent = np.full(len(self._crossed), UNKNOWN, np.int8)
+        percent[self._crossed] = np.rint(100.0 * np.prod(self._chances(self._log_odds[:, self._crossed]), axis=0))
+        return percent.reshape(-1, self._stride)[2:-2, 2:-2].copy()
 
     def learn(self, cell: np.ndarray, incidence_rad: np.ndarray, passed: np.ndarray) -> None:
         """Take in one scan.
@@ -107,19 +114,31 @@ class GlassMap:
         """
         if not len(cell):
             return
-        back, leak = answers_of_a_pane(incidence_rad), self._evidence.glass_wall_leak
-        says = np.where(passed, np.log((1.0 - back) / leak), np.log(back / (1.0 - leak)))
+        says = self._says(incidence_rad, passed)
         offsets, weights = self._kernel
         at = (self._bordered(cell)[:, None] + offsets).ravel()
         share = (np.ones(len(cell))[:, None] * weights).ravel()
         touched, group = np.unique(at, return_inverse=True)
-        # A wall cell that many beams of one scan hit has one piece of evidence, not many.
-        mean = np.bincount(group, share * np.repeat(says, len(offsets))) / np.bincount(group, share)
         walls = self._occupied[touched]
-        touched, added = touched[walls], self._SPREAD[1] * mean[walls]
+        total = np.bincount(group, share)
         limit = self._evidence.glass_memory
-        self._log_odds[touched] = np.clip(self._log_odds[touched] + added, -limit, limit)
-        self._crossed[touched] = True
+        for log_odds, said in zip(self._log_odds, says):
+            # A wall cell that many beams of one scan hit has one piece of evidence, not many.
+            mean = np.bincount(group, share * np.repeat(said, len(offsets))) / total
+            added = self._SPREAD[1] * mean[walls] * np.minimum(total[walls], 1.0)
+            log_odds[touched[walls]] = np.clip(log_odds[touched[walls]] + added, -limit, limit)
+        self._crossed[touched[walls]] = True
+
+    def _says(self, incidence_rad: np.ndarray, passed: np.ndarray) -> "Tuple[np.ndarray, np.ndarray]":
+        """(B,) log odds of glass against wall, and against gone. What lidar it is is not known: each may be."""
+        leak = self._evidence.glass_wall_leak
+        narrow, wide = answers_of_a_pane(incidence_rad, _NARROW_RAD), answers_of_a_pane(incidence_rad, _WIDE_RAD)
+        return (np.where(passed, np.log((1.0 - narrow) / leak), np.log(wide / (1.0 - leak))),
+                np.where(passed, np.log((1.0 - narrow) / (1.0 - _GONE_ANSWERS)), np.log(wide / _GONE_ANSWERS)))
+
+    def _chances(self, log_odds: np.ndarray) -> np.ndarray:
+        """(2, K) chances to be seen through, and to be there if so, from what beams added."""
+        return 1.0 / (1.0 + np.exp(-(self._prior + log_odds)))
 
     def _bordered(self, cell: np.ndarray) -> np.ndarray:
         row, column = np.divmod(cell, self._shape[1])

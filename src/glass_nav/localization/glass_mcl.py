@@ -327,7 +327,7 @@ class GlassMcl:
         across = np.maximum(references.cos_incidence[0, 0], LEAST_COS)
         first_m = references.range_m[0, 0] + self._residuals.depth_share * references.thickness_m[0, 0] / across
         gate_m = beam_cases.gate_m(self._residuals, self._params.vote) / across
-        return surface_scan.of(scan.ranges_m, cases.case, first_m, self._glass_map.probability(references.cell[0, 0]),
+        return surface_scan.of(scan.ranges_m, cases.case, first_m, self._glass_map.probability(references.cell[0, 0])[1],
                                gate_m, trusted)
 
     def _start_with(self, particles: np.ndarray, searching: bool) -> None:

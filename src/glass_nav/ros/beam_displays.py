@@ -1,25 +1,19 @@
-"""The beams of one scan as rviz shows them: a coloured cloud, and markers with a checkbox per case.
-
-B beams, K points. Everything is packed by numpy: the markers of 541 beams go out in under 1 ms, where lists
-of geometry_msgs/Point take 5.
-"""
+"""The beams of one scan as rviz shows them: a coloured cloud, and markers with a checkbox per case. B beams."""
 
 from __future__ import annotations
 
-import struct
 from dataclasses import replace
-from io import BytesIO
-from typing import Any, List, Optional
+from typing import List, Optional
 
 import numpy as np
 from geometry_msgs.msg import Pose, Quaternion, Vector3
 from sensor_msgs.msg import PointCloud2, PointField
-from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from glass_nav.localization.beam_cases import BeamCases
 from glass_nav.localization.surface_scan import SurfaceScan
 from glass_nav.ros import conversions
+from glass_nav.ros.packed_markers import PackedMarkerArray, colour, points_marker
 from glass_nav.sensing.scan import Scan
 
 # Names of cases 0 to 4: the namespaces of the markers, and so the words beside rviz' checkboxes.
@@ -34,11 +28,11 @@ STATE_COLOURS = {"LOCALIZED": (0, 110, 70), "UNCERTAIN": (200, 110, 0), "LOST": 
                  "GLOBAL_SEARCH": (110, 60, 160), "UNKNOWN": (90, 90, 90)}
 STATUS_NAMESPACE = "status"
 
-_POINT_M = 0.07         # edge of the square at the end of a beam
-_LINE_M = 0.012         # width of the line from the surface to that end
-_LINE_ALPHA = 0.45
+_POINT_M = 0.08         # edge of the square at the end of a beam
+_LINE_M = 0.018         # width of the line from the surface to that end
+_LINE_ALPHA = 0.6
 _TEXT_M = 0.35          # height of a capital letter
-_TEXT_ABOVE_M = 0.9     # of the robot: up, and to the north, which is up on the screen when seen from above
+_TEXT_ABOVE_M = 1.1     # of the robot: up, and to the north, which is up on the screen when seen from above
 _REASON_WIDTH = 48      # letters of a line
 
 
@@ -75,34 +69,6 @@ def beam_cloud(scan: Scan, cases: BeamCases, height_m: float, base_frame: str) -
 # -- markers
 
 
-class _PackedMarker(Marker):
-    """A marker whose points are an array already, of one colour and without text."""
-
-    _AFTER_POINTS = 4 + 4 + 4 + 1  # bytes of no colors, no text, no mesh_resource, mesh_use_embedded_materials
-
-    def __init__(self, packed: np.ndarray, **fields: Any) -> None:
-        super().__init__(**fields)
-        self.packed = packed  # (K, 3) x y z
-
-    def serialize(self, buff: BytesIO) -> None:
-        raw = BytesIO()
-        super().serialize(raw)
-        bare = raw.getvalue()
-        buff.write(bare[:-self._AFTER_POINTS - 4])  # 4: the count of points, none so far
-        buff.write(struct.pack("<I", len(self.packed)))
-        buff.write(self.packed.astype("<f8").tobytes())
-        buff.write(bare[-self._AFTER_POINTS:])
-
-
-class _PackedMarkerArray(MarkerArray):
-    """Markers that write themselves; the generated code would ask each point for its x, y and z."""
-
-    def serialize(self, buff: BytesIO) -> None:
-        buff.write(struct.pack("<I", len(self.markers)))
-        for marker in self.markers:
-            marker.serialize(buff)
-
-
 def beam_markers(scan: Scan, cases: BeamCases, surface: SurfaceScan, height_m: float,
                  base_frame: str) -> MarkerArray:
     """A namespace per case: squares where its beams end, and lines there from the surface they met first.
@@ -128,19 +94,11 @@ def beam_markers(scan: Scan, cases: BeamCases, surface: SurfaceScan, height_m: f
         pairs = np.stack([starts[lines], ends[lines]], axis=1).reshape(-1, 2)
         if not lines.any():
             pairs = np.zeros((2, 2)) + scan.base_from_laser[:2]
-        markers.append(_packed_marker(head, name, 0, Marker.LINE_LIST, pairs, height_m, case))
-        markers.append(_packed_marker(head, name, 1, Marker.POINTS, ends[in_case], height_m, case))
-    return _PackedMarkerArray(markers)
-
-
-def _packed_marker(head: Header, name: str, number: int, kind: int, points: np.ndarray, height_m: float,
-                   case: int) -> Marker:
-    packed = np.column_stack([points, np.full(len(points), height_m)])
-    width_m, alpha = (_LINE_M, _LINE_ALPHA) if kind == Marker.LINE_LIST else (_POINT_M, 1.0)
-    return _PackedMarker(packed, header=head, ns=name, id=number, type=kind,
-                         action=Marker.ADD if len(points) else Marker.DELETE,  # rviz wants no empty marker
-                         pose=Pose(orientation=Quaternion(w=1.0)), scale=Vector3(width_m, width_m, 0.0),
-                         color=_colour(CASE_COLOURS[case], alpha))
+        rgb = CASE_COLOURS[case]
+        markers.append(points_marker(head, name, 0, Marker.LINE_LIST, pairs, height_m, _LINE_M,
+                                     colour(rgb, _LINE_ALPHA)))
+        markers.append(points_marker(head, name, 1, Marker.POINTS, ends[in_case], height_m, _POINT_M, colour(rgb)))
+    return PackedMarkerArray(markers)
 
 
 def status_marker(map_from_base: Optional[np.ndarray], map_frame: str, state: str, reason: str,
@@ -161,7 +119,7 @@ def status_marker(map_from_base: Optional[np.ndarray], map_frame: str, state: st
     pose.position.x, pose.position.y, pose.position.z = float(x), float(y) + _TEXT_ABOVE_M, _TEXT_ABOVE_M
     return Marker(header=conversions.header(0, map_frame), ns=STATUS_NAMESPACE, type=Marker.TEXT_VIEW_FACING,
                   action=Marker.ADD, pose=pose, scale=Vector3(0.0, 0.0, _TEXT_M), text=text,
-                  color=_colour(np.array(STATE_COLOURS[state]), 1.0))
+                  color=colour(np.array(STATE_COLOURS[state])))
 
 
 def _wrapped(text: str) -> str:
@@ -172,8 +130,3 @@ def _wrapped(text: str) -> str:
             lines.append("")
         lines[-1] = f"{lines[-1]} {word}".strip()
     return "\n".join(lines)
-
-
-def _colour(rgb: np.ndarray, alpha: float) -> ColorRGBA:
-    red, green, blue = (float(value) / 255.0 for value in rgb)
-    return ColorRGBA(red, green, blue, alpha)

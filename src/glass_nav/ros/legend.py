@@ -9,16 +9,17 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from sensor_msgs.msg import Image as ImageMsg
 
-from glass_nav.ros import beam_displays, conversions
+from glass_nav.ros import beam_displays, conversions, wall_display
 
 BACKGROUND, INK, FAINT_INK = (250, 250, 250), (20, 20, 20), (95, 95, 95)
 ZOOM = 2                 # the font's letters are 6 x 11 pixels
 WIDTH, ROW = 240, 15     # before the zoom
 MARGIN, PATCH = 6, 22
 
-# In the order of the way of a beam, not of the numbers.
+# In the order of the rows: as far as a beam gets.
 CASE_WORDS = {1: "1 diffuse: ended at first surface", 3: "3 behind one pane", 4: "4 behind two panes",
               2: "2 mirrored at first surface", 0: "0 uncertain: not on the map"}
+WALL_WORDS = {2: "glass: chance of 75 % and more", 1: "undecided", 0: "solid: chance of glass below 25 %"}
 
 
 def image_msg(map_frame: str) -> ImageMsg:
@@ -30,32 +31,18 @@ def image_msg(map_frame: str) -> ImageMsg:
 
 
 def draw() -> np.ndarray:
-    """(H, W, 3) uint8: a row per case, then the colours of the glass map."""
-    height = 2 * MARGIN + ROW * (len(CASE_WORDS) + 4)
+    """(H, W, 3) uint8: a row per case, then one per kind of wall."""
+    beams = [(beam_displays.CASE_COLOURS[case], words) for case, words in CASE_WORDS.items()]
+    walls = [(wall_display.WALL_COLOURS[kind], words) for kind, words in WALL_WORDS.items()]
+    height = 2 * MARGIN + ROW * (len(beams) + len(walls) + 2) + ROW // 2
     picture = Image.new("RGB", (WIDTH, height), BACKGROUND)
     brush, font = ImageDraw.Draw(picture), ImageFont.load_default()
     top = MARGIN
-
-    def write(left: int, text: str, colour: "tuple[int, int, int]") -> None:
-        brush.text((left, top + 1), text, fill=colour, font=font)
-
-    write(MARGIN, "Beams, by what they met", FAINT_INK)
-    for case, words in CASE_WORDS.items():
-        top += ROW
-        colour = tuple(int(value) for value in beam_displays.CASE_COLOURS[case])
-        brush.rectangle((MARGIN, top + 1, MARGIN + PATCH, top + ROW - 3), fill=colour)
-        write(MARGIN + PATCH + 8, words, INK)
-    top += ROW + ROW // 2
-    write(MARGIN, "Walls, by how glassy they proved [%]", FAINT_INK)
-    top += ROW
-    right = WIDTH - 60
-    for x in range(MARGIN, right):
-        brush.line((x, top + 1, x, top + ROW - 3), fill=costmap_colour(100.0 * (x - MARGIN) / (right - MARGIN)))
-    write(right + 6, "0 .. 100", INK)
+    for heading, rows in (("Beams, by what they met", beams), ("Walls, by the beams that crossed them", walls)):
+        brush.text((MARGIN, top + 1), heading, fill=FAINT_INK, font=font)
+        for rgb, words in rows:
+            top += ROW
+            brush.rectangle((MARGIN, top + 1, MARGIN + PATCH, top + ROW - 3), fill=tuple(int(value) for value in rgb))
+            brush.text((MARGIN + PATCH + 8, top + 1), words, fill=INK, font=font)
+        top += ROW + ROW // 2
     return np.repeat(np.repeat(np.asarray(picture), ZOOM, axis=0), ZOOM, axis=1)
-
-
-def costmap_colour(percent: float) -> "tuple[int, int, int]":
-    """What rviz' Map display paints in its colour scheme "costmap": blue to red up to 98."""
-    red = round(255.0 * min(percent, 98.0) / 98.0)
-    return red, 0, 255 - red

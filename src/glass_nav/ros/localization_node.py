@@ -12,7 +12,8 @@ Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseAr
     is used; none for a scan that is refused or has no transforms, as nobody knows where it would have to be cut;
     ~glass_map (OccupancyGrid, latched): how glassy each wall cell proved [percent], -1 where nothing is known;
     for rviz, while somebody listens: ~beam_cloud (PointCloud2), ~beam_markers (MarkerArray, a namespace per case
-    and one for the status), ~legend (Image, latched).
+    and one for the status), ~wall_markers (MarkerArray, latched: the glass map without what is unknown), ~legend
+    (Image, latched).
 Services: global_localization, request_nomotion_update (Empty), set_map (SetMap). Calls static_map (GetMap).
 Parameters: LocalizationNodeParams and GlassMclParams, read once; explained in config/localization.yaml.
 """
@@ -40,7 +41,7 @@ from visualization_msgs.msg import MarkerArray
 from glass_nav.geometry import se2
 from glass_nav.localization.glass_mcl import Estimate, GlassMcl
 from glass_nav.msg import BeamCases, LocalizationStatus
-from glass_nav.ros import beam_displays, conversions, legend, params
+from glass_nav.ros import beam_displays, conversions, legend, params, wall_display
 from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Errand, Mailbox, WaitingScans
@@ -100,6 +101,7 @@ class LocalizationNode:
         self._glass_map = rospy.Publisher("~glass_map", OccupancyGrid, queue_size=1, latch=True)
         self._beam_cloud = rospy.Publisher("~beam_cloud", PointCloud2, queue_size=2)
         self._beam_markers = rospy.Publisher("~beam_markers", MarkerArray, queue_size=2)
+        self._wall_markers = rospy.Publisher("~wall_markers", MarkerArray, queue_size=1, latch=True)
         self._legend = rospy.Publisher("~legend", Image, queue_size=1, latch=True)
         self._legend.publish(legend.image_msg(self._p.global_frame_id))
         self._diagnostics = Diagnostics(p.node, self._waiting.counts)
@@ -431,12 +433,14 @@ class LocalizationNode:
         if self._mcl is None or self._map is None or not self._glass_changed:
             return
         period_s = self._p.glass_map_period_s
-        if not self._glass_map.get_num_connections() or 0.0 <= self._now_s - self._last_glass_s < period_s:
+        listeners = self._glass_map.get_num_connections() + self._wall_markers.get_num_connections()
+        if not listeners or 0.0 <= self._now_s - self._last_glass_s < period_s:
             return
         self._last_glass_s, self._glass_changed = self._now_s, False
         stamp_ns = 0 if self._estimate is None else self._estimate.stamp_ns
-        self._glass_map.publish(conversions.glass_map_msg(stamp_ns, self._p.global_frame_id, self._map,
-                                                          self._mcl.glass_map.occupancy()))
+        frame, glass = self._p.global_frame_id, self._mcl.glass_map.occupancy()
+        self._glass_map.publish(conversions.glass_map_msg(stamp_ns, frame, self._map, glass))
+        self._wall_markers.publish(wall_display.wall_markers(frame, self._map, glass))
 
     def _due(self, last: str, rate_hz: float) -> bool:
         """Whether 1 / rate has passed since the time in the attribute `last`, which then becomes now."""

@@ -183,7 +183,7 @@ class Building:
             raise ValueError(f"changed share must be 0 to 1, got {share}")
         movable = [index for index, thing in enumerate(self.things)
                    if thing.movable and thing.mapped and thing.present]
-        moved = rng.choice(len(movable), int(round(share * len(movable))), replace=False) if movable else []
+        moved = rng.permutation(len(movable))[:int(round(share * len(movable)))]
         building = self
         for index in sorted(movable[number] for number in moved):
             thing = self.things[index]

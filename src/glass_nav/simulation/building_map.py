@@ -8,7 +8,7 @@ unknown: the inside of walls and furniture, the far side of walls, rooms that no
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Tuple
+from typing import List, Tuple
 
 import numpy as np
 from scipy import ndimage
@@ -66,7 +66,8 @@ def _mapped_lines(building: Building) -> Tuple[np.ndarray, np.ndarray]:
     """Ends (L, 2), (L, 2) of what is drawn; a glazing is one line."""
     surfaces = building.surfaces
     opaque = surfaces.mapped & (surfaces.kind == OPAQUE)
-    glass = np.array([part.line_m for part in (*building.panes, *building.mirrors)], float).reshape(-1, 2, 2)
+    lines: List[np.ndarray] = [pane.line_m for pane in building.panes] + [each.line_m for each in building.mirrors]
+    glass = np.array(lines, float).reshape(-1, 2, 2)
     return (np.concatenate([surfaces.from_m[opaque], glass[:, 0]]),
             np.concatenate([surfaces.to_m[opaque], glass[:, 1]]))
 

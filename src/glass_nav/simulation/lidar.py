@@ -112,19 +112,40 @@ class TrueScan:
 
 
 @dataclass(frozen=True)
+class _Fans:
+    """Rays that seem to come from F centres: the laser, or its mirror images behind panes. R rays, B beams of the lidar.
+
+    The ray of beam b in fan f has the direction first_rad[f] + b * step_rad[f].
+    """
+    centre_m: np.ndarray   # (F, 2)
+    first_rad: np.ndarray  # (F,) direction of beam 0 in map
+    step_rad: np.ndarray   # (F,) from one beam to the next, negative in a mirror
+    ray_of: np.ndarray     # (F, B) index of the ray, -1: the beam is none of this fan
+    lowest: np.ndarray     # (F,) first and last beam of the fan
+    highest: np.ndarray
+    fan: np.ndarray        # (R,) of each ray
+    ray: np.ndarray        # (R, 2) directions of length 1
+    start_m: np.ndarray    # (R,) range at which the ray begins: 0, or that of the mirror
+
+    def points(self, rays: np.ndarray, range_m: np.ndarray) -> np.ndarray:
+        """(N, 2) at ranges (N,) on rays (N,)."""
+        return self.centre_m[self.fan[rays]] + range_m[:, None] * self.ray[rays]
+
+
+@dataclass(frozen=True)
 class _Ways:
-    """What B rays meet up to the first opaque surface. Panes by ascending range, inf where there is none."""
-    pane_m: np.ndarray        # (B, K)
-    pane: np.ndarray          # (B, K) index of the surface
-    cos: np.ndarray           # (B, K) of the incidence
-    met: np.ndarray           # (B, K) bool: there is this pane
-    pane_mapped: np.ndarray   # (B, K) bool
-    passed: np.ndarray        # (B, K) int: mapped glazings on the way to this pane
-    end_m: np.ndarray         # (B,)
-    end_power: np.ndarray     # (B,) of the opaque surface at 1 m, panes not counted: rho cos
-    end_mapped: np.ndarray    # (B,) bool
-    end_passed: np.ndarray    # (B,) int: mapped glazings on the way to it
-    missing_m: np.ndarray     # (B,) where something mapped is no longer
+    """What R rays meet up to the first opaque surface. Panes by ascending range, inf where there is none."""
+    pane_m: np.ndarray        # (R, K)
+    pane: np.ndarray          # (R, K) index of the surface
+    cos: np.ndarray           # (R, K) of the incidence
+    met: np.ndarray           # (R, K) bool: there is this pane
+    pane_mapped: np.ndarray   # (R, K) bool
+    passed: np.ndarray        # (R, K) int: mapped glazings on the way to this pane
+    end_m: np.ndarray         # (R,)
+    end_power: np.ndarray     # (R,) of the opaque surface at 1 m, panes not counted: rho cos
+    end_mapped: np.ndarray    # (R,) bool
+    end_passed: np.ndarray    # (R,) int: mapped glazings on the way to it
+    missing_m: np.ndarray     # (R,) where something mapped is no longer
 
 
 @dataclass(frozen=True)
@@ -149,14 +170,12 @@ def scan(model: LidarModel, building: Building, map_from_laser: np.ndarray, time
     """
     map_from_laser = np.asarray(map_from_laser, float)
     surfaces = joined(building.surfaces, people.surfaces(building.people, time_s, map_from_laser[:2]))
-    cos, sin = angles.cos_sin(map_from_laser[2] + model.angles_rad)
-    ray = np.stack([cos, sin], axis=-1)
-    direct = _ways(building, surfaces, map_from_laser[None, :2], ray)
+    fan = _fan(model, map_from_laser)
+    direct = _ways(building, surfaces, fan)
     reflected, passing = _pane_light(model, surfaces, direct)
     first_m = np.where(direct.pane_mapped, direct.pane_m, np.inf).min(axis=1, initial=np.inf)  # first mapped pane
     echoes = _direct_echoes(model, surfaces, direct, passing, first_m, rng)
-    echoes += _mirrored_echoes(model, building, surfaces, map_from_laser[:2], ray, direct, reflected, passing, first_m,
-                               rng)
+    echoes += _mirrored_echoes(model, building, surfaces, fan, direct, reflected, passing, first_m, rng)
     return _reported(model, echoes, first_m, rng)
 
 
@@ -199,105 +218,152 @@ def _direct_echoes(model: LidarModel, surfaces: Surfaces, direct: _Ways, passing
     return echoes
 
 
-def _mirrored_echoes(model: LidarModel, building: Building, surfaces: Surfaces, origin_m: np.ndarray, ray: np.ndarray,
-                     direct: _Ways, reflected: np.ndarray, passing: np.ndarray, first_m: np.ndarray,
+def _fan(model: LidarModel, map_from_laser: np.ndarray) -> _Fans:
+    """All beams from the laser."""
+    angles_rad = map_from_laser[2] + model.angles_rad
+    cos, sin = angles.cos_sin(angles_rad)
+    beams = len(angles_rad)
+    return _Fans(map_from_laser[None, :2], angles_rad[:1], angles_rad[1:2] - angles_rad[:1], np.arange(beams)[None],
+                 np.zeros(1, int), np.full(1, beams - 1), np.zeros(beams, int), np.stack([cos, sin], axis=-1),
+                 np.zeros(beams))
+
+
+def _mirrored(fan: _Fans, surfaces: Surfaces, beams: np.ndarray, mirror: np.ndarray, start_m: np.ndarray) -> _Fans:
+    """The beams (R,) of the laser's fan after their mirrors (R,), as from the laser's images behind these."""
+    panes, image = np.unique(mirror, return_inverse=True)
+    from_m = surfaces.from_m[panes]
+    line = surfaces.to_m[panes] - from_m
+    line /= np.hypot(line[:, 0], line[:, 1])[:, None]
+    to_laser = fan.centre_m - from_m
+    centre_m = from_m + 2.0 * (to_laser * line).sum(axis=1)[:, None] * line - to_laser
+    along = line[image]
+    ray = 2.0 * (fan.ray[beams] * along).sum(axis=1)[:, None] * along - fan.ray[beams]
+    ray_of = np.full((len(panes), len(fan.ray)), -1)
+    ray_of[image, beams] = np.arange(len(beams))
+    ours = ray_of >= 0
+    return _Fans(centre_m, 2.0 * np.arctan2(line[:, 1], line[:, 0]) - fan.first_rad, np.repeat(-fan.step_rad, len(panes)),
+                 ray_of, np.argmax(ours, axis=1), ours.shape[1] - 1 - np.argmax(ours[:, ::-1], axis=1), image, ray,
+                 start_m)
+
+
+def _mirrored_echoes(model: LidarModel, building: Building, surfaces: Surfaces, fan: _Fans, direct: _Ways,
+                     reflected: np.ndarray, passing: np.ndarray, first_m: np.ndarray,
                      rng: np.random.Generator) -> List[_Echoes]:
     """By the mirror image in the first and in the second glazing."""
     glazing = np.where(direct.met, surfaces.glazing[direct.pane], -1)
+    beams = len(glazing)
     echoes: List[_Echoes] = []
-    for mirror in range(2):
-        if not glazing.shape[1]:
-            break
-        other = direct.met & (glazing != glazing[:, :1])
-        at = np.zeros(len(ray), int) if mirror == 0 else np.argmax(other, axis=1)  # (B,) which pane mirrors
-        rows = np.flatnonzero(direct.met[:, 0] if mirror == 0 else other.any(axis=1))
+    for mirror in range(2 if glazing.shape[1] else 0):
+        is_mirror = direct.met & (glazing != glazing[:, :1]) if mirror else direct.met
+        at = np.argmax(is_mirror, axis=1)  # (B,) which pane mirrors
+        rows = np.flatnonzero(is_mirror.any(axis=1))
         if not len(rows):
             break
         at = at[rows]
         to_mirror_m = direct.pane_m[rows, at]
-        index = direct.pane[rows, at]
-        line = surfaces.to_m[index] - surfaces.from_m[index]
-        line /= np.hypot(line[:, 0], line[:, 1])[:, None]
-        mirrored_ray = 2.0 * (ray[rows] * line).sum(axis=1)[:, None] * line - ray[rows]
-        ways = _ways(building, surfaces, origin_m + to_mirror_m[:, None] * ray[rows], mirrored_ray)
+        ways = _ways(building, surfaces, _mirrored(fan, surfaces, rows, direct.pane[rows, at], to_mirror_m))
         _, on_way = _pane_light(model, surfaces, ways)
         pane_power = _pane_power(model, surfaces, ways, rng)
         light = passing[rows, at] * reflected[rows, at]
         before = direct.passed[rows, at]  # mapped glazings on the way to the mirror
         known = direct.pane_mapped[rows, at] & (before == 0) & (direct.missing_m[rows] >= to_mirror_m)
         crossed_m = np.where((before > 0) | direct.pane_mapped[rows, at], first_m[rows], np.nan)
+        later_m = np.where(ways.pane_mapped, ways.pane_m, np.inf).min(axis=1, initial=np.inf)
         for k in range(ways.pane_m.shape[1] + 1):
             at_end = k == ways.pane_m.shape[1]
-            further_m = ways.end_m if at_end else ways.pane_m[:, k]
+            range_m = ways.end_m if at_end else ways.pane_m[:, k]
             mapped = ways.end_mapped if at_end else ways.pane_mapped[:, k]
             passed = ways.end_passed if at_end else ways.passed[:, k]
-            range_m = to_mirror_m + further_m
             power = (ways.end_power if at_end else pane_power[:, k]) * (light * on_way[:, k]) ** 2 / range_m ** 2
-            case = np.where(known & mapped & (passed == 0) & (ways.missing_m >= further_m), MIRRORED, UNCERTAIN)
-            later_m = np.where(ways.pane_mapped, ways.pane_m, np.inf).min(axis=1, initial=np.inf)
-            crossing_m = np.where(np.isnan(crossed_m) & (passed > 0), to_mirror_m + later_m, crossed_m)
-            echoes.append(_Echoes(_spread(power, rows, len(ray), 0.0), _spread(range_m, rows, len(ray), np.inf),
-                                  _spread(case, rows, len(ray), UNCERTAIN),
-                                  _spread(crossing_m, rows, len(ray), np.nan)))
+            case = np.where(known & mapped & (passed == 0) & (ways.missing_m >= range_m), MIRRORED, UNCERTAIN)
+            crossing_m = np.where(np.isnan(crossed_m) & (passed > 0), later_m, crossed_m)
+            echoes.append(_Echoes(*(_spread(values, rows, beams, rest) for values, rest in (
+                (power, 0.0), (range_m, np.inf), (case, UNCERTAIN), (crossing_m, np.nan)))))
     return echoes
 
 
-def _ways(building: Building, surfaces: Surfaces, origin_m: np.ndarray, ray: np.ndarray) -> _Ways:
-    """Follow rays (B, 2) of length 1 from origins (B, 2) or (1, 2)."""
-    opaque = np.flatnonzero((surfaces.kind == OPAQUE) & surfaces.present)
-    panes = np.flatnonzero((surfaces.kind != OPAQUE) & surfaces.present)
-    missing = np.flatnonzero(surfaces.mapped & ~surfaces.present)
-    end_m, end, end_cos = _nearest(surfaces, opaque, origin_m, ray)
-    end_at = origin_m + np.where(np.isfinite(end_m), end_m, 0.0)[:, None] * ray
-    missing_m, _, _ = _nearest(surfaces, missing, origin_m, ray)
-    if len(missing):
-        missing_at = origin_m + np.where(np.isfinite(missing_m), missing_m, 0.0)[:, None] * ray
-        missing_m = np.where(building_map.is_drawn(building, missing_at), missing_m, np.inf)
+def _ways(building: Building, surfaces: Surfaces, fans: _Fans) -> _Ways:
+    """Follow the rays of fans up to the first opaque surface; ranges from the centre of each fan."""
+    there = np.flatnonzero(surfaces.present | surfaces.mapped)
+    ray, surface, range_m, cos = _crossings(surfaces, there, fans)
+    rays = len(fans.ray)
+    is_opaque = surfaces.kind[surface] == OPAQUE
+    end_m, end, end_cos = _nearest(rays, *(column[is_opaque & surfaces.present[surface]]
+                                           for column in (ray, surface, range_m, cos)))
+    missing_m, _, _ = _nearest(rays, *(column[~surfaces.present[surface]] for column in (ray, surface, range_m, cos)))
+    gone = np.flatnonzero(np.isfinite(missing_m))
+    missing_m[gone[~building_map.is_drawn(building, fans.points(gone, missing_m[gone]))]] = np.inf
+    ended = np.flatnonzero(np.isfinite(end_m))
+    end_mapped = np.zeros(rays, bool)
+    end_mapped[ended] = (surfaces.mapped[end[ended]]
+                         & building_map.is_drawn(building, fans.points(ended, end_m[ended])))
 
-    pane_m, cos = _crossings(surfaces, panes, origin_m, ray)  # (B, all panes)
-    pane_m[pane_m >= end_m[:, None]] = np.inf
-    most = min(int(np.isfinite(pane_m).sum(axis=1).max(initial=0)), LARGEST_PANES)
-    order = np.argsort(pane_m, axis=1)[:, :most]
-    pane_m, cos = np.take_along_axis(pane_m, order, axis=1), np.take_along_axis(cos, order, axis=1)
-    met = np.isfinite(pane_m)
-    pane = panes[order] if len(panes) else order
-    at = origin_m[:, None] + np.where(met, pane_m, 0.0)[..., None] * ray[:, None]
-    mapped = met & surfaces.mapped[pane] & building_map.is_drawn(building, at)
+    keep = np.flatnonzero(~is_opaque & (range_m < end_m[ray]))
+    ray, surface, range_m, cos = ray[keep], surface[keep], range_m[keep], cos[keep]
+    order = np.lexsort((range_m, ray))
+    ray, surface, range_m, cos = ray[order], surface[order], range_m[order], cos[order]
+    place = np.arange(len(ray)) - np.searchsorted(ray, ray)  # of the pane on its way
+    few = place < LARGEST_PANES
+    most = int(place[few].max(initial=-1)) + 1
+    at = ray[few], place[few]
+    pane_m, pane_cos = np.full((rays, most), np.inf), np.ones((rays, most))
+    pane, mapped = np.zeros((rays, most), int), np.zeros((rays, most), bool)
+    pane_m[at], pane_cos[at], pane[at] = range_m[few], cos[few], surface[few]
+    mapped[at] = (surfaces.mapped[surface[few]]
+                  & building_map.is_drawn(building, fans.points(ray[few], range_m[few])))
     glazing = surfaces.glazing[pane]
-    opens = np.ones(met.shape, bool)  # the first sheet of its glazing on this way
+    opens = np.ones(mapped.shape, bool)  # the first sheet of its glazing on this way
     opens[:, 1:] = glazing[:, 1:] != glazing[:, :-1]
     count = np.cumsum(mapped & opens, axis=1)
-    return _Ways(pane_m, pane, cos, met, mapped, np.maximum(count - mapped, 0), end_m,
-                 surfaces.reflectance[end] * end_cos if len(opaque) else np.zeros(len(ray)),
-                 (surfaces.mapped[end] & building_map.is_drawn(building, end_at)) if len(opaque)
-                 else np.zeros(len(ray), bool),
-                 count[:, -1] if most else np.zeros(len(ray), int), missing_m)
+    return _Ways(pane_m, pane, pane_cos, np.isfinite(pane_m), mapped, np.maximum(count - mapped, 0),
+                 end_m, np.where(np.isfinite(end_m), surfaces.reflectance[end] * end_cos, 0.0), end_mapped,
+                 count[:, -1] if most else np.zeros(rays, int), missing_m)
 
 
-def _nearest(surfaces: Surfaces, chosen: np.ndarray, origin_m: np.ndarray,
-             ray: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Range to the nearest of the chosen surfaces, its index and cos of the incidence, all (B,)."""
-    if not len(chosen):
-        return np.full(len(ray), np.inf), np.zeros(len(ray), int), np.zeros(len(ray))
-    range_m, cos = _crossings(surfaces, chosen, origin_m, ray)
-    best = np.argmin(range_m, axis=1)
-    beams = np.arange(len(ray))
-    return range_m[beams, best], chosen[best], cos[beams, best]
+def _nearest(rays: int, ray: np.ndarray, surface: np.ndarray, range_m: np.ndarray,
+             cos: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of crossings (C,) the nearest of each ray: range, inf without one, index of the surface, cos; all (rays,)."""
+    order = np.lexsort((range_m, ray))
+    first = order[np.flatnonzero(np.diff(ray[order], prepend=-1))]
+    nearest_m, index, at_cos = np.full(rays, np.inf), np.zeros(rays, int), np.zeros(rays)
+    nearest_m[ray[first]], index[ray[first]], at_cos[ray[first]] = range_m[first], surface[first], cos[first]
+    return nearest_m, index, at_cos
 
 
-def _crossings(surfaces: Surfaces, chosen: np.ndarray, origin_m: np.ndarray,
-               ray: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Ranges at which rays cross the chosen surfaces, inf: not, and cos of the incidence; both (B, chosen)."""
-    from_m = surfaces.from_m[chosen]
-    line = surfaces.to_m[chosen] - from_m
-    to_x, to_y = (from_m[:, axis] - origin_m[:, axis:axis + 1] for axis in range(2))
-    across = ray[:, :1] * line[:, 1] - ray[:, 1:] * line[:, 0]
+def _crossings(surfaces: Surfaces, chosen: np.ndarray,
+               fans: _Fans) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Where rays cross the chosen surfaces: index of the ray, of the surface, range [m], cos of the incidence; all (C,).
+
+    Seen from the centre of a fan a surface covers an interval of its beams: only those are worked out.
+    """
+    from_m, to_m = surfaces.from_m[chosen], surfaces.to_m[chosen]
+    sign = np.sign(fans.step_rad)[:, None]
+    from_at, to_at = (sign * (np.arctan2(ends[:, 1] - fans.centre_m[:, 1:], ends[:, 0] - fans.centre_m[:, :1])
+                              - fans.first_rad[:, None]) for ends in (from_m, to_m))  # (F, S)
+    span = angles.wrap(to_at - from_at)
+    start = np.mod(np.where(span < 0.0, to_at, from_at), 2.0 * np.pi)
+    start = np.concatenate([start, start - 2.0 * np.pi], axis=1)  # what begins behind the last beam may reach the first
+    step = np.abs(fans.step_rad)[:, None]
+    low = np.maximum(np.ceil(start / step).astype(int) - 1, fans.lowest[:, None])
+    high = np.minimum(np.floor((start + np.tile(np.abs(span), 2)) / step).astype(int) + 1, fans.highest[:, None])
+    count = np.maximum(high - low + 1, 0).ravel()
+    cell = np.repeat(np.arange(count.size), count)
+    beam = np.arange(cell.size) - np.repeat(np.cumsum(count) - count, count) + low.ravel()[cell]
+    fan, surface = cell // start.shape[1], cell % start.shape[1] % len(chosen)
+    ray = fans.ray_of[fan, beam]
+    ours = ray >= 0
+    fan, surface, ray = fan[ours], surface[ours], ray[ours]
+
+    line = to_m[surface] - from_m[surface]
+    to_line = from_m[surface] - fans.centre_m[fan]
+    way = fans.ray[ray]
+    across = way[:, 0] * line[:, 1] - way[:, 1] * line[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        range_m = (to_x * line[:, 1] - to_y * line[:, 0]) / across
-        share = (to_x * ray[:, 1:] - to_y * ray[:, :1]) / across
-        met = (range_m > NEAR_M) & (share >= -ENDS) & (share <= 1.0 + ENDS)
-    cos = np.abs(across) / np.hypot(line[:, 0], line[:, 1])
-    return np.where(met, range_m, np.inf), np.minimum(cos, 1.0)
+        range_m = (to_line[:, 0] * line[:, 1] - to_line[:, 1] * line[:, 0]) / across
+        share = (to_line[:, 0] * way[:, 1] - to_line[:, 1] * way[:, 0]) / across
+        met = (range_m > fans.start_m[ray] + NEAR_M) & (share >= -ENDS) & (share <= 1.0 + ENDS)
+    cos = np.minimum(np.abs(across[met]) / np.hypot(line[met, 0], line[met, 1]), 1.0)
+    return ray[met], chosen[surface[met]], range_m[met], cos
 
 
 def _pane_light(model: LidarModel, surfaces: Surfaces, ways: _Ways) -> Tuple[np.ndarray, np.ndarray]:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from io import BytesIO
 
 import numpy as np
-import pytest
 from sensor_msgs.msg import Image
 
-from glass_nav.ros import beam_displays, legend
+from glass_nav.ros import beam_displays, legend, wall_display
 
 
 def rows_with(pixels: np.ndarray, colour) -> np.ndarray:
@@ -49,6 +48,18 @@ def test_no_word_is_cut_off_at_the_edge():
     assert np.all(edge == legend.BACKGROUND)
 
 
-@pytest.mark.parametrize("percent, colour", [(0.0, (0, 0, 255)), (49.0, (128, 0, 127)), (98.0, (255, 0, 0))])
-def test_the_glass_map_has_the_colours_of_rviz(percent, colour):
-    assert legend.costmap_colour(percent) == colour
+def test_each_kind_of_wall_has_a_row_with_its_colour_and_name():
+    pixels = legend.draw()
+    assert sorted(legend.WALL_WORDS) == [0, 1, 2]
+    for kind, words in legend.WALL_WORDS.items():
+        assert words.startswith(wall_display.WALL_NAMES[kind])
+        rows = rows_with(pixels, wall_display.WALL_COLOURS[kind])
+        assert len(rows) >= 16 and (pixels[rows] == legend.INK).all(axis=2).sum() > 150
+    assert str(wall_display.GLASS_FROM) in legend.WALL_WORDS[2]
+    assert str(wall_display.SOLID_BELOW) in legend.WALL_WORDS[0]
+
+
+def test_no_two_colours_are_alike():
+    colours = np.concatenate([beam_displays.CASE_COLOURS.astype(int), wall_display.WALL_COLOURS])
+    apart = np.abs(colours[:, None] - colours).sum(axis=2)
+    assert apart[~np.eye(len(colours), dtype=bool)].min() > 80
