@@ -1,0 +1,250 @@
+"""What others would do: localizers to compare with, each as good as we know to make it.
+
+Two sensor models, the likelihood field and the beam model, in two filters: plain Monte Carlo localization as
+AMCL has it (particles move by odometry only), and our own filter with nothing but the weights exchanged. And our
+filter with less and with more knowledge of glass: only the beams that are told diffuse, and the true cases.
+
+All have set_pose() and update() as GlassMcl has. Every model is told what is known to help it: log probabilities
+(AMCL multiplies or adds up cubes), surfaces half a cell inside the walls that are drawn, thinned beams, and the
+settings of SETTINGS, the best of those tried on seeds 100 to 102 (test/benchmark/tune_baselines.py shows how).
+P particles, B beams.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Callable, Dict, NamedTuple, Optional, Union
+
+import numpy as np
+
+from glass_nav.geometry import angles, se2
+from glass_nav.localization import motion, pose_estimate, resampling
+from glass_nav.localization.beam_cases import DIFFUSE, UNCERTAIN, BeamCases
+from glass_nav.localization.glass_mcl import GlassMcl, GlassMclParams
+from glass_nav.localization.resampling import ParticleCount
+from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.raycast import RayCaster
+from glass_nav.sensing.scan import Scan
+from glass_nav.world.grid_map import GridMap
+
+_PARTS = 2  # of a cell's edge: how finely the likelihood field is tabulated
+
+
+class Settings(NamedTuple):
+    """Of a sensor model; AMCL's names where it has them."""
+    sigma_hit_m: float
+    z_hit: float
+    z_rand: float
+    max_beams: Optional[int] = 60              # None: all that answered
+    independent_beams: Optional[float] = None  # as how many they count; None: as many as they are
+    z_short: float = 0.0                       # of the beam model: something stood in the way
+    lambda_short: float = 0.1                  # [1/m]
+
+
+class LikelihoodField:
+    """Thrun, Burgard, Fox, Probabilistic Robotics (2005), table 6.3: how near is a wall to where the beam ended?
+
+    log of z_hit exp(-d^2 / (2 s^2)) + z_rand / z_max, as AMCL has it, looked up in a table of half cells.
+    """
+
+    def __init__(self, grid_map: GridMap, settings: Settings) -> None:
+        self._settings = settings
+        self._grid_from_map = se2.inverse(grid_map.map_from_grid)
+        self._parts_per_m = _PARTS / grid_map.resolution_m
+        rows, columns = (_PARTS * size for size in grid_map.occupancy.shape)
+        points = se2.transform_points(grid_map.map_from_grid, np.stack(np.meshgrid(
+            np.arange(columns) + 0.5, np.arange(rows) + 0.5), axis=-1) / self._parts_per_m)
+        distance_m = DistanceField(grid_map).at(points[..., 0], points[..., 1])[0]
+        self._fit = np.exp(-0.5 * (distance_m / settings.sigma_hit_m) ** 2).astype(np.float32)
+        self._log_p: Dict[float, np.ndarray] = {}  # by the range of the lidar
+
+    def log_weights(self, map_from_base: np.ndarray, scan: Scan) -> np.ndarray:
+        """(P,) log likelihoods of the scan at poses (P, 3)."""
+        settings = self._settings
+        if scan.range_max_m not in self._log_p:
+            self._log_p[scan.range_max_m] = np.log(settings.z_hit * self._fit + settings.z_rand / scan.range_max_m)
+        log_p = self._log_p[scan.range_max_m]
+        beams = chosen_beams(scan, settings)
+        grid_from_base = se2.compose(self._grid_from_map, map_from_base) * [self._parts_per_m, self._parts_per_m, 1.0]
+        points = (scan.points_in_base()[beams] * self._parts_per_m).astype(np.float32)
+        cos, sin = (value[:, None].astype(np.float32) for value in angles.cos_sin(grid_from_base[:, 2]))
+        x, y = grid_from_base[:, :2].T.astype(np.float32)[..., None]
+        column = (cos * points[:, 0] - sin * points[:, 1] + x).astype(np.int32)
+        row = (sin * points[:, 0] + cos * points[:, 1] + y).astype(np.int32)
+        np.clip(column, 0, log_p.shape[1] - 1, out=column)
+        np.clip(row, 0, log_p.shape[0] - 1, out=row)
+        row *= log_p.shape[1]
+        row += column
+        return weight_of_a_beam(len(beams), settings) * np.take(log_p, row).sum(axis=1, dtype=float)
+
+
+class BeamModel:
+    """Thrun et al. (2005), sec. 6.3.1: hit, something in the way, no answer, and a floor of random ranges.
+
+    Beams without an answer weigh all particles alike and are left out.
+    """
+
+    def __init__(self, grid_map: GridMap, settings: Settings) -> None:
+        self._settings = settings
+        self._caster = RayCaster(grid_map)
+        self._depth_m = 0.5 * grid_map.resolution_m  # a ray ends at the cell's boundary, a beam inside
+
+    def log_weights(self, map_from_base: np.ndarray, scan: Scan) -> np.ndarray:
+        """(P,) log likelihoods of the scan at poses (P, 3)."""
+        settings = self._settings
+        beams = chosen_beams(scan, settings)
+        z = scan.ranges_m[beams]
+        expected = self._depth_m + self._caster.cast_first(se2.compose(map_from_base, scan.base_from_laser),
+                                                           scan.angles_rad[beams], scan.range_max_m).range_m
+        normal = np.exp(-0.5 * np.minimum(((z - expected) / settings.sigma_hit_m) ** 2, 100.0))
+        density = (settings.z_hit / (np.sqrt(2.0 * np.pi) * settings.sigma_hit_m) * normal
+                   + settings.z_rand / scan.range_max_m)
+        if settings.z_short > 0.0:
+            rate = settings.lambda_short
+            density += np.where(z < expected, settings.z_short * rate * np.exp(-rate * z)
+                                / -np.expm1(-rate * np.minimum(expected, scan.range_max_m)), 0.0)
+        return weight_of_a_beam(len(beams), settings) * np.log(density).sum(axis=1)
+
+
+SensorModel = Union[LikelihoodField, BeamModel]
+
+
+def chosen_beams(scan: Scan, settings: Settings) -> np.ndarray:
+    """Indices of beams that answered, at most so many, spread evenly."""
+    answered = np.flatnonzero(scan.answered)
+    if settings.max_beams is None or len(answered) <= settings.max_beams:
+        return answered
+    return answered[np.linspace(0, len(answered) - 1, settings.max_beams).round().astype(int)]
+
+
+def weight_of_a_beam(beams: int, settings: Settings) -> float:
+    """Neighbouring beams err together; many of them count for less each."""
+    if settings.independent_beams is None:
+        return 1.0
+    return min(1.0, settings.independent_beams / max(beams, 1))
+
+
+@dataclass(frozen=True)
+class PlainEstimate:
+    """What plain Monte Carlo localization says after one scan."""
+    stamp_ns: int
+    map_from_base: np.ndarray  # (3,) pose of the best cluster
+
+
+class PlainMcl:
+    """Monte Carlo localization as AMCL has it: odometry moves the particles, the scan weighs them, KLD counts them.
+
+    Thrun et al. (2005), table 8.2 and sec. 8.3.7; resampling with every update, the update thresholds and the noise
+    of odometry those of our filter.
+    """
+
+    def __init__(self, params: GlassMclParams, grid_map: GridMap, rng: np.random.Generator, model: SensorModel,
+                 count: ParticleCount = ParticleCount(min_particles=500, max_particles=5000)) -> None:
+        self._params, self._count, self._rng, self._model = params, count, rng, model
+        self._particles = np.zeros((0, 3))
+        self._odom_from_base: Optional[np.ndarray] = None
+        self._map_from_odom = np.zeros(3)
+        self._update_due = True
+
+    def set_pose(self, map_from_base: np.ndarray, covariance: np.ndarray) -> None:
+        """Start over around a pose (3,) with a covariance (3, 3)."""
+        self._particles = self._rng.multivariate_normal(map_from_base, covariance, self._count.max_particles)
+        self._odom_from_base = None
+
+    def request_update(self) -> None:
+        """The next scan is used even if the robot did not move."""
+        self._update_due = True
+
+    def update(self, scan: Scan, odom_from_base: np.ndarray) -> PlainEstimate:
+        """One scan and the odometry (3,) at its stamp -> pose."""
+        if self._is_due(odom_from_base):
+            if self._odom_from_base is not None:
+                step = se2.compose(se2.inverse(self._odom_from_base), odom_from_base)
+                self._particles = motion.sample(self._particles, step, self._params.odometry, self._rng)
+            weights = resampling.normalised(self._model.log_weights(self._particles, scan))
+            best = pose_estimate.of(self._particles, weights)
+            drawn = resampling.low_variance(weights, self._count.max_particles, self._rng)
+            enough = resampling.enough_particles(self._particles[np.unique(drawn)], self._count)
+            self._particles = self._particles[resampling.low_variance(weights, enough, self._rng)]
+            self._map_from_odom = se2.compose(best.map_from_base, se2.inverse(odom_from_base))
+            self._odom_from_base, self._update_due = np.array(odom_from_base, float), False
+        return PlainEstimate(scan.stamp_ns, se2.compose(self._map_from_odom, odom_from_base))
+
+    def _is_due(self, odom_from_base: np.ndarray) -> bool:
+        if self._odom_from_base is None or self._update_due:
+            return True
+        way, turn = motion.travelled(se2.compose(se2.inverse(self._odom_from_base), odom_from_base))
+        return way >= self._params.schedule.update_min_d or turn >= self._params.schedule.update_min_a
+
+
+class OtherWeights(GlassMcl):
+    """Our filter, start to end, but the particles weighed by another sensor model."""
+
+    def __init__(self, params: GlassMclParams, grid_map: GridMap, rng: np.random.Generator,
+                 model: SensorModel) -> None:
+        super().__init__(params, grid_map, rng)
+        self._model = model
+
+    def _log_weights(self, scan: Scan, particles: np.ndarray, cases: BeamCases, *_: Any) -> np.ndarray:
+        return self._model.log_weights(particles, scan)
+
+
+class DiffuseOnly(GlassMcl):
+    """Our filter, with only the beams that are told to have ended at the first surface."""
+
+    def _log_weights(self, scan: Scan, particles: np.ndarray, cases: BeamCases, *rest: Any) -> np.ndarray:
+        diffuse = np.where(cases.case == DIFFUSE, cases.case, UNCERTAIN).astype(np.uint8)
+        return super()._log_weights(scan, particles, replace(cases, case=diffuse), *rest)
+
+
+class OracleCases(GlassMcl):
+    """Our filter, weighing by the true cases; set `true_case` (B,) before each update()."""
+
+    true_case = np.zeros(0, np.uint8)
+
+    def _log_weights(self, scan: Scan, particles: np.ndarray, cases: BeamCases, *rest: Any) -> np.ndarray:
+        known = np.where(scan.answered, self.true_case, UNCERTAIN).astype(np.uint8)
+        return super()._log_weights(scan, particles, replace(cases, case=known), *rest)
+
+
+SETTINGS = {
+    "amcl_field60": Settings(sigma_hit_m=0.1, z_hit=0.95, z_rand=0.05),
+    "amcl_field_all": Settings(sigma_hit_m=0.1, z_hit=0.95, z_rand=0.05, max_beams=None, independent_beams=60.0),
+    "amcl_beam60": Settings(sigma_hit_m=0.1, z_hit=0.7, z_rand=0.2, z_short=0.1),
+    "amcl_beam_all": Settings(sigma_hit_m=0.1, z_hit=0.7, z_rand=0.2, z_short=0.1, max_beams=None,
+                              independent_beams=60.0),
+    "ours_field": Settings(sigma_hit_m=0.05, z_hit=0.95, z_rand=0.05, max_beams=60, independent_beams=40.0),
+    "ours_beam": Settings(sigma_hit_m=0.05, z_hit=0.7, z_rand=0.2, z_short=0.1, max_beams=60, independent_beams=40.0),
+}
+
+Localizer = Union[GlassMcl, PlainMcl]
+
+
+def localizer(name: str, params: GlassMclParams, grid_map: GridMap, seed: int,
+              settings: Optional[Settings] = None) -> Localizer:
+    """One of LOCALIZERS, fresh.
+
+    Args:
+        name: of LOCALIZERS.
+        params: of our filter; the others take odometry, update thresholds and the rest from it.
+        grid_map: where the robot is.
+        seed: of its random numbers.
+        settings: of the sensor model, in place of SETTINGS[name].
+    """
+    rng = np.random.default_rng(seed)
+    if name in OURS:
+        return OURS[name](params, grid_map, rng)
+    chosen = SETTINGS[name] if settings is None else settings
+    model: SensorModel = (LikelihoodField if "field" in name else BeamModel)(grid_map, chosen)
+    return (PlainMcl if name.startswith("amcl") else OtherWeights)(params, grid_map, rng, model)
+
+
+def _with_vote(mode: str) -> Callable[[GlassMclParams, GridMap, np.random.Generator], GlassMcl]:
+    return lambda params, grid_map, rng: GlassMcl(replace(params, vote=replace(params.vote, vote_mode=mode)),
+                                                  grid_map, rng)
+
+
+OURS: Dict[str, Callable[[GlassMclParams, GridMap, np.random.Generator], GlassMcl]] = {
+    "ours": GlassMcl, "ours_paper": _with_vote("paper"), "ours_case1": DiffuseOnly, "ours_oracle": OracleCases}
+LOCALIZERS = (*OURS, *SETTINGS)
+BASELINES = ("ours_case1", *SETTINGS)  # honest: they know what a localizer can know; ours_oracle is told more
