@@ -1,0 +1,76 @@
+"""rviz/glass_nav.rviz and launch/rviz.launch: native displays, on topics that exist, all of which can be remapped."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Any, Iterator
+
+import yaml
+
+from glass_nav.ros import beam_displays, localization_node, wall_display
+
+REPO = Path(__file__).parents[3]
+CONFIG = yaml.safe_load((REPO / "rviz" / "glass_nav.rviz").read_text(encoding="utf-8"))
+TOPIC_KEYS = ("Topic", "Marker Topic", "Image Topic")
+
+
+def displays(part: Any = None) -> Iterator[Any]:
+    """Every display, those in groups too."""
+    for display in CONFIG["Visualization Manager"]["Displays"] if part is None else part:
+        yield display
+        yield from displays(display.get("Displays", []))
+
+
+def named(name: str) -> Any:
+    (display,) = [display for display in displays() if display["Name"] == name]
+    return display
+
+
+def topics() -> "dict[str, str]":
+    """Topic -> display."""
+    return {display[key]: display["Name"] for display in displays() for key in TOPIC_KEYS if key in display}
+
+
+def test_all_displays_and_panels_are_rviz_own():
+    for part in [*displays(), *CONFIG["Panels"], *CONFIG["Visualization Manager"]["Tools"]]:
+        assert part["Class"].startswith("rviz/"), part
+
+
+def test_what_is_called_value_is_what_is_enabled():
+    for display in displays():
+        assert display.get("Value", display["Enabled"]) == display["Enabled"], display["Name"]
+
+
+def test_every_case_and_the_status_have_a_checkbox():
+    names = [*beam_displays.CASE_NAMES, beam_displays.STATUS_NAMESPACE]
+    assert named("Beams by case")["Namespaces"] == dict.fromkeys(names, True)
+    assert named("Glass map")["Namespaces"] == dict.fromkeys(wall_display.WALL_NAMES, True)
+
+
+def test_the_topology_waits_switched_off():
+    group = named("Topology")
+    assert group["Class"] == "rviz/Group" and group["Enabled"] is False
+    assert {display["Name"] for display in group["Displays"]} == {"Candidates", "Atlas"}
+
+
+def test_the_topics_of_the_node_are_those_it_tells_of():
+    told = localization_node.__doc__
+    for topic in topics():
+        match = re.fullmatch(r"/glass_localization/(\w+)", topic)
+        if match:
+            assert f"~{match[1]}" in told, topic
+
+
+def test_every_topic_below_a_node_can_be_remapped_to_another_name():
+    launch = ElementTree.parse(REPO / "launch" / "rviz.launch").getroot()
+    remaps = {remap.get("from"): remap.get("to") for remap in launch.iter("remap")}
+    below = {topic for topic in topics() if topic.count("/") == 2 and not topic.startswith("/move_base")}
+    assert {topic for topic in remaps if topic.count("/") == 2} == below
+    for origin in below:
+        _, node, topic = origin.split("/")
+        argument = {"glass_localization": "name", "topology_node": "topology_name"}[node]
+        assert remaps[origin] == f"/$(arg {argument})/{topic}"
+    defaults = {arg.get("name"): arg.get("default") for arg in launch.iter("arg")}
+    assert (defaults["name"], defaults["topology_name"]) == ("glass_localization", "topology_node")
