@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import List, NamedTuple, Optional
 
 from glass_nav.simulation import building_file, building_map, lidar
+from glass_nav.simulation.lidar import LidarModel
 from glass_nav.simulation.simulation import Frame, Simulation
 from glass_nav.world.grid_map import GridMap
 
@@ -39,12 +41,13 @@ def drive(name: str, lidar_name: str, seed: int, changed: float = 0.0, max_scans
         changed: share of the movable furniture that was moved since the map was drawn.
         max_scans: stop there.
     """
+    return drive_with(lidar.preset(lidar_name), name, seed, changed, max_scans)
+
+
+def drive_with(model: LidarModel, name: str, seed: int, changed: float = 0.0,
+               max_scans: Optional[int] = None) -> Drive:
+    """As drive(), with any lidar."""
     building = building_file.load(MAPS / name / "building.yaml")
-    simulation = Simulation(building, lidar.preset(lidar_name), seed=seed, scan_rate_hz=SCAN_RATE_HZ,
-                            changed_share=changed)
-    frames: List[Frame] = []
-    for frame in simulation.drive(next(iter(building.paths))):
-        frames.append(frame)
-        if len(frames) == max_scans:
-            break
+    simulation = Simulation(building, model, seed=seed, scan_rate_hz=SCAN_RATE_HZ, changed_share=changed)
+    frames = list(itertools.islice(simulation.drive(next(iter(building.paths))), max_scans))
     return Drive(building_map.draw(building), frames)

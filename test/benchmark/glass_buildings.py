@@ -80,10 +80,10 @@ def run(job: Job) -> List[Run]:
     return [follow(name, job, drive) for name in job.localizers]
 
 
-def follow(name: str, job: Job, drive: drives.Drive) -> Run:
-    """One localizer on one drive, from near its first pose."""
+def follow(name: str, job: Job, drive: drives.Drive, settings: Optional[baselines.Settings] = None) -> Run:
+    """One localizer on one drive, from near its first pose; settings in place of the baseline's own."""
     rng = np.random.default_rng([job.seed, 1])
-    localizer = baselines.localizer(name, job.settings, drive.grid_map, job.seed)
+    localizer = baselines.localizer(name, job.settings, drive.grid_map, job.seed, settings)
     start = drive.frames[0].map_from_base + START_DEVIATION * rng.standard_normal(3)
     localizer.set_pose(start, np.diag(START_DEVIATION**2))
     poses: List[np.ndarray] = []
