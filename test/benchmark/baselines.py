@@ -27,7 +27,7 @@ from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import GridMap
 
-_PARTS = 2  # of a cell's edge: how finely the likelihood field is tabulated
+_PARTS = 4  # of a cell's edge: how finely the likelihood field is tabulated
 
 
 class Settings(NamedTuple):
@@ -44,7 +44,7 @@ class Settings(NamedTuple):
 class LikelihoodField:
     """Thrun, Burgard, Fox, Probabilistic Robotics (2005), table 6.3: how near is a wall to where the beam ended?
 
-    log of z_hit exp(-d^2 / (2 s^2)) + z_rand / z_max, as AMCL has it, looked up in a table of half cells.
+    log of z_hit exp(-d^2 / (2 s^2)) + z_rand / z_max, as AMCL has it, looked up in a table of quarters of cells.
     """
 
     def __init__(self, grid_map: GridMap, settings: Settings) -> None:
