@@ -7,13 +7,17 @@ unknown: the inside of walls and furniture, the far side of walls, rooms that no
 
 from __future__ import annotations
 
+import os
 from functools import lru_cache
-from typing import List, Tuple
+from pathlib import Path
+from typing import List, Tuple, Union
 
 import numpy as np
 from scipy import ndimage
 
+from glass_nav.simulation import building_file
 from glass_nav.simulation.building import OPAQUE, Building
+from glass_nav.world import map_file
 from glass_nav.world.grid_map import UNKNOWN, GridMap
 
 MARGIN_M = 1.0     # of unknown cells around the building
@@ -45,6 +49,11 @@ def draw(building: Building, resolution_m: float = RESOLUTION_M) -> GridMap:
     grid.occupancy[free] = 0
     grid.occupancy[surface & ndimage.binary_dilation(free, np.ones((3, 3), bool))] = 100
     return grid
+
+
+def redraw(folder: "Union[str, os.PathLike[str]]") -> None:
+    """Write map.yaml and map.png beside the building.yaml of a folder."""
+    map_file.save(draw(building_file.load(folder)), Path(folder) / "map.yaml", ".png")
 
 
 def is_drawn(building: Building, points_m: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ import numpy as np
 
 from glass_nav.geometry import angles
 from glass_nav.simulation import building_map, glass, people
-from glass_nav.simulation.building import MIRROR, OPAQUE, Building, Surfaces, joined
+from glass_nav.simulation.building import LARGEST_GAP_M, MIRROR, OPAQUE, Building, Surfaces, joined
 
 ECHOES = ("first", "strongest", "last")
 VISIBILITIES = ("logistic", "lobe")
@@ -26,6 +26,7 @@ UNCERTAIN, DIFFUSE, MIRRORED, BEHIND_ONE, BEHIND_TWO = 0, 1, 2, 3, 4  # true cas
 FLOOR_REFLECTANCE = 0.1  # what a lidar still sees at its largest range, face on
 USUAL_DIRT = 0.004       # of a pane; dirty_share is the model's for this
 LARGEST_PANES = 8        # of one way that are looked at, two for each double glazing
+RESOLVED_M = 0.05        # echoes closer than this are one, named after the stronger
 NEAR_M = 1e-6            # a mirrored way does not meet its mirror
 ENDS = 1e-9              # share by which a surface is longer than it is: no beam slips through a corner
 
@@ -103,7 +104,8 @@ class TrueScan:
 
     Cases: 1 ended at the first mapped surface on its way; 3 and 4 passed one and two mapped panes and ended at the
     second and third mapped surface; 2 was mirrored at the first mapped surface, then ended at the first mapped one on
-    the mirrored way; 0 all else. The sheets of a double glazing are one surface.
+    the mirrored way; 0 all else. What is nearer than LARGEST_GAP_M to a pane, along the beam, is one surface with it,
+    as in the map; so are the sheets of a double glazing.
     """
     ranges_m: np.ndarray    # (B,) REP 117: inf no answer, -inf nearer than range_min
     case: np.ndarray        # (B,) uint8
@@ -113,7 +115,7 @@ class TrueScan:
 
 @dataclass(frozen=True)
 class _Fans:
-    """Rays that seem to come from F centres: the laser, or its mirror images behind panes. R rays, B beams of the lidar.
+    """Rays that seem to come from F centres: the laser, or its mirror images behind panes. R rays, B beams.
 
     The ray of beam b in fan f has the direction first_rad[f] + b * step_rad[f].
     """
@@ -186,6 +188,9 @@ def _reported(model: LidarModel, echoes: List[_Echoes], first_m: np.ndarray, rng
     rank = {"first": -range_m, "last": range_m, "strongest": power}[model.echo]
     best = np.argmax(np.where(heard, rank, -np.inf), axis=1)
     beams = np.arange(len(best))
+    with np.errstate(invalid="ignore"):  # echoes of one range, mostly by a wall that runs into the pane
+        same = heard & (np.abs(range_m - range_m[beams, best][:, None]) < RESOLVED_M)
+    best = np.argmax(np.where(same, power, -np.inf), axis=1)
     exact_m = range_m[beams, best]
     noise_m = model.noise_m * rng.standard_normal(len(beams))
     lost = rng.random(len(beams)) < model.dropout
@@ -241,9 +246,9 @@ def _mirrored(fan: _Fans, surfaces: Surfaces, beams: np.ndarray, mirror: np.ndar
     ray_of = np.full((len(panes), len(fan.ray)), -1)
     ray_of[image, beams] = np.arange(len(beams))
     ours = ray_of >= 0
-    return _Fans(centre_m, 2.0 * np.arctan2(line[:, 1], line[:, 0]) - fan.first_rad, np.repeat(-fan.step_rad, len(panes)),
-                 ray_of, np.argmax(ours, axis=1), ours.shape[1] - 1 - np.argmax(ours[:, ::-1], axis=1), image, ray,
-                 start_m)
+    return _Fans(centre_m, 2.0 * np.arctan2(line[:, 1], line[:, 0]) - fan.first_rad,
+                 np.repeat(-fan.step_rad, len(panes)), ray_of, np.argmax(ours, axis=1),
+                 ours.shape[1] - 1 - np.argmax(ours[:, ::-1], axis=1), image, ray, start_m)
 
 
 def _mirrored_echoes(model: LidarModel, building: Building, surfaces: Surfaces, fan: _Fans, direct: _Ways,
@@ -275,8 +280,11 @@ def _mirrored_echoes(model: LidarModel, building: Building, surfaces: Surfaces, 
             mapped = ways.end_mapped if at_end else ways.pane_mapped[:, k]
             passed = ways.end_passed if at_end else ways.passed[:, k]
             power = (ways.end_power if at_end else pane_power[:, k]) * (light * on_way[:, k]) ** 2 / range_m ** 2
-            case = np.where(known & mapped & (passed == 0) & (ways.missing_m >= range_m), MIRRORED, UNCERTAIN)
+            one = range_m - to_mirror_m < LARGEST_GAP_M  # it ended at what it was mirrored at, for the map
+            case = np.where(known & mapped & (passed == 0) & (ways.missing_m >= range_m),
+                            np.where(one, DIFFUSE, MIRRORED), UNCERTAIN)
             crossing_m = np.where(np.isnan(crossed_m) & (passed > 0), later_m, crossed_m)
+            crossing_m = np.where(case == DIFFUSE, np.nan, crossing_m)
             echoes.append(_Echoes(*(_spread(values, rows, beams, rest) for values, rest in (
                 (power, 0.0), (range_m, np.inf), (case, UNCERTAIN), (crossing_m, np.nan)))))
     return echoes
@@ -313,11 +321,17 @@ def _ways(building: Building, surfaces: Surfaces, fans: _Fans) -> _Ways:
                   & building_map.is_drawn(building, fans.points(ray[few], range_m[few])))
     glazing = surfaces.glazing[pane]
     opens = np.ones(mapped.shape, bool)  # the first sheet of its glazing on this way
-    opens[:, 1:] = glazing[:, 1:] != glazing[:, :-1]
+    with np.errstate(invalid="ignore"):
+        opens[:, 1:] = (glazing[:, 1:] != glazing[:, :-1]) & (np.diff(pane_m, axis=1) >= LARGEST_GAP_M)
     count = np.cumsum(mapped & opens, axis=1)
+    end_passed = np.zeros(rays, int)
+    if most:
+        last_m = np.where(np.isfinite(pane_m), pane_m, -np.inf).max(axis=1)
+        behind = end_m - last_m >= LARGEST_GAP_M  # else what ends the way is one surface with the last pane
+        end_passed = np.where(behind, count[:, -1], np.maximum(count[:, -1] - 1, 0))
     return _Ways(pane_m, pane, pane_cos, np.isfinite(pane_m), mapped, np.maximum(count - mapped, 0),
                  end_m, np.where(np.isfinite(end_m), surfaces.reflectance[end] * end_cos, 0.0), end_mapped,
-                 count[:, -1] if most else np.zeros(rays, int), missing_m)
+                 end_passed, missing_m)
 
 
 def _nearest(rays: int, ray: np.ndarray, surface: np.ndarray, range_m: np.ndarray,
@@ -332,7 +346,7 @@ def _nearest(rays: int, ray: np.ndarray, surface: np.ndarray, range_m: np.ndarra
 
 def _crossings(surfaces: Surfaces, chosen: np.ndarray,
                fans: _Fans) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Where rays cross the chosen surfaces: index of the ray, of the surface, range [m], cos of the incidence; all (C,).
+    """Where rays cross the chosen surfaces: ray and surface by index, range [m], cos of the incidence; all (C,).
 
     Seen from the centre of a fan a surface covers an interval of its beams: only those are worked out.
     """
