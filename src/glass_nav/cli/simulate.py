@@ -91,7 +91,8 @@ def main(arguments: argparse.Namespace) -> None:
             for frame in simulation.drive(path, pace):
                 write_frame(bag, frame, simulation.scan_period_s)
                 tally.add(frame)
-                for shown_m in range(shown_m + 1, int(tally.way_m) + 1):
+                while shown_m + 1 <= tally.way_m:
+                    shown_m += 1
                     progress.step()
     finally:
         progress.finish()

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glass_nav.geometry import se2
-from glass_nav.simulation.robot import arc
+from glass_nav.simulation.robot import moved
 
 SPIN_S = 0.2  # a wheel that lost its grip takes so long to find it
 DRAWS = 7  # random numbers of a step, used or not: what one step meets does not change the others
@@ -88,7 +87,7 @@ class Odometry:
         spun_s = min(dt_s, self._spin_left_s)
         told += spun_s * self._spin
         self._spin_left_s -= spun_s
-        self.odom_from_base = se2.compose(self.odom_from_base, arc(told))
+        self.odom_from_base = moved(self.odom_from_base, told)
         self.velocity = told / dt_s
 
     def _spinning(self, how_far: float, which: float) -> np.ndarray:

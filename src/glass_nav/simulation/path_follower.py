@@ -14,7 +14,6 @@ from typing import Any, List, Tuple
 
 import numpy as np
 
-from glass_nav.geometry import angles
 from glass_nav.simulation.robot import RobotParams
 
 TURN_ON_THE_SPOT_RAD = 1.0  # a point farther off to the side is turned to first
@@ -75,7 +74,7 @@ class PathFollower:
             return np.zeros(3)
         to_point = self._at(self.progress_m + self._p.lookahead_m) - map_from_base[:2]
         distance_m = max(float(np.linalg.norm(to_point)), 1e-6)
-        bearing = float(angles.wrap(math.atan2(to_point[1], to_point[0]) - map_from_base[2]))
+        bearing = math.remainder(math.atan2(to_point[1], to_point[0]) - float(map_from_base[2]), 2.0 * math.pi)
         braking = math.sqrt(2.0 * 0.7 * self._robot.max_acceleration_m_s2 * remaining_m) + CREEP_M_S
         speed = min(self._p.speed_m_s, self._robot.max_speed_m_s, braking)
         if self._robot.kind == "omni":
@@ -111,13 +110,13 @@ class PathFollower:
         parts = slice(first, last + 1)
         along = ((point_m - self._points[:-1][parts]) * self._directions[parts]).sum(axis=1)
         low = np.maximum(self.progress_m - self._starts[:-1][parts], 0.0)
-        along = np.clip(along, low, np.maximum(self._lengths[parts], low))
+        along = np.minimum(np.maximum(along, low), np.maximum(self._lengths[parts], low))
         nearest = self._points[:-1][parts] + along[:, None] * self._directions[parts]
         best = int(np.argmin(((nearest - point_m) ** 2).sum(axis=1)))
         return min(float(self._starts[first + best] + along[best]), self.length_m)
 
     def _segment(self, way_m: float) -> int:
-        return int(np.clip(np.searchsorted(self._starts, way_m, side="right") - 1, 0, len(self._lengths) - 1))
+        return min(max(int(np.searchsorted(self._starts, way_m, side="right")) - 1, 0), len(self._lengths) - 1)
 
     def _at(self, way_m: float) -> np.ndarray:
         index = self._segment(way_m)

@@ -13,8 +13,6 @@ from typing import Tuple
 
 import numpy as np
 
-from glass_nav.geometry import se2
-
 KINDS = ("diff", "omni")
 BISECTIONS = 20  # of the way to a contact: below a micrometre
 
@@ -56,7 +54,7 @@ class Obstacles:
         if not len(self._start_m):
             return math.inf
         offset = point_m - self._start_m
-        share = np.clip((offset * self._along_m).sum(axis=1) / self._length2, 0.0, 1.0)
+        share = np.minimum(np.maximum((offset * self._along_m).sum(axis=1) / self._length2, 0.0), 1.0)
         gap = offset - share[:, None] * self._along_m
         return math.sqrt(float((gap * gap).sum(axis=1).min()))
 
@@ -67,12 +65,21 @@ def arc(twist: np.ndarray) -> np.ndarray:
     The exponential map of the plane's rigid motions; Thrun, Burgard, Fox, Probabilistic Robotics (2005), eq. 5.9,
     with sideways motion.
     """
-    forward, left, turn = (float(value) for value in twist)
+    forward, left, turn = twist.tolist()
     if abs(turn) < 1e-6:  # the series: 1 - cos(w) loses all its digits there
         along, across = 1.0 - turn * turn / 6.0, turn / 2.0
     else:
         along, across = math.sin(turn) / turn, (1.0 - math.cos(turn)) / turn
     return np.array([along * forward - across * left, across * forward + along * left, turn])
+
+
+def moved(pose: np.ndarray, twist: np.ndarray) -> np.ndarray:
+    """(3,) pose after a twist: compose(pose, arc(twist)), for one pose and without numpy, five times as fast."""
+    x, y, yaw = pose.tolist()
+    ahead, aside, turn = arc(twist).tolist()
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return np.array([x + cos * ahead - sin * aside, y + sin * ahead + cos * aside,
+                     (yaw + turn + math.pi) % (2.0 * math.pi) - math.pi])
 
 
 class Robot:
@@ -84,6 +91,7 @@ class Robot:
         self.velocity = np.zeros(3)
         self.blocked = False  # the last step ended at an obstacle
         self._obstacles = obstacles
+        self._room_m = 0.0  # the nearest obstacle is at least so far away
 
     @property
     def standing(self) -> bool:
@@ -113,7 +121,7 @@ class Robot:
             twist = mean * (dt_s / parts)
             share = self._free_share(twist)
             made = made + share * twist
-            self.map_from_base = se2.compose(self.map_from_base, arc(share * twist))
+            self.map_from_base = moved(self.map_from_base, share * twist)
             if share < 1.0:
                 self.blocked, self.velocity = True, np.zeros_like(before)
                 break
@@ -137,12 +145,18 @@ class Robot:
 
     def _free_share(self, twist: np.ndarray) -> float:
         """The part of a twist before it comes nearer to an obstacle than the base is wide; 1: all of it."""
+        self._room_m -= math.hypot(twist[0], twist[1])
+        if self._room_m >= self.params.radius_m:
+            return 1.0
+
         def clearance(share: float) -> float:
-            return self._obstacles.clearance(se2.compose(self.map_from_base, arc(share * twist))[:2])
+            return self._obstacles.clearance(moved(self.map_from_base, share * twist)[:2])
 
         allowed = min(self.params.radius_m, clearance(0.0))  # it may always leave, and turn on the spot
-        if clearance(1.0) >= allowed - 1e-9:
+        self._room_m = clearance(1.0)
+        if self._room_m >= allowed - 1e-9:
             return 1.0
+        self._room_m = 0.0
         free, hit = 0.0, 1.0
         for _ in range(BISECTIONS):
             middle = 0.5 * (free + hit)

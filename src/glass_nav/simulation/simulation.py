@@ -118,20 +118,13 @@ class Simulation:
         """Move for a time without a scan.
 
         Args:
-            dt_s: > 0.
+            dt_s: >= 1e-6.
             command: (3,) velocity: forward, left [m/s], turn [rad/s].
         """
-        if not 0.0 < dt_s < math.inf:
-            raise ValueError(f"a step must take > 0 s, got {dt_s}")
-        parts = math.ceil(dt_s / CONTROL_S - 1e-6)
-        begin_ns, whole_ns = self._time_ns, round(dt_s * 1e9)
-        for part in range(1, parts + 1):
-            end_ns = begin_ns + whole_ns * part // parts
-            part_s = (end_ns - self._time_ns) * 1e-9
-            self._wheels.step(self._robot.step(command, part_s), part_s)
-            self._time_ns = end_ns
-            self._blocked = self._blocked or self._robot.blocked
-            self._readings.append(self.reading)
+        if not 1e-6 <= dt_s < math.inf:
+            raise ValueError(f"a step must take >= 1e-6 s, got {dt_s}")
+        for end_ns in self._control_times(round(dt_s * 1e9)):
+            self._control(end_ns, command)
 
     def look(self) -> Frame:
         """One turn of the lidar, now."""
@@ -182,15 +175,27 @@ class Simulation:
             if still_s > STUCK_S:
                 x, y, _ = self.map_from_base
                 raise SimulationError(f"{self.building.name}: the robot is stuck at x {x:.2f} m, y {y:.2f} m after "
-                                      f"{follower.progress_m:.1f} of {follower.length_m:.1f} m: something stands in the "
-                                      "way of the path")
+                                      f"{follower.progress_m:.1f} of {follower.length_m:.1f} m: something stands in "
+                                      "the way of the path")
 
     def follow(self, follower: PathFollower) -> Frame:
         """Along the path until the next turn of the lidar."""
-        parts = max(1, math.ceil(self.scan_period_s / CONTROL_S - 1e-6))
-        for _ in range(parts):  # a command for each control step
-            self.move(self.scan_period_s / parts, follower.command(self.map_from_base))
+        for end_ns in self._control_times(round(self.scan_period_s * 1e9)):
+            self._control(end_ns, follower.command(self.map_from_base))
         return self.look()
+
+    def _control_times(self, whole_ns: int) -> List[int]:
+        """Ends of the control steps from now on, all of about the same length."""
+        parts = -(-whole_ns // round(CONTROL_S * 1e9))
+        return [self._time_ns + whole_ns * part // parts for part in range(1, parts + 1)]
+
+    def _control(self, end_ns: int, command: np.ndarray) -> None:
+        """One command for the base, and then one reading of its wheels."""
+        part_s = (end_ns - self._time_ns) * 1e-9
+        self._wheels.step(self._robot.step(command, part_s), part_s)
+        self._time_ns = end_ns
+        self._blocked = self._blocked or self._robot.blocked
+        self._readings.append(self.reading)
 
     def _robot_at(self, map_from_base: np.ndarray) -> Robot:
         if map_from_base.shape != (3,) or not np.all(np.isfinite(map_from_base)):
@@ -198,6 +203,6 @@ class Simulation:
         gap_m, radius_m = self._obstacles.clearance(map_from_base[:2]), self._robot_params.radius_m
         if gap_m < radius_m:
             x, y, _ = map_from_base
-            raise SimulationError(f"{self.building.name}: no room for the robot at x {x:.2f} m, y {y:.2f} m: its radius "
-                                  f"is {radius_m:g} m, the nearest obstacle {gap_m:.2f} m away")
+            raise SimulationError(f"{self.building.name}: no room for the robot at x {x:.2f} m, y {y:.2f} m: its "
+                                  f"radius is {radius_m:g} m, the nearest obstacle {gap_m:.2f} m away")
         return Robot(self._robot_params, map_from_base, self._obstacles)

@@ -51,7 +51,8 @@ def test_a_path_is_followed_to_its_end(name, kind):
     poses, velocities, follower = followed(PATHS[name], kind)
     assert np.hypot(*(poses[-1, :2] - PATHS[name][-1])) < 0.1
     assert off_path(poses[:, :2], PATHS[name]).max() < 0.2
-    assert follower.length_m == pytest.approx(np.linalg.norm(np.diff(np.array(PATHS[name], float), axis=0), axis=1).sum())
+    pieces_m = np.linalg.norm(np.diff(np.array(PATHS[name], float), axis=0), axis=1)
+    assert follower.length_m == pytest.approx(pieces_m.sum())
     acceleration = np.diff(velocities, axis=0) / CONTROL_S  # smooth: what the base can do
     assert np.abs(acceleration[:, 0]).max() < 0.8 + 1e-9
 

@@ -19,8 +19,8 @@ def driven(robot, command, seconds, dt_s=0.02):
     return robot
 
 
-@pytest.mark.parametrize("twist", [[1.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.3, -0.2, 1.1], [0.0, 0.0, 2.0], [1.0, 1.0, 1e-7],
-                                   [0.5, 0.1, 1.00001e-6], [2.0, 0.0, -6.0]])
+@pytest.mark.parametrize("twist", [[1.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.3, -0.2, 1.1], [0.0, 0.0, 2.0],
+                                   [1.0, 1.0, 1e-7], [0.5, 0.1, 1.00001e-6], [2.0, 0.0, -6.0]])
 def test_an_arc_is_the_sum_of_many_short_straight_steps(twist):
     twist, parts = np.array(twist), 3000
     pose = np.zeros(3)

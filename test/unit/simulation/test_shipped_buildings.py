@@ -1,0 +1,58 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from glass_nav.simulation import building_file, shipped_buildings
+from glass_nav.simulation.building_file import BuildingError
+
+REPO = Path(__file__).resolve().parents[3]
+
+
+def test_the_buildings_of_the_package_are_found_by_name():
+    assert "glass_office" in shipped_buildings.shipped()
+    path = shipped_buildings.find("glass_office")
+    assert path.resolve() == REPO / "maps" / "glass_office" / "building.yaml"
+    assert building_file.load(path).name == "glass_office"
+
+
+def test_files_and_folders_are_found_as_such(tmp_path):
+    (tmp_path / "mine").mkdir()
+    path = tmp_path / "mine" / "building.yaml"
+    path.write_text("walls: []\n")
+    assert shipped_buildings.find(str(path)) == path
+    assert shipped_buildings.find(str(tmp_path / "mine")) == path
+
+
+def test_a_folder_here_does_not_hide_a_building_of_the_package(tmp_path, monkeypatch):
+    (tmp_path / "glass_office").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert shipped_buildings.find("glass_office").resolve() == REPO / "maps" / "glass_office" / "building.yaml"
+
+
+def test_what_is_not_there_is_said_with_what_is(tmp_path):
+    known = ", ".join(shipped_buildings.shipped())
+    with pytest.raises(BuildingError) as caught:
+        shipped_buildings.find("glas_office")
+    assert str(caught.value) == ("glas_office: no such file, nor a building of the package, which are "
+                                 f"{known}; did you mean glass_office?")
+    with pytest.raises(BuildingError, match=f"^{tmp_path}: a folder without building.yaml$"):
+        shipped_buildings.find(str(tmp_path))
+
+
+def test_an_installed_package_has_them_in_its_share(tmp_path, monkeypatch):
+    module = tmp_path / "lib" / "python3" / "dist-packages" / "glass_nav" / "simulation" / "shipped_buildings.py"
+    module.parent.mkdir(parents=True)
+    module.write_text("")
+    assert shipped_buildings.maps_folder(module) is None
+    maps = tmp_path / "share" / "glass_nav" / "maps"
+    maps.mkdir(parents=True)
+    assert shipped_buildings.maps_folder(module) == maps
+
+
+def test_without_any_the_list_is_empty(monkeypatch):
+    monkeypatch.setattr(shipped_buildings, "maps_folder", lambda: None)
+    assert shipped_buildings.shipped() == {}
+    with pytest.raises(BuildingError, match="^office: no such file, nor a building of the package, which are none$"):
+        shipped_buildings.find("office")
