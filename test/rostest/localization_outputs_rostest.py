@@ -1,0 +1,260 @@
+#!/usr/bin/env python3
+"""The running node's scan_surfaces, glass map, markers and legend, in a room with a clear pane across it.
+
+The lidar of the test sees the pane head on, as real ones do, and what is behind it everywhere else.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import unittest
+from pathlib import Path
+from typing import Any, List
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import numpy as np
+import rospy
+import rostest
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from localization_interface_rostest import BEAMS, Robot, changed, pose_message, room
+from nav_msgs.msg import OccupancyGrid
+from nav_msgs.srv import GetMap, GetMapResponse
+from rostest_support import Heard, LogLines, wait_until
+from sensor_msgs.msg import Image, LaserScan
+from std_srvs.srv import Empty
+from visualization_msgs.msg import MarkerArray
+
+from glass_nav.geometry import angles, se2
+from glass_nav.msg import LocalizationStatus
+from glass_nav.ros import beam_displays, conversions, wall_display
+from glass_nav.sensing.raycast import RayCaster
+from glass_nav.world.grid_map import GridMap
+
+PANE_COLUMN = 140
+NODE = "/glass_localization"
+HEAD_ON_RAD = 0.15                    # up to this angle to its normal the pane answers
+MOUNTING = np.array([0.2, 0.0, 0.3])  # of the robot's lidar
+PERIOD_S = 0.5                        # ~glass_map_period_s
+
+
+def room_with_a_pane() -> GridMap:
+    """The room, and a pane that parts its eastern third, 1.3 m and more from the robot."""
+    empty = room()
+    occupancy = empty.occupancy.copy()
+    occupancy[:, PANE_COLUMN] = 100
+    return GridMap(occupancy, empty.resolution_m, empty.map_from_grid)
+
+
+class LidarAndPane:
+    """Ranges in the room with the pane, as RayCaster gives them of one without panes."""
+
+    def __init__(self) -> None:
+        self.room, self.with_pane = RayCaster(room()), RayCaster(room_with_a_pane())
+        self._normal_rad = room().map_from_grid[2]
+
+    def cast(self, poses: np.ndarray, bearings: np.ndarray, max_range_m: float) -> np.ndarray:
+        """(P, B) ranges [m] along bearings (B,) from poses (P, 3)."""
+        off_normal = np.abs(angles.wrap(poses[:, 2:] + bearings - self._normal_rad))
+        return np.where(off_normal < HEAD_ON_RAD, self.with_pane.cast(poses, bearings, max_range_m),
+                        self.room.cast(poses, bearings, max_range_m))
+
+
+class LocalizationOutputs(unittest.TestCase):
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.grid_map = room_with_a_pane()
+        cls.lines = LogLines()
+        cls.scans = Heard("scan", LaserScan)
+        cls.surfaces = Heard("scan_surfaces", LaserScan)
+        cls.status = Heard(f"{NODE}/status", LocalizationStatus)
+        cls.initialpose = rospy.Publisher("initialpose", PoseWithCovarianceStamped, queue_size=1)
+        cls.map_msg = conversions.msg_from_map(cls.grid_map, rospy.Time.now(), "map")
+        rospy.Service("static_map", GetMap, lambda _: GetMapResponse(cls.map_msg))
+        cls.lidar = LidarAndPane()
+        cls.robot = Robot(cls.grid_map, cls.lidar)
+        for service in ("global_localization", "request_nomotion_update"):
+            rospy.wait_for_service(service, timeout=20.0)
+        cls.update = rospy.ServiceProxy("request_nomotion_update", Empty)
+
+    def setUp(self) -> None:
+        self.robot.moving, self.robot.silent, self.robot.upside_down = False, False, False
+        self.robot.spoil = lambda msg: msg
+        self.assertTrue(wait_until(self.initialpose.get_num_connections, 20.0), "nobody listens to initialpose")
+        self.assertTrue(wait_until(lambda: len(self.surfaces), 20.0), "no scan_surfaces within 20 s")
+        self.localize()
+
+    def localize(self) -> None:
+        """Tell the node where the robot stands, and let it look until it is sure."""
+        def sure() -> bool:
+            self.update()
+            return self.status.last is not None and self.status.last.state == LocalizationStatus.LOCALIZED
+        self.initialpose.publish(pose_message(self.robot.map_from_base()))
+        self.robot.make_steps(3)
+        self.status.clear()
+        self.assertTrue(wait_until(sure, 20.0), f"not localized within 20 s: {self.status.last}")
+
+    def newest(self) -> "tuple[LaserScan, LaserScan]":
+        """The next message of scan_surfaces, and the scan with its stamp."""
+        self.robot.make_steps(2)  # what is under way
+        self.surfaces.clear()
+        self.assertTrue(wait_until(lambda: len(self.surfaces), 10.0), "no scan_surfaces within 10 s")
+        out = self.surfaces.last
+        self.assertTrue(wait_until(lambda: self.sent(out.header.stamp), 10.0), "no scan has the stamp of scan_surfaces")
+        return out, self.sent(out.header.stamp)[0]
+
+    def sent(self, stamp: rospy.Time) -> List[LaserScan]:
+        return [msg for msg in self.scans.all if msg.header.stamp == stamp]
+
+    def true_ranges(self, caster: Any, bearings: np.ndarray) -> np.ndarray:
+        return caster.cast(se2.compose(self.robot.map_from_base(), MOUNTING)[None], bearings, 20.0)[0]
+
+    def check_cut_at_the_pane(self, out: LaserScan, scan: LaserScan, bearings: np.ndarray) -> None:
+        measured, pane = (self.true_ranges(caster, bearings) for caster in (self.lidar, self.lidar.with_pane))
+        passed = measured > pane + 0.5
+        ranges, cut = np.array(out.ranges), np.array(out.intensities) == 1.0
+        self.assertGreater(passed.sum(), 30)
+        self.assertGreater(np.mean(cut[passed]), 0.9, f"{self.status.last.state_name}: {self.status.last.reason}")
+        self.assertEqual(np.count_nonzero(cut[measured == pane]), 0)
+        off = np.abs(ranges - pane)[cut]
+        self.assertLess(np.percentile(off, 95), 0.15)
+        self.assertLess(off.max(), 0.4)  # along a beam that grazes the pane
+        self.assertTrue(np.array_equal(ranges[~cut], np.array(scan.ranges)[~cut]))
+        self.assertEqual(set(out.intensities), {0.0, 1.0})
+
+    # -- scan_surfaces
+
+    def test_beams_through_the_pane_are_cut_there(self) -> None:
+        out, scan = self.newest()
+        self.check_cut_at_the_pane(out, scan, BEAMS)
+        self.assertEqual(out.header.frame_id, "laser")
+        self.assertEqual(len(out.ranges), len(scan.ranges))
+        for name in ("angle_min", "angle_max", "angle_increment", "range_min", "range_max"):
+            self.assertEqual(getattr(out, name), getattr(scan, name))
+
+    def test_a_lidar_that_hangs_upside_down_keeps_the_order_of_its_beams(self) -> None:
+        self.robot.silent = True
+        self.robot.make_steps(2)
+        self.robot.upside_down = True
+        self.robot.make_steps(2)  # no interpolation between the two mountings
+        self.robot.silent = False
+        self.localize()
+        out, scan = self.newest()
+        self.check_cut_at_the_pane(out, scan, -BEAMS)
+        self.robot.silent = True
+        self.robot.make_steps(2)
+        self.robot.upside_down = False
+        self.robot.make_steps(2)
+
+    def test_while_the_pose_is_not_trusted_the_scan_is_raw_and_flagged(self) -> None:
+        self.surfaces.clear()
+        rospy.ServiceProxy("global_localization", Empty)()
+        self.assertTrue(wait_until(lambda: any(msg.intensities[0] == -1.0 for msg in self.surfaces.all), 10.0),
+                        f"no raw scan while searching; state {self.status.last.state_name}")
+        out = [msg for msg in self.surfaces.all if msg.intensities[0] == -1.0][0]
+        self.assertEqual(set(out.intensities), {-1.0})
+        self.assertEqual(out.ranges, self.sent(out.header.stamp)[0].ranges)
+
+    def test_one_for_each_scan_that_is_used_and_none_for_others(self) -> None:
+        for fields in ({"angle_increment": 0.0}, {"header__frame_id": "nowhere"}, {"ranges": []}):
+            with self.subTest(fields=fields):
+                spoilt: List[rospy.Time] = []
+
+                def spoil(msg: LaserScan, fields: Any = fields, spoilt: Any = spoilt) -> LaserScan:
+                    spoilt.append(msg.header.stamp)
+                    return changed(msg, **fields)
+
+                self.robot.spoil = spoil
+                self.robot.make_steps(4)
+                self.robot.spoil = lambda msg: msg
+                self.robot.make_steps(2)
+                self.surfaces.clear()
+                self.assertTrue(wait_until(lambda: len(self.surfaces) > 3, 20.0), "no scan_surfaces any more")
+                stamps = [msg.header.stamp for msg in self.surfaces.all]
+                self.assertEqual(len(stamps), len(set(stamps)))
+                self.assertFalse(set(stamps) & set(spoilt))
+
+    def test_beams_without_an_answer_stay_without_one_or_end_at_glass(self) -> None:
+        answers = [math.nan, -math.inf, 0.0]
+        self.robot.spoil = lambda msg: changed(msg, ranges=answers + list(msg.ranges[3:]))
+        out, _ = self.newest()
+        self.assertTrue(np.array_equal(out.ranges[:3], answers, equal_nan=True), out.ranges[:3])
+        self.assertEqual(list(out.intensities[:3]), [0.0] * 3)
+
+    # -- ~glass_map and what rviz shows
+
+    def glass_map(self) -> OccupancyGrid:
+        """As somebody gets it who comes late."""
+        heard = Heard(f"{NODE}/glass_map", OccupancyGrid)
+        self.assertTrue(wait_until(lambda: len(heard), 10.0), "no ~glass_map within 10 s")
+        return heard.last
+
+    def test_the_glass_map_has_the_maps_geometry_and_tells_the_pane_from_walls(self) -> None:
+        for _ in range(10):
+            self.update()
+            self.robot.make_steps(1)
+        listener = Heard(f"{NODE}/glass_map", OccupancyGrid)
+        self.assertTrue(wait_until(lambda: len(listener) > 1 or (self.update() and False), 10.0), "sent only once")
+        msg = self.glass_map()
+        self.assertEqual(msg.header.frame_id, "map")
+        self.assertAlmostEqual(msg.info.resolution, self.map_msg.info.resolution, places=6)
+        self.assertEqual((msg.info.width, msg.info.height), (self.map_msg.info.width, self.map_msg.info.height))
+        self.assertLess(np.abs(conversions.planar_from_pose(msg.info.origin) - self.grid_map.map_from_grid).max(), 1e-9)
+        glass = np.array(msg.data).reshape(self.grid_map.occupancy.shape)
+        self.assertTrue(np.all(glass[~self.grid_map.occupied] == -1))
+        pane, walls = glass[10:-10, PANE_COLUMN], np.concatenate([glass[:5].ravel(), glass[:, :5].ravel()])
+        self.assertGreater(np.count_nonzero(pane >= 0), 10)
+        self.assertLess(np.median(walls[walls >= 0]), 0.5 * np.median(pane[pane >= 0]))
+
+    def test_the_glass_map_goes_out_no_more_often_than_asked(self) -> None:
+        listener = Heard(f"{NODE}/glass_map", OccupancyGrid)
+        self.assertTrue(wait_until(lambda: len(listener), 10.0), "no ~glass_map within 10 s")
+        for _ in range(15):
+            self.update()
+            self.robot.make_steps(1)
+        stamps = [msg.header.stamp.to_sec() for msg in listener.all[1:]]  # the first is the latched one
+        self.assertGreater(len(stamps), 1)
+        self.assertGreater(np.diff(stamps).min(), PERIOD_S - 0.2)  # a scan is up to 0.1 s old
+
+    def test_the_glass_map_comes_without_a_scan_too(self) -> None:
+        self.robot.silent = True
+        self.robot.make_steps(3)
+        self.glass_map()
+
+    def test_each_case_has_its_namespace_and_the_status_too(self) -> None:
+        markers = Heard(f"{NODE}/beam_markers", MarkerArray)
+        self.assertTrue(wait_until(lambda: len(markers), 10.0), "no ~beam_markers within 10 s")
+        self.assertTrue(wait_until(lambda: self.sent(markers.last.markers[0].header.stamp), 10.0),
+                        "no scan has the stamp of the markers")
+        names = {marker.ns for marker in markers.last.markers}
+        self.assertEqual(names, {*beam_displays.CASE_NAMES, beam_displays.STATUS_NAMESPACE})
+        (status,) = [marker for marker in markers.last.markers if marker.ns == beam_displays.STATUS_NAMESPACE]
+        self.assertTrue(status.text.startswith("LOCALIZED"), status.text)
+        self.assertEqual(status.header.frame_id, "map")
+        through = [marker for marker in markers.last.markers if marker.ns == "3 behind one pane"]
+        self.assertGreater(max(len(marker.points) for marker in through), 30)
+
+    def test_the_walls_are_shown_by_what_they_are(self) -> None:
+        markers = Heard(f"{NODE}/wall_markers", MarkerArray)
+        self.assertTrue(wait_until(lambda: len(markers), 10.0), "no ~wall_markers within 10 s")
+        self.assertEqual([marker.ns for marker in markers.last.markers], list(wall_display.WALL_NAMES))
+
+    def test_silence_is_told_beside_the_robot(self) -> None:
+        markers = Heard(f"{NODE}/beam_markers", MarkerArray)
+        self.robot.silent = True
+        self.assertTrue(wait_until(lambda: markers.last and "no scan on /scan" in " ".join(
+            markers.last.markers[-1].text.split("\n")), 10.0), "nothing said in ~beam_markers within 10 s")
+
+    def test_the_legend_waits_for_whoever_comes(self) -> None:
+        for _ in range(2):
+            legend = Heard(f"{NODE}/legend", Image)
+            self.assertTrue(wait_until(lambda legend=legend: len(legend), 10.0), "no ~legend within 10 s")
+            self.assertEqual((legend.last.encoding, legend.last.step), ("rgb8", 3 * legend.last.width))
+            self.assertEqual(len(legend.last.data), legend.last.height * legend.last.step)
+
+
+if __name__ == "__main__":
+    rospy.init_node("localization_outputs_rostest")
+    rostest.rosrun("glass_nav", "localization_outputs", LocalizationOutputs)
