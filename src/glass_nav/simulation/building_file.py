@@ -126,8 +126,12 @@ def _made(noun: str, number: int, item: Item, make: Callable[[str, Item], T]) ->
     try:
         return make(noun, item)
     except ValueError as err:
-        word, _, rest = str(err).partition(" ")  # the parts of a building name themselves in the first word
-        raise BuildingError(f"{noun} {number} {rest}") from err
+        raise BuildingError(f"{noun} {number} {_without_noun(err)}") from err
+
+
+def _without_noun(err: ValueError) -> str:
+    """The text of an error of a part of a building, which begins with the word for it."""
+    return str(err).partition(" ")[2]
 
 
 def _items(document: Item, section: str) -> List[Item]:
@@ -253,8 +257,9 @@ def _paths(document: Item) -> Dict[str, np.ndarray]:
     checked = {}
     for name in paths:
         points = _points(f"path {name}", paths, name)
-        if len(points) < 2:
-            raise BuildingError(f"path {name} has {len(points)} point{'s' if len(points) != 1 else ''}, "
-                                "a path needs at least 2")
+        try:
+            check_line("path", points)
+        except ValueError as err:
+            raise BuildingError(f"path {name} {_without_noun(err)}") from err
         checked[str(name)] = points
     return checked
