@@ -8,16 +8,15 @@ import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from typing import Optional, Union
+from typing import Optional
 
 import numpy as np
 
 from glass_nav.cli.progress import Progress
 from glass_nav.recording.bag_writer import BagWriter
-from glass_nav.simulation import building_file, building_map, lidar, path_follower, shipped_buildings
+from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings
 from glass_nav.simulation.lidar import ECHOES, LidarModel
-from glass_nav.simulation.building import Building
-from glass_nav.simulation.path_follower import FollowerParams
+from glass_nav.simulation.path_follower import FIRST, FollowerParams
 from glass_nav.simulation.robot import KINDS, RobotParams
 from glass_nav.simulation.simulation import Frame, Simulation
 from glass_nav.world import map_file
@@ -36,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                              f"{', '.join(shipped_buildings.shipped())}")
     parser.add_argument("--out", required=True, type=Path, metavar="BAG",
                         help="the bag, such as run.bag; the map goes beside it as run.map.yaml")
-    parser.add_argument("--path", metavar="NAME_OR_FILE",
+    parser.add_argument("--path", default=FIRST, metavar="NAME_OR_FILE",
                         help="a path of the building, or a file of waypoints: yaml, a list of [x, y], or lines of x,y; "
                              "default: the building's first path")
     parser.add_argument("--lidar", default="sensitive", metavar="PRESET",
@@ -80,15 +79,15 @@ def main(arguments: argparse.Namespace) -> None:
     building = building_file.load(shipped_buildings.find(arguments.building))
     simulation = Simulation(building, _lidar_model(arguments), RobotParams(arguments.robot), seed=arguments.seed,
                             scan_rate_hz=arguments.rate, changed_share=arguments.changed)
-    path, pace = _path(building, arguments.path), FollowerParams(speed_m_s=arguments.speed)
-    follower = simulation.follower(path, pace)
+    pace = FollowerParams(speed_m_s=arguments.speed)
+    way_m = simulation.follower(arguments.path, pace).length_m
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     tally, shown_m = _Tally(), 0
-    progress = Progress("simulate", math.ceil(follower.length_m), unit="m")
+    progress = Progress("simulate", math.ceil(way_m), unit="m")
     try:
         with BagWriter(arguments.out) as bag:
             bag.mounting(simulation.stamp_ns, simulation.base_from_laser)
-            for frame in simulation.drive(path, pace):
+            for frame in simulation.drive(arguments.path, pace):
                 write_frame(bag, frame, simulation.scan_period_s)
                 tally.add(frame)
                 while shown_m + 1 <= tally.way_m:
@@ -142,14 +141,3 @@ class _Tally:
 def _lidar_model(arguments: argparse.Namespace) -> LidarModel:
     changes = {name: getattr(arguments, name) for name in ("beams", "echo") if getattr(arguments, name) is not None}
     return replace(lidar.preset(arguments.lidar), **changes)
-
-
-def _path(building: Building, wanted: Optional[str]) -> "Union[str, np.ndarray]":
-    """A name of the building's, or the waypoints of a file."""
-    if wanted is None:
-        if not building.paths:
-            raise path_follower.PathError(f"{building.name}: has no path; give a file of waypoints with --path")
-        return next(iter(building.paths))
-    if wanted not in building.paths and (Path(wanted).suffix or Path(wanted).is_file()):
-        return path_follower.load(Path(wanted))
-    return wanted

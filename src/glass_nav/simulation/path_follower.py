@@ -7,6 +7,7 @@ W waypoints; poses, velocities as in robot.py.
 
 from __future__ import annotations
 
+import difflib
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +15,11 @@ from typing import Any, List, Tuple
 
 import numpy as np
 
+from glass_nav.simulation.building import Building
 from glass_nav.simulation.robot import RobotParams
 
 TURN_ON_THE_SPOT_RAD = 1.0  # a point farther off to the side is turned to first
+FIRST = "first"             # the name that stands for a building's first path
 CREEP_M_S = 0.02            # so that braking arrives
 
 
@@ -64,6 +67,10 @@ class PathFollower:
         """(3,) pose on the first point, with a view to the second."""
         x, y = self._directions[0]
         return np.array([self._points[0, 0], self._points[0, 1], math.atan2(y, x)])
+
+    def back(self) -> "PathFollower":
+        """For the way back along the same path."""
+        return PathFollower(self._points[::-1], self._robot, self._p)
 
     def command(self, map_from_base: np.ndarray) -> np.ndarray:
         """(3,) velocity that brings a base at that pose on along the path; zero at its end."""
@@ -124,6 +131,29 @@ class PathFollower:
 
     def _direction(self, way_m: float) -> np.ndarray:
         return self._directions[self._segment(way_m)]
+
+
+def find(wanted: str, building: Building) -> np.ndarray:
+    """Waypoints (W, 2) [m] of a path.
+
+    Args:
+        wanted: the name of a path of the building, "first" for the one that it has first, or a file; see load().
+
+    Raises:
+        PathError: none of these.
+    """
+    paths = building.paths
+    if wanted in paths:
+        return paths[wanted]
+    if wanted == FIRST:
+        if not paths:
+            raise PathError(f"{building.name}: has no path; give a file of waypoints")
+        return next(iter(paths.values()))
+    if Path(wanted).suffix or Path(wanted).is_file():
+        return load(Path(wanted))
+    near = difflib.get_close_matches(wanted, list(paths), n=1)
+    hint = f"; did you mean {near[0]}?" if near else ""
+    raise PathError(f"{building.name}: no path {wanted!r}, it has {', '.join(paths) or 'none'}{hint}")
 
 
 def load(path: Path) -> np.ndarray:

@@ -6,7 +6,6 @@ bytes, and the noise of one part does not depend on what another one draws. Time
 
 from __future__ import annotations
 
-import difflib
 import math
 from dataclasses import dataclass
 from typing import Iterator, List, Optional, Tuple, Union
@@ -15,11 +14,11 @@ import numpy as np
 
 from glass_nav.geometry import se2
 from glass_nav.sensing.scan import Scan, scan_from_fields
-from glass_nav.simulation import lidar
+from glass_nav.simulation import lidar, path_follower
 from glass_nav.simulation.building import Building
 from glass_nav.simulation.lidar import LidarModel, TrueScan
 from glass_nav.simulation.odometry import Odometry, OdometryParams
-from glass_nav.simulation.path_follower import FollowerParams, PathError, PathFollower
+from glass_nav.simulation.path_follower import FollowerParams, PathFollower
 from glass_nav.simulation.robot import Obstacles, Robot, RobotParams
 
 START_NS = 1_600_000_000 * 10**9  # of every run: a stamp that looks like one and says nothing about when it was made
@@ -141,18 +140,14 @@ class Simulation:
                      readings or (self.reading,), blocked)
 
     def follower(self, path: "Union[str, np.ndarray]", p: FollowerParams = FollowerParams()) -> PathFollower:
-        """For a path of the building by name, or waypoints (W, 2). Puts a robot that has not moved yet at its start.
+        """For a path by name or file, see path_follower.find(), or waypoints (W, 2). Puts a robot that has not moved
+        yet at its start.
 
         Raises:
             PathError: no such path, or none that can be driven.
         """
         if isinstance(path, str):
-            paths = self.building.paths
-            if path not in paths:
-                near = difflib.get_close_matches(path, list(paths), n=1)
-                hint = f"; did you mean {near[0]}?" if near else ""
-                raise PathError(f"{self.building.name}: no path {path!r}, it has {', '.join(paths) or 'none'}{hint}")
-            path = paths[path]
+            path = path_follower.find(path, self.building)
         follower = PathFollower(path, self._robot_params, p)
         if self._time_ns == 0 and not self._start_given:
             self._robot = self._robot_at(follower.start)

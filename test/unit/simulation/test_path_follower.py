@@ -1,11 +1,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from glass_nav.simulation import path_follower
+from glass_nav.simulation.building import Building, Wall
 from glass_nav.simulation.path_follower import FollowerParams, PathError, PathFollower
 from glass_nav.simulation.robot import KINDS, Obstacles, Robot, RobotParams
 
@@ -110,6 +112,34 @@ def test_a_speed_of_nothing_is_refused():
 def test_a_file_of_waypoints(tmp_path, name, text):
     (tmp_path / name).write_text(text)
     np.testing.assert_array_equal(path_follower.load(tmp_path / name), [[0.0, 1.0], [2.5, 3.0]])
+
+
+def test_a_path_is_found_by_name_by_order_and_as_a_file(tmp_path):
+    building = Building((Wall(np.array([[0.0, 9.0], [9.0, 9.0]])),), name="hall",
+                        paths={"round": np.array([[0.0, 0.0], [1.0, 0.0]]), "a.b": np.array([[0.0, 0.0], [2.0, 0.0]])})
+    (tmp_path / "way").write_text("0 0\n3 0\n")
+    for wanted, end in (("round", 1.0), ("first", 1.0), ("a.b", 2.0), (str(tmp_path / "way"), 3.0)):
+        np.testing.assert_array_equal(path_follower.find(wanted, building), [[0.0, 0.0], [end, 0.0]])
+    named_first = replace(building, paths={"other": building.paths["round"], "first": building.paths["a.b"]})
+    assert path_follower.find("first", named_first)[1, 0] == 2.0
+    for wanted, text in (("rond", "hall: no path 'rond', it has round, a.b; did you mean round?"),
+                         ("x", "hall: no path 'x', it has round, a.b"),
+                         ("no.csv", "no.csv: cannot be read: No such file or directory")):
+        with pytest.raises(PathError) as caught:
+            path_follower.find(wanted, building)
+        assert str(caught.value) == text
+    for wanted, text in (("first", "hall: has no path; give a file of waypoints"),
+                         ("x", "hall: no path 'x', it has none")):
+        with pytest.raises(PathError) as caught:
+            path_follower.find(wanted, replace(building, paths={}))
+        assert str(caught.value) == text
+
+
+def test_the_way_back_is_the_same_path():
+    follower = PathFollower(np.array(PATHS["corner"], float), RobotParams(), FollowerParams(speed_m_s=0.2)).back()
+    np.testing.assert_allclose(follower.start, [4.0, 3.0, -math.pi / 2])
+    assert follower.length_m == 7.0
+    assert np.abs(follower.command(follower.start)).max() == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize("name, text, reason", [
