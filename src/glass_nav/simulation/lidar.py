@@ -42,8 +42,8 @@ class LidarModel:
     dropout: float = 0.005        # share of the beams that come back and are lost
     echo: str = "strongest"       # which one is reported: one of ECHOES
     visibility: str = "logistic"  # of panes: "logistic" share of beams by incidence, or "lobe" power by incidence
-    half_rad: float = np.deg2rad(15.8)   # logistic: half of the beams return from a clean pane
-    width_rad: float = np.deg2rad(1.8)   # logistic: 12 to 88 percent within two widths to either side
+    half_rad: float = np.deg2rad(15.5)   # logistic: half of the beams return from a clean pane
+    width_rad: float = np.deg2rad(2.2)   # logistic: 12 to 88 percent within two widths to either side
     dirty_share: float = 0.16     # logistic: of a usual pane, the share of spots that return a beam at any incidence
     specular: float = 1.0         # A: power of a pane face on at 1 m; a white wall has 1
     lobe_rad: float = np.deg2rad(5.0)    # lobe: theta_s
