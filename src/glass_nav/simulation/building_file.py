@@ -26,7 +26,7 @@ KEYS = {"walls": ("line", "thickness", "reflectance"),
         "unmapped": ("box", "yaw_deg", "outline", "reflectance"),
         "gone": ("box", "yaw_deg", "outline", "reflectance"),
         "people": ("waypoints", "speed", "radius")}
-SECTIONS = ("about", "placed", *KEYS, "seen", "paths", "start")
+SECTIONS = ("placed", *KEYS, "seen", "paths", "start")
 UNITS = {"thickness": "thickness_m", "gap": "gap_m", "speed": "speed_m_s", "radius": "radius_m"}  # keys of numbers
 MULLION_M = 0.06
 
