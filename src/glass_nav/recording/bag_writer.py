@@ -7,7 +7,6 @@ B beams.
 
 from __future__ import annotations
 
-import math
 import os
 from pathlib import Path
 from types import TracebackType
@@ -134,8 +133,8 @@ class BagWriter:
         return self._new(f"geometry_msgs/{kind}", x=float(x), y=float(y), z=0.0)
 
     def _rotation(self, yaw_rad: float) -> Any:
-        return self._new("geometry_msgs/Quaternion", x=0.0, y=0.0, z=math.sin(0.5 * yaw_rad),
-                         w=math.cos(0.5 * yaw_rad))
+        return self._new("geometry_msgs/Quaternion", x=0.0, y=0.0, z=float(np.sin(0.5 * yaw_rad)),
+                         w=float(np.cos(0.5 * yaw_rad)))
 
     def _pose(self, planar: np.ndarray) -> Any:
         return self._new("geometry_msgs/Pose", position=self._vector("Point", planar[0], planar[1]),

@@ -5,10 +5,13 @@ from io import BytesIO
 import numpy as np
 import pytest
 from geometry_msgs.msg import Twist, Vector3
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
+from tf2_msgs.msg import TFMessage
 
 from glass_nav.msg import TrueBeams
 from glass_nav.recording import bag_writer
+from glass_nav.recording.bag_writer import BagWriter
 from glass_nav.ros import conversions, frame_messages
 from glass_nav.ros.conversions import Mounting
 from glass_nav.ros.frame_messages import FrameNames
@@ -32,11 +35,15 @@ def frame():
     return Frame(STAMP_NS, POSE, reading.odom_from_base, scan, truth, (reading,), False)
 
 
-def over_the_wire(msg):
-    """As a subscriber gets it."""
+def serialized(msg):
     raw = BytesIO()
     msg.serialize(raw)
-    return type(msg)().deserialize(raw.getvalue())
+    return raw.getvalue()
+
+
+def over_the_wire(msg):
+    """As a subscriber gets it."""
+    return type(msg)().deserialize(serialized(msg))
 
 
 def test_a_scan_comes_back_through_the_conversion_of_the_localization(frame):
@@ -92,3 +99,35 @@ def test_bags_name_the_message_as_ros_does():
     store = get_typestore(Stores.ROS1_NOETIC)
     store.register(get_types_from_msg(bag_writer.TRUE_BEAMS, bag_writer.KINDS["/true_beams"]))
     assert store.generate_msgdef(bag_writer.KINDS["/true_beams"])[1] == TrueBeams._md5sum
+
+
+def transform(parent, child, parent_from_child):
+    return TFMessage([conversions.transform_stamped(STAMP_NS, parent, child, parent_from_child)])
+
+
+def test_rosbag_reads_what_the_package_writes(frame, tmp_path):
+    """So do `rosbag info` and `rosbag play`: each message comes out as the type of this machine."""
+    rosbag = pytest.importorskip("rosbag")
+    with BagWriter(tmp_path / "run.bag") as writer:
+        writer.mounting(STAMP_NS, LASER)
+        writer.odometry(STAMP_NS, frame.odom_from_base, frame.odometry[0].velocity)
+        writer.scan(frame.scan, 0.1)
+        writer.truth(STAMP_NS, POSE, frame.truth.case, frame.truth.exact_m, frame.truth.crossing_m)
+    names = FrameNames()
+    expected = {"/scan": frame_messages.scan_msg(frame.scan, 0.1, "laser"),
+                "/true_beams": frame_messages.true_beams_msg(STAMP_NS, frame.truth, "laser"),
+                "/odom": frame_messages.odometry_msg(frame.odometry[0], names),
+                "/ground_truth": frame_messages.ground_truth_msg(frame, names),
+                "/clock": Clock(conversions.stamp_from_ns(STAMP_NS)),
+                "/tf": transform("odom", "base_link", frame.odom_from_base),
+                "/tf_static": transform("base_link", "laser", LASER)}
+    with rosbag.Bag(str(tmp_path / "run.bag")) as bag:
+        read = {topic: (raw, stamp) for topic, raw, stamp in bag.read_messages(raw=True)}
+        assert {topic: info.msg_type for topic, info in bag.get_type_and_topic_info().topics.items()} == {
+            topic: msg._type for topic, msg in expected.items()}
+    assert read.keys() == expected.keys()
+    for topic, msg in expected.items():
+        (kind, data, digest, *_), stamp = read[topic]
+        assert (kind, digest) == (msg._type, msg._md5sum)
+        assert data == serialized(msg), topic
+        assert stamp == conversions.stamp_from_ns(STAMP_NS)
