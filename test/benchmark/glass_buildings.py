@@ -2,7 +2,8 @@
 """Simulated buildings of glass through the filter and through others: cases, poses, scan_surfaces.
 
     python test/benchmark/glass_buildings.py --localizers ours ours_paper      cases, soft and the document's vote
-    python test/benchmark/glass_buildings.py --seeds 20 --jobs 2 --out glass_buildings.json
+    python test/benchmark/glass_buildings.py --first-seed 200 --mixed --jobs 2 --out glass_buildings.json
+    python test/benchmark/glass_buildings.py --first-seed 200 --seeds 20 --mixed --localizers ours     lost share
     python test/benchmark/glass_buildings.py --buildings glass_office --lidars weak --changed 0.33 --set sample_count=19
 
 Every building x lidar x seed is driven once, and every localizer gets the same scans, odometry and start. A seed
@@ -256,6 +257,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--buildings", nargs="+", default=None, metavar="NAME", help="default: all in maps/")
     parser.add_argument("--lidars", nargs="+", default=None, metavar="PRESET", help="default: all presets")
+    parser.add_argument("--mixed", action="store_true", help="one lidar for each seed, in turn, not all of them")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--first-seed", type=int, default=100)
     parser.add_argument("--changed", type=float, default=0.0, metavar="SHARE", help="of the furniture, moved since "
@@ -268,9 +270,11 @@ def main() -> int:
     parser.add_argument("--out", type=Path, help="JSON with all figures of all runs")
     arguments = parser.parse_args()
     settings = settings_from(arguments.set)
+    lidars = arguments.lidars or drives.lidars()
     jobs = [Job(building, lidar, seed, arguments.changed, arguments.max_scans, tuple(arguments.localizers), settings)
-            for building in arguments.buildings or drives.buildings() for lidar in arguments.lidars or drives.lidars()
-            for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)]
+            for building in arguments.buildings or drives.buildings()
+            for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
+            for lidar in ([lidars[seed % len(lidars)]] if arguments.mixed else lidars)]
     runs: List[Run] = []
     began = time.monotonic()
     with multiprocessing.Pool(arguments.jobs) as pool:
