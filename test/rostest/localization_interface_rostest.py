@@ -410,6 +410,7 @@ class LocalizationInterface(unittest.TestCase):
         self.robot.moving = False  # until the node is there: its start pose is where the robot stands now
         x, y, yaw = self.robot.map_from_base()
         node = self.start(name, f"_initial_pose_x:={x}", f"_initial_pose_y:={y}", f"_initial_pose_a:={yaw}",
+                          "_initial_cov_xx:=0.01", "_initial_cov_yy:=0.01", "_initial_cov_aa:=0.01",
                           "_save_pose_rate:=0.0", "_laser_likelihood_max_dist:=2.0", "_do_beamskip:=false",
                           script=script)
         started = wait_until(lambda: len(poses), 30.0)
