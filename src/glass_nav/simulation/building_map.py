@@ -23,6 +23,7 @@ from glass_nav.world.grid_map import UNKNOWN, GridMap
 MARGIN_M = 1.0     # of unknown cells around the building
 RESOLUTION_M = 0.05
 STEPS_PER_CELL = 10
+LEAST_SHARE = 0.35  # of a cell that a surface runs through: where it cuts a corner, more beams pass than end
 
 
 def draw(building: Building, resolution_m: float = RESOLUTION_M) -> GridMap:
@@ -41,8 +42,9 @@ def draw(building: Building, resolution_m: float = RESOLUTION_M) -> GridMap:
     low = np.floor((ends.min(axis=0) - MARGIN_M) / resolution_m).astype(int)
     columns, rows = np.ceil((ends.max(axis=0) + MARGIN_M) / resolution_m).astype(int) - low
     grid = GridMap(np.full((rows, columns), UNKNOWN, np.int8), resolution_m, np.append(low * resolution_m, 0.0))
-    surface = np.zeros((rows, columns), bool)
-    surface[grid.cells(_points(from_m, to_m, resolution_m / STEPS_PER_CELL))] = True
+    row, column = grid.cells(_points(from_m, to_m, resolution_m / STEPS_PER_CELL))
+    points = np.bincount(row * columns + column, minlength=rows * columns).reshape(rows, columns)
+    surface = points >= LEAST_SHARE * STEPS_PER_CELL
     regions, _ = ndimage.label(~surface)  # of cells that share an edge
     reached = np.unique(regions[grid.cells(seeds)])
     free = np.isin(regions, reached[reached > 0])
