@@ -82,3 +82,9 @@ def test_rosrun_starts_the_command_line_tool(install: Path, tmp_path: Path) -> N
     done = in_install_space(install, "rosrun glass_nav glass_nav --help", tmp_path)
     assert done.returncode == 0, done.stdout
     assert "replay" in done.stdout
+
+
+def test_the_installed_buildings_are_found_by_name(install: Path, tmp_path: Path) -> None:
+    code = "from glass_nav.simulation import shipped_buildings as s; print(s.shipped()[\"glass_office\"])"
+    done = in_install_space(install, f"/usr/bin/python3 -c '{code}'", tmp_path)
+    assert done.stdout.strip() == str(install / "share" / "glass_nav" / "maps" / "glass_office" / "building.yaml")

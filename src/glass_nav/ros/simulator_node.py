@@ -115,7 +115,8 @@ class SimulatorNode:
         self._answers = 0  # transforms map -> odom; counted by the thread of tf
         self._answers_used, self._answering = 0, False
         self._pose_wanted = threading.Event()
-        self._began_s = time.monotonic()
+        self._began_s = self._paced_s = time.monotonic()
+        self._paced_ns = self._simulation.stamp_ns  # simulated time that was due at _paced_s
         self._next_scan_ns = self._simulation.stamp_ns
 
         self._clock = rospy.Publisher("/clock", Clock, queue_size=100, tcp_nodelay=True)
@@ -141,7 +142,7 @@ class SimulatorNode:
             simulation.stamp_ns, self._names.base, self._names.laser, simulation.base_from_laser))
         self._blocked_flag.publish(Bool(False))
         self._publish_reading()
-        began_ns, began_s = simulation.stamp_ns, time.monotonic()
+        self._paced_s = time.monotonic()
         while not (rospy.is_shutdown() or ending.is_set()):
             if simulation.stamp_ns >= self._next_scan_ns:
                 self._next_scan_ns += round(simulation.scan_period_s * 1e9)
@@ -151,15 +152,23 @@ class SimulatorNode:
             left_s = (self._next_scan_ns - simulation.stamp_ns) * 1e-9
             simulation.move(min(CONTROL_S, left_s), self._wanted_velocity())
             self._publish_reading()
-            if self._p.speed_factor > 0.0:
-                due_s = began_s + (simulation.stamp_ns - began_ns) * 1e-9 / self._p.speed_factor
-                wait_s = due_s - time.monotonic()
-                if wait_s > 0.0:
-                    ending.wait(wait_s)
-                elif wait_s < -BEHIND_S:
-                    began_s -= wait_s
-                    self._log.warn(f"slower than ~speed_factor {self._p.speed_factor:g} asks for: behind by "
-                                   f"{-wait_s:.1f} s", 30.0)
+            self._keep_pace(ending)
+
+    def _keep_pace(self, ending: threading.Event) -> None:
+        """Wait until the simulated time is due by the monotonic clock."""
+        factor = self._p.speed_factor
+        if factor == 0.0 and self._follower is not None and not self._driving:
+            factor = 1.0  # whoever it waits for needs the processor
+        now_s = time.monotonic()
+        if factor == 0.0:
+            self._paced_ns, self._paced_s = self._simulation.stamp_ns, now_s
+            return
+        wait_s = self._paced_s + (self._simulation.stamp_ns - self._paced_ns) * 1e-9 / factor - now_s
+        if wait_s > 0.0:
+            ending.wait(wait_s)
+        elif wait_s < -BEHIND_S:
+            self._paced_s -= wait_s
+            self._log.warn(f"slower than ~speed_factor {factor:g} asks for: behind by {-wait_s:.1f} s", 30.0)
 
     # -- callbacks of other threads: they store
 

@@ -2,10 +2,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from glass_nav.simulation import building_file, shipped_buildings
 from glass_nav.simulation.building_file import BuildingError
+from glass_nav.simulation.path_follower import PathFollower
+from glass_nav.simulation.robot import Obstacles, Robot, RobotParams
 
 REPO = Path(__file__).resolve().parents[3]
 
@@ -56,3 +59,21 @@ def test_without_any_the_list_is_empty(monkeypatch):
     assert shipped_buildings.shipped() == {}
     with pytest.raises(BuildingError, match="^office: no such file, nor a building of the package, which are none$"):
         shipped_buildings.find("office")
+
+
+@pytest.mark.parametrize("name, kind", [*((name, "diff") for name in shipped_buildings.shipped()),
+                                        ("glass_office", "omni")])
+def test_every_path_can_be_driven_also_when_all_furniture_has_moved(name, kind):
+    building = building_file.load(shipped_buildings.find(name)).changed(1.0, np.random.default_rng(1))
+    assert building.paths
+    surfaces, params, step_s = building.surfaces, RobotParams(kind), 0.1
+    obstacles = Obstacles(np.stack([surfaces.from_m, surfaces.to_m], axis=1)[surfaces.present])
+    for path, waypoints in building.paths.items():
+        follower = PathFollower(waypoints, params)
+        robot = Robot(params, follower.start, obstacles)
+        for _ in range(round((60.0 + 4.0 * follower.length_m) / step_s)):
+            robot.step(follower.command(robot.map_from_base), step_s)
+            assert not robot.blocked, f"{path}: blocked at {robot.map_from_base} after {follower.progress_m:.1f} m"
+            if follower.done:
+                break
+        assert follower.done, f"{path}: at {robot.map_from_base} after {follower.progress_m:.1f} m"
