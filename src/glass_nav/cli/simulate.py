@@ -81,6 +81,7 @@ def main(arguments: argparse.Namespace) -> None:
                             scan_rate_hz=arguments.rate, changed_share=arguments.changed)
     pace = FollowerParams(speed_m_s=arguments.speed)
     way_m = simulation.follower(arguments.path, pace).length_m
+    grid_map = building_map.draw(building, arguments.resolution)
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     tally, shown_m = _Tally(), 0
     progress = Progress("simulate", math.ceil(way_m), unit="m")
@@ -96,7 +97,7 @@ def main(arguments: argparse.Namespace) -> None:
     finally:
         progress.finish()
     path_map = arguments.out.with_suffix(".map.yaml")
-    map_file.save(building_map.draw(building, arguments.resolution), path_map, ".png")
+    map_file.save(grid_map, path_map, ".png")
     print(f"{tally.line()}; written to {arguments.out} and {path_map}")
 
 
