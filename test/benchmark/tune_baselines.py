@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Which settings suit each baseline best? The ones in baselines.SETTINGS were chosen by this.
+r"""Which settings suit each baseline best? The ones in baselines.SETTINGS were chosen by this.
 
-    python test/benchmark/tune_baselines.py --jobs 2
+    python test/benchmark/tune_baselines.py --buildings glass_office glass_bridge glass_atrium --lidars weak \
+        --max-scans 150
     python test/benchmark/tune_baselines.py --localizers amcl_field60 --buildings glass_office
 
 A table for each baseline, best first: by the geometric mean of position rmse and mean yaw error over all drives.
