@@ -144,6 +144,16 @@ class Demo(unittest.TestCase):
         self.assertLessEqual(np.diff(times).max(), 20_000_000)
         self.assertEqual((self.odometry.last.header.frame_id, self.odometry.last.child_frame_id), ("odom", "base_link"))
 
+    def test_3_whoever_listens_is_given_the_pose_and_nobody_else(self) -> None:
+        lines = len(self.lines.having("starting at x"))
+        heard = Heard("initialpose", PoseWithCovarianceStamped)
+        self.assertTrue(wait_until(lambda: len(heard), 10.0), "no initialpose within 10 s")
+        self.hear_scans(5)
+        self.assertEqual(len(heard), 1)
+        truth = self.true_poses()[stamp_ns(heard.last)]
+        np.testing.assert_allclose(conversions.planar_from_pose(heard.last.pose.pose), truth, atol=1e-9)
+        self.assertEqual(len(self.lines.having("starting at x")), lines)  # the localization was not disturbed
+
     def test_4_cmd_vel_moves_the_robot_up_to_a_wall(self) -> None:
         yaw = self.position()[2]
         self.driver.start(0.0, 1.0)  # before the path, which waits
@@ -162,10 +172,13 @@ class Demo(unittest.TestCase):
         self.assertLess(np.hypot(*(self.position() - there)[:2]), 0.01)
 
     def test_5_a_silent_driver_is_not_obeyed(self) -> None:
-        there = self.position()
-        self.assertTrue(wait_until(lambda: np.hypot(*(self.position() - there)[:2]) > 0.3, 20.0),
-                        "the robot does not go back to its path when cmd_vel falls silent")
-        self.assertFalse(self.blocked.last.data)
+        def speed() -> float:
+            return float(np.mean([msg.twist.twist.linear.x for msg in self.odometry.all[-5:]]))
+
+        self.driver.start(-0.3, 0.0)  # the way that it came
+        self.assertTrue(wait_until(lambda: speed() < -0.25, 10.0), f"{speed()} m/s")
+        self.driver.stop()
+        self.assertTrue(wait_until(lambda: speed() > -0.1, 10.0), "the robot goes on when cmd_vel falls silent")
 
     def test_6_a_velocity_that_is_none_is_refused(self) -> None:
         publisher = rospy.Publisher("cmd_vel", Twist, queue_size=1)

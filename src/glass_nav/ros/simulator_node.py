@@ -109,12 +109,12 @@ class SimulatorNode:
         self._names = FrameNames(p.global_frame_id, p.odom_frame_id, p.base_frame_id, p.laser_frame_id)
         self._log = LogThrottle()
         self._inbox = Mailbox(commands=1)
+        self._newcomers = Mailbox(publish=10)  # to one node each that has begun to listen to initialpose
         self._command, self._command_until_ns = np.zeros(3), 0
         self._blocked = False
         self._driving = False
         self._answers = 0  # transforms map -> odom; counted by the thread of tf
         self._answers_used, self._answering = 0, False
-        self._pose_wanted = threading.Event()
         self._began_s = self._paced_s = time.monotonic()
         self._paced_ns = self._simulation.stamp_ns  # simulated time that was due at _paced_s
         self._next_scan_ns = self._simulation.stamp_ns
@@ -131,7 +131,7 @@ class SimulatorNode:
             self._serve_map()
         if p.give_initial_pose:
             self._initial_pose = rospy.Publisher("initialpose", PoseWithCovarianceStamped, queue_size=2,
-                                                 subscriber_listener=_Listener(self._pose_wanted))
+                                                 subscriber_listener=_Listener(self._newcomers))
         rospy.Subscriber("cmd_vel", Twist, lambda msg: self._inbox.put("commands", msg), queue_size=1, tcp_nodelay=True)
         rospy.Subscriber("/tf", TFMessage, self._hear_localization, queue_size=100, tcp_nodelay=True)
 
@@ -233,9 +233,8 @@ class SimulatorNode:
         self._truth.publish(frame_messages.ground_truth_msg(frame, names))
         if self._true_beams.get_num_connections():
             self._true_beams.publish(frame_messages.true_beams_msg(frame.stamp_ns, frame.truth, names.laser))
-        if self._pose_wanted.is_set():
-            self._pose_wanted.clear()
-            self._initial_pose.publish(frame_messages.initial_pose_msg(frame, names))
+        for publish in self._newcomers.take(timeout_s=0.0)["publish"]:
+            publish(frame_messages.initial_pose_msg(frame, names))
 
     def _serve_map(self) -> None:
         """As map_node does, of what the package draws of the building."""
@@ -258,14 +257,14 @@ class SimulatorNode:
 
 
 class _Listener(rospy.SubscribeListener):
-    """Notes that somebody new listens."""
+    """Notes who begins to listen."""
 
-    def __init__(self, noted: threading.Event) -> None:
+    def __init__(self, newcomers: Mailbox) -> None:
         super().__init__()
-        self._noted = noted
+        self._newcomers = newcomers
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Any) -> None:
-        self._noted.set()
+        self._newcomers.put("publish", peer_publish)
 
 
 def _drive(p: SimulatorNodeParams) -> _Drive:
