@@ -88,7 +88,7 @@ py::dict cast_surfaces(const GridRaycaster& grid, const Array<double>& poses, co
   const SurfaceArrays out{{real("first_m"), real("second_m"), real("third_m")},
                           {index("first_cell"), index("second_cell"), index("third_cell")},
                           {real("first_thickness_m"), real("second_thickness_m")},
-                          real("normal_rad"), real("linearity"), real("mirrored_m")};
+                          real("normal_rad"), real("linearity"), real("mirrored_m"), index("mirrored_cell")};
   {
     py::gil_scoped_release unlocked;
     grid.cast_surfaces(rays, {max_thickness_m, min_linearity, min_gap_m}, out);
@@ -114,16 +114,19 @@ py::tuple normals(const GridRaycaster& grid) {
   }
   const auto count = static_cast<py::ssize_t>(grid.width()) * grid.height();
   const std::vector<py::ssize_t> shape{count};  // not the bare number: pybind11 2.10 makes that an array of stride 0
-  py::array_t<float> normal_rad(shape), linearity(shape);
+  py::array_t<float> normal_rad(shape), linearity(shape), offset_m(shape);
   float *angle_to = normal_rad.mutable_data(), *linearity_to = linearity.mutable_data();
+  float* offset_to = offset_m.mutable_data();
   std::fill(angle_to, angle_to + count, std::numeric_limits<float>::quiet_NaN());
   std::fill(linearity_to, linearity_to + count, 0.0F);
+  std::fill(offset_to, offset_to + count, std::numeric_limits<float>::quiet_NaN());
   for (const std::int32_t cell : walls->cells()) {
     const WallNormals::Normal normal = walls->at(cell);
     angle_to[cell] = std::atan2(normal.y, normal.x);
     linearity_to[cell] = normal.linearity;
+    offset_to[cell] = static_cast<float>(normal.offset * grid.resolution_m());
   }
-  return py::make_tuple(normal_rad, linearity);
+  return py::make_tuple(normal_rad, linearity, offset_m);
 }
 
 }  // namespace

@@ -136,6 +136,7 @@ void GridRaycaster::cast_surfaces(const RayBatch& batch, const SurfaceLimits& li
       out.normal_rad[i] = std::atan2(found.normal.y, found.normal.x);
       out.linearity[i] = found.normal.linearity;
       out.mirrored_m[i] = found.mirrored * resolution_m_;
+      out.mirrored_cell[i] = found.mirrored_cell;
     };
     for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
       constexpr std::size_t kTogether = 512;  // their state fits the level 2 cache

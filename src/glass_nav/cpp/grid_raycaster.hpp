@@ -49,6 +49,7 @@ struct SurfaceArrays {
   double* normal_rad;      // of the first, facing the origin of the ray; NaN where none
   double* linearity;       // of the first
   double* mirrored_m;      // path by way of the first surface; inf where none
+  std::int32_t* mirrored_cell;  // where that ends; -1 where none
 };
 
 /// An occupancy grid and the rays on it. Frame of the grid: cell [0, 0] starts at (0, 0), no rotation.
@@ -62,6 +63,7 @@ class GridRaycaster {
 
   int width() const { return width_; }
   int height() const { return height_; }
+  double resolution_m() const { return resolution_m_; }
 
   /// First occupied cell along every ray: range_m inf and cell -1 where there is none. `cell` may be null.
   void cast_first(const RayBatch& batch, double* range_m, std::int32_t* cell) const;

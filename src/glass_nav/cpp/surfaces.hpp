@@ -29,8 +29,9 @@ struct Surfaces {
   std::array<std::int32_t, 3> cell{-1, -1, -1};
   std::array<double, 2> thickness{kInfinity, kInfinity};
   WallNormals::Normal normal{std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::quiet_NaN(),
-                             0.0F};  // of the first, towards the origin
+                             0.0F, std::numeric_limits<float>::quiet_NaN()};  // of the first, towards the origin
   double mirrored = kInfinity;
+  std::int32_t mirrored_cell = -1;
 };
 
 /// Looks along rays and through what they meet.
@@ -75,16 +76,36 @@ class SurfaceFinder {
     }
   };
 
+  /// The line of the wall that a ray has passed: a flat ray would meet its posts and the steps of its staircase again.
+  struct PassedWall {
+    int width = 1;
+    std::int32_t cell = 0;
+    double nx = 0.0, ny = 0.0;
+    bool has_line = false;
+
+    bool operator()(std::int32_t other) const {
+      if (!has_line) return false;
+      const int dx = other % width - cell % width, dy = other / width - cell / width;
+      return std::abs(nx * dx + ny * dy) <= 1.5;  // cells
+    }
+  };
+
   /// Sends the rays on to their surface number k; `going` keeps those that meet one.
   void seek_surface(std::size_t k, std::vector<std::size_t>& going, std::vector<Search>& searches,
                     std::vector<Surfaces>& surfaces) const {
-    seeker_.seek_all(
-        going.size(), [&](std::size_t j) -> const Search& { return searches[going[j]]; }, NothingIgnored{},
-        [&](std::size_t j, const GridWalk& walk, std::int32_t met) {
-          searches[going[j]].walk = walk;
-          surfaces[going[j]].cell[k] = met;
-          if (met >= 0) surfaces[going[j]].range[k] = walk.t();
-        });
+    const auto search = [&](std::size_t j) -> const Search& { return searches[going[j]]; };
+    const auto found = [&](std::size_t j, const GridWalk& walk, std::int32_t met) {
+      searches[going[j]].walk = walk;
+      surfaces[going[j]].cell[k] = met;
+      if (met >= 0) surfaces[going[j]].range[k] = walk.t();
+    };
+    if (k == 0) {
+      seeker_.seek_all(going.size(), search, NothingIgnored{}, found);
+    } else {
+      std::vector<PassedWall> passed(going.size());
+      for (std::size_t j = 0; j < going.size(); ++j) passed[j] = passed_wall(surfaces[going[j]].cell[k - 1]);
+      seeker_.seek_all(going.size(), search, [&](std::size_t j, std::int32_t cell) { return passed[j](cell); }, found);
+    }
     const auto ended = [&](std::size_t i) { return surfaces[i].cell[k] < 0; };
     going.erase(std::remove_if(going.begin(), going.end(), ended), going.end());
   }
@@ -125,8 +146,15 @@ class SurfaceFinder {
         [&](std::size_t j, std::int32_t cell) { return mirrors[j](cell); },
         [&](std::size_t j, const GridWalk& walk, std::int32_t met) {
           Surfaces& at = surfaces[mirrored[j]];
+          at.mirrored_cell = met;
           if (met >= 0) at.mirrored = at.range[0] + walk.t();
         });
+  }
+
+  PassedWall passed_wall(std::int32_t cell) const {
+    const WallNormals::Normal normal = normals_.at(cell);
+    if (!usable(normal)) return {};
+    return {cells_.width, cell, normal.x, normal.y, true};
   }
 
   static Ray reflected(const Ray& ray, double t, const WallNormals::Normal& normal) {
@@ -144,7 +172,7 @@ class SurfaceFinder {
 
   static WallNormals::Normal facing(WallNormals::Normal normal, const Ray& ray) {
     if (projection(normal, ray) <= 0.0) return normal;  // also if it is NaN
-    return {-normal.x, -normal.y, normal.linearity};
+    return {-normal.x, -normal.y, normal.linearity, -normal.offset};
   }
 
   /// Leaves the run of occupied cells in which the walk stands, gaps too short to count included.

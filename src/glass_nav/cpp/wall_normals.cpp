@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 
 namespace glass_nav {
 namespace {
 
-constexpr WallNormals::Normal kNone{std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::quiet_NaN(), 0.0F};
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr WallNormals::Normal kNone{kNaN, kNaN, 0.0F, kNaN};
 
 /// The occupied cells with a side towards a cell that is not occupied; outside the grid nothing is.
 std::vector<std::uint8_t> boundary_of(const std::vector<std::uint8_t>& occupied, int width, int height) {
@@ -76,18 +78,33 @@ class Patch {
   }
 
   /// The same wall over a longer stretch. Twice the length makes the staircase of cells a third as steep; the weight
-  /// falls off towards the ends, so that no step there tilts the line.
+  /// falls off towards the ends, so that no step there tilts the line. What sticks out, as the posts of a glass wall do,
+  /// is left out of a second fit.
   Line refined(int x, int y, const Line& shape) {
-    Moments moments;
-    const int radius = WallNormals::kStretchCells;
-    collect(x, y, radius, [&](int dx, int dy) { return shape.distance(dx, dy) <= kBesideLine; });
-    for (const auto& [dx, dy] : found_) moments.add(1.0 - (dx * dx + dy * dy) / (radius * radius + 1.0), dx, dy);
-    return Line(moments);
+    collect(x, y, WallNormals::kStretchCells, [&](int dx, int dy) { return shape.distance(dx, dy) <= kBesideLine; });
+    const Line all = line_of(found_.size() + 1.0, shape);
+    distances_.clear();
+    for (const auto& [dx, dy] : found_) distances_.push_back(all.distance(dx, dy));
+    const auto middle = distances_.begin() + static_cast<std::ptrdiff_t>(distances_.size() / 2);
+    std::nth_element(distances_.begin(), middle, distances_.end());
+    const Line flush = line_of(std::max(kSticksOut, 1.3 * *middle), all);
+    return flush.linearity > 0.0 ? flush : all;
   }
 
  private:
+  /// Through the cells found within a distance of another line.
+  Line line_of(double within, const Line& other) const {
+    constexpr double kRadiusSquare = WallNormals::kStretchCells * WallNormals::kStretchCells + 1.0;
+    Moments moments;
+    for (const auto& [dx, dy] : found_) {
+      if (other.distance(dx, dy) <= within) moments.add(1.0 - (dx * dx + dy * dy) / kRadiusSquare, dx, dy);
+    }
+    return moments.weight > 0.0 ? Line(moments) : other;
+  }
+
   static constexpr int kBridge = 2;           // cells; a gap of one missing cell does not part a wall
   static constexpr double kBesideLine = 2.5;  // cells from the line: both faces of a wall three cells thick
+  static constexpr double kSticksOut = 0.8;   // a cell so far from a thin wall is none of it
   static constexpr int kReach = WallNormals::kStretchCells;
   static constexpr int kSide = 2 * kReach + 1;
 
@@ -116,16 +133,18 @@ class Patch {
   int width_, height_;
   std::array<bool, kSide * kSide> seen_{};
   std::vector<std::array<int, 2>> found_;
+  std::vector<double> distances_;
 };
 
 WallNormals::Normal normal_at(int x, int y, Patch& patch) {
   constexpr double kWorthRefining = 0.7;  // below it there is no line to be beside
   const Line shape = patch.shape_at(x, y);
   if (shape.linearity == 0.0) return kNone;
-  const double along = shape.linearity < kWorthRefining ? shape.along_rad : patch.refined(x, y, shape).along_rad;
-  const double sign = along > 0.0 ? 1.0 : -1.0;
-  return {static_cast<float>(sign * std::sin(along)), static_cast<float>(-sign * std::cos(along)),
-          static_cast<float>(shape.linearity)};
+  const Line line = shape.linearity < kWorthRefining ? shape : patch.refined(x, y, shape);
+  const double sign = line.along_rad > 0.0 ? 1.0 : -1.0;
+  const double nx = sign * std::sin(line.along_rad), ny = -sign * std::cos(line.along_rad);
+  return {static_cast<float>(nx), static_cast<float>(ny), static_cast<float>(shape.linearity),
+          static_cast<float>(nx * line.mean_x + ny * line.mean_y)};
 }
 
 }  // namespace

@@ -19,11 +19,12 @@ class WallNormals {
   struct Normal {
     float x, y;       // unit vector, x >= 0: the sign is the ray's business; NaN where there is none
     float linearity;  // 1 - smaller / larger principal variance: 1 straight wall, 0 no direction at all
+    float offset;     // from the centre of the cell to the line of the wall, along (x, y) [cells]; NaN where none is
   };
 
   WallNormals(const std::vector<std::uint8_t>& occupied, int width, int height);
 
-  /// Normal of one cell; {NaN, NaN, 0} for a cell inside a wall or without neighbours.
+  /// Normal of one cell; {NaN, NaN, 0, NaN} for a cell inside a wall or without neighbours.
   Normal at(std::int32_t cell) const;
 
   /// Flat indices of the boundary cells, ascending.

@@ -3,7 +3,9 @@
 Seed document glass_localization.txt, sec. III.A, eq. (1) and steps 3 and 4: each preliminary sample
 votes for the reference nearest to the measured range, and the case with the highest vote wins. What the
 document leaves open (it breaks off at step 1) is ours: the gate, ties, and the soft vote, in which a
-sample votes with shares, and the more the better it explains the whole scan. N samples, B beams.
+sample votes with shares, and the more the better it explains the whole scan; in which the chance of each
+case before the beam is looked at follows from how glassy its walls proved and from the physics of a pane;
+and in which neighbouring beams pull each other. N samples, B beams.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from typing import Tuple
 
 import numpy as np
 
+from glass_nav.localization import pane_answers
 from glass_nav.localization.range_residuals import RangeResiduals
 from glass_nav.localization.reference_ranges import LEAST_COS, ReferenceRanges
 
@@ -20,8 +23,13 @@ UNCERTAIN, DIFFUSE, SPECULAR, FIRST_PENETRATION, SECOND_PENETRATION = range(5)
 VOTE_MODES = ("soft", "paper")
 _TIE_ORDER = (DIFFUSE, FIRST_PENETRATION, SECOND_PENETRATION, SPECULAR)
 _GATE_SIGMAS = 3.0
+_OTHER_SURFACE_M = 0.3    # of two expected ranges: an edge lies between them
 _TOLD_GATES = 2.0         # the samples that won the vote may stand one gate away from the pose told
 _PANE_INDEX = 1.51        # of soda-lime glass
+_WALL_OVER_DARK = 5.0     # reflectance of a wall over that of the darkest that is seen at the largest range
+_LEAST_SEEN_THROUGH = 0.05  # a cell may hold a post and the edge of the pane beside it
+_TEMPER = 0.2  # of a sample's evidence: beams err together, and the best sample shall not vote alone
+_REACH, _ROUNDS = 2, 3    # of the pull between neighbouring beams
 
 
 @dataclass(frozen=True)
@@ -46,10 +54,10 @@ class CaseVote:
     case_min_share: float = 0.5        # of the vote; a case with less is uncertain
     glass_max_thickness_m: float = 0.2  # a thicker run of occupied cells ends the beam
     normal_min_linearity: float = 0.9
-    prior_specular: float = 0.02
-    prior_first_penetration: float = 0.12
-    prior_second_penetration: float = 0.04
-    prior_uncertain: float = 0.1
+    prior_uncertain: float = 0.1       # chance to meet what is not on the map
+    prior_uncertain_behind: float = 0.2  # the same behind a pane: rooms that nobody mapped again, and outdoors
+    mirror_gain: float = 2.0           # how much more light panes mirror than clear glass does
+    neighbour_pull: float = 1.5        # log odds that equal cases of all neighbouring beams add
 
     def __post_init__(self) -> None:
         if self.vote_mode not in VOTE_MODES:
@@ -57,66 +65,83 @@ class CaseVote:
         for name in ("case_gate_m", "glass_max_thickness_m"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"~{name} must be > 0 m, got {getattr(self, name)}")
-        for name in ("case_min_share", "normal_min_linearity", "prior_specular", "prior_first_penetration",
-                     "prior_second_penetration", "prior_uncertain"):
+        for name in ("case_min_share", "normal_min_linearity"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"~{name} must be in [0, 1], got {getattr(self, name)}")
-        if not self.prior_diffuse > 0.0:
-            raise ValueError("~prior_specular, ~prior_first_penetration, ~prior_second_penetration and "
-                             f"~prior_uncertain must sum to less than 1, got {1.0 - self.prior_diffuse:g}")
-
-    @property
-    def prior_diffuse(self) -> float:
-        """What the other priors leave."""
-        return 1.0 - (self.prior_specular + self.prior_first_penetration
-                      + self.prior_second_penetration + self.prior_uncertain)
+        for name in ("prior_uncertain", "prior_uncertain_behind"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise ValueError(f"~{name} must be in (0, 1), got {getattr(self, name)}")
+        for name in ("mirror_gain", "neighbour_pull"):
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise ValueError(f"~{name} must be finite and >= 0, got {getattr(self, name)}")
 
 
-def classify(measured_m: np.ndarray, references: ReferenceRanges, residuals: RangeResiduals,
-             vote: CaseVote) -> BeamCases:
+def classify(measured_m: np.ndarray, references: ReferenceRanges, residuals: RangeResiduals, vote: CaseVote,
+             seen_through: np.ndarray, max_range_m: float) -> BeamCases:
     """Cases of the beams of one scan.
 
     Args:
         measured_m: (B,) ranges by REP 117; beams without an answer are uncertain.
-        references: of the preliminary samples; sample 0 is the pose that expected_m is told for. A beam that
-            passes an edge there and met it from the samples that won keeps its case: it tells poses apart.
+        references: of the preliminary samples; sample 0 is the pose that expected_m is told for, and for a beam that
+            passes an edge there, the sample that explains it best.
         residuals: where in a wall beams end, and how widely.
         vote: mode, gate and priors.
+        seen_through: (2, B) chance of the first and of the second surface at sample 0 to let beams pass; of the
+            soft vote.
+        max_range_m: of the lidar: what it can still see; of the soft vote.
     """
     answered = np.isfinite(measured_m)
-    ballots = _paper_ballots if vote.vote_mode == "paper" else _soft_ballots
     references = _inside_walls(references, residuals)
-    share = ballots(measured_m, references, residuals, vote)  # (5, B), column sums 1
+    if vote.vote_mode == "paper":
+        share = _paper_ballots(measured_m, references, residuals, vote)  # (5, B), column sums 1
+    else:
+        prior = _priors(references, seen_through, max_range_m, vote)
+        share = _pulled(_soft_ballots(measured_m, references, residuals, vote, prior), answered, vote.neighbour_pull)
     share[:, ~answered] = np.array([1.0, 0.0, 0.0, 0.0, 0.0])[:, None]
-    won = _winner(share)
-    case = np.where(answered & (share[won, np.arange(len(won))] >= vote.case_min_share), won, UNCERTAIN)
-    return _told_from_sample_0(case, share[case, np.arange(len(case))], measured_m, references, np.inf)
+    won, beam = _winner(share), np.arange(len(measured_m))
+    case = np.where(answered & (share[won, beam] >= vote.case_min_share), won, UNCERTAIN)
+    offered_m, across_m = _offered(case, measured_m, references)
+    sample = np.where(across_m[0] <= gate_m(residuals, vote), 0, np.argmin(across_m, axis=0))
+    return _told(case, share[case, beam], measured_m, offered_m[sample, beam],
+                 np.isfinite(across_m[sample, beam]))
 
 
 def as_seen_from(cases: BeamCases, measured_m: np.ndarray, references: ReferenceRanges,
                  residuals: RangeResiduals, vote: CaseVote) -> BeamCases:
-    """The same cases, with the ranges expected at sample 0 of other references; uncertain where none is near."""
-    return _told_from_sample_0(cases.case, cases.weight, measured_m, _inside_walls(references, residuals),
-                               gate_m(residuals, vote))
+    """The same cases from a pose nearby, with the ranges expected at sample 0 of its references.
+
+    A beam that passes an edge from there keeps its range; one that ends farther from its surface is uncertain.
+    """
+    offered_m, across_m = _offered(cases.case, measured_m, _inside_walls(references, residuals))
+    other = np.abs(offered_m[0] - cases.expected_m) > _OTHER_SURFACE_M  # also where there is none
+    fits = across_m[0] <= _TOLD_GATES * gate_m(residuals, vote)
+    return _told(cases.case, cases.weight, measured_m, np.where(fits, offered_m[0], cases.expected_m), fits | other)
 
 
-def _told_from_sample_0(case: np.ndarray, weight: np.ndarray, measured_m: np.ndarray,
-                        references: ReferenceRanges, within_m: float) -> BeamCases:
+def _offered(case: np.ndarray, measured_m: np.ndarray, references: ReferenceRanges) -> Tuple[np.ndarray, np.ndarray]:
+    """(N, B) ranges that the samples offer for the case of each beam, and how far across the surface it ended."""
     row, beam = np.maximum(case.astype(int) - 1, 0), np.arange(len(case))
-    expected = references.range_m[row, 0, beam]
+    offered_m = references.range_m[row, :, beam].T
     with np.errstate(invalid="ignore"):
-        residual = measured_m - expected
-        across = np.abs(residual) * references.cos_incidence[row, 0, beam]
-        known = (case > 0) & np.isfinite(expected) & (across <= _TOLD_GATES * within_m)
-    return BeamCases(np.where(known, case, UNCERTAIN).astype(np.uint8), np.where(known, expected, np.nan),
-                     np.where(known, residual, np.nan), weight)
+        across_m = np.abs(measured_m - offered_m) * references.cos_incidence[row, :, beam].T
+    return offered_m, np.where(np.isnan(across_m), np.inf, across_m)
+
+
+def _told(case: np.ndarray, weight: np.ndarray, measured_m: np.ndarray, expected_m: np.ndarray,
+          known: np.ndarray) -> BeamCases:
+    known = known & (case > 0)
+    with np.errstate(invalid="ignore"):
+        residual_m = np.where(known, measured_m - expected_m, np.nan)
+    return BeamCases(np.where(known, case, UNCERTAIN).astype(np.uint8), np.where(known, expected_m, np.nan), residual_m,
+                     weight)
 
 
 def _inside_walls(references: ReferenceRanges, residuals: RangeResiduals) -> ReferenceRanges:
     """References where beams end, not at the near boundary of the wall's cells."""
-    cos = np.maximum(references.cos_incidence, LEAST_COS)
-    depth = residuals.depth_share * references.thickness_m / cos
-    return replace(references, range_m=references.range_m + depth)
+    depth = residuals.depth_share * references.thickness_m
+    shift = depth / np.maximum(references.cos_incidence, LEAST_COS)
+    shift[SPECULAR - 1] += 2.0 * depth[DIFFUSE - 1] * references.cos_incidence[DIFFUSE - 1]  # so much deeper a mirror
+    return replace(references, range_m=references.range_m + shift)
 
 
 def _winner(share: np.ndarray) -> np.ndarray:
@@ -139,25 +164,25 @@ def _paper_ballots(measured_m: np.ndarray, references: ReferenceRanges, residual
 
 
 def _soft_ballots(measured_m: np.ndarray, references: ReferenceRanges, residuals: RangeResiduals,
-                  vote: CaseVote) -> np.ndarray:
-    """(5, B) posterior over the cases, averaged over the samples by how well each explains the scan."""
+                  vote: CaseVote, prior: np.ndarray) -> np.ndarray:
+    """(5, B) posterior over the cases; samples count by how well each explains the scan.
+
+    prior (4, B) is the chance of cases 1 to 4 before the range is looked at.
+    """
     answered = np.isfinite(measured_m)
     z = np.where(answered, measured_m, 0.0)
     sigma_m, gate = residuals.sigma_m, gate_m(residuals, vote)
-    density, plausible = _density(z, references, sigma_m, gate)
-    prior = np.array([vote.prior_diffuse, vote.prior_specular, vote.prior_first_penetration,
-                      vote.prior_second_penetration])
-    joint = prior[:, None, None] * density * plausible  # (4, N, B)
+    joint = prior[:, None] * _density(z, references, sigma_m, gate)  # (4, N, B)
     nothing = vote.prior_uncertain * np.exp(-0.25 * (gate / sigma_m) ** 2)
     total = joint.sum(axis=0) + nothing
     log_evidence = np.log(total) @ answered  # (N,)
-    temper = 4.0 / np.sqrt(max(answered.sum(), 1))  # neighbouring beams err together
+    temper = _TEMPER / np.sqrt(max(answered.sum(), 1))
     sample_w = np.exp(temper * (log_evidence - log_evidence.max()))
     sample_w /= sample_w.sum()
-    share = np.empty((5, len(measured_m)))
-    share[1:] = np.einsum("n,cnb->cb", sample_w, joint / total)
-    share[0] = 1.0 - share[1:].sum(axis=0)
-    return share
+    # The samples are summed before the cases compete: a corner that some of them graze and others miss is no surface
+    # to explain the beam by, if without it a likelier case does.
+    share = np.concatenate([np.full((1, len(measured_m)), nothing), np.einsum("n,cnb->cb", sample_w, joint)])
+    return share / share.sum(axis=0)
 
 
 def gate_m(residuals: RangeResiduals, vote: CaseVote) -> float:
@@ -165,31 +190,67 @@ def gate_m(residuals: RangeResiduals, vote: CaseVote) -> float:
     return max(vote.case_gate_m, _GATE_SIGMAS * residuals.sigma_m)
 
 
-def _density(z: np.ndarray, references: ReferenceRanges, sigma_m: float,
-             gate: float) -> Tuple[np.ndarray, np.ndarray]:
-    """(4, N, B) how near each reference is, relative to a perfect match, and how possible it is."""
+def _density(z: np.ndarray, references: ReferenceRanges, sigma_m: float, gate: float) -> np.ndarray:
+    """(4, N, B) how near each reference is, relative to a perfect match."""
     cos = np.maximum(references.cos_incidence, LEAST_COS)
     across = (z - references.range_m) * cos
     density = np.exp(-0.5 * np.minimum((across / sigma_m) ** 2, 100.0))
     density[~(np.abs(across) <= gate)] = 0.0
-    plausible = np.ones_like(density)
-    plausible[SPECULAR - 1] = _mirror_beats_what_is_behind(references)
-    return density, plausible
+    return density
 
 
-def _mirror_beats_what_is_behind(references: ReferenceRanges) -> np.ndarray:
-    """(N, B) 1 where a mirrored echo can be the stronger one: d3 / d2 > T / R of one clear pane.
+def _priors(references: ReferenceRanges, seen_through: np.ndarray, max_range_m: float, vote: CaseVote) -> np.ndarray:
+    """(4, B) chance of cases 1 to 4, from how glassy the walls proved and how a pane answers at that incidence."""
+    incidence = references.pane_incidence[0]
+    first, second = np.clip(seen_through, _LEAST_SEEN_THROUGH, 1.0)
+    passes = first * (1.0 - pane_answers.least(incidence))
+    mirrored = passes * _chance_of_a_mirror(references, max_range_m, vote.mirror_gain)
+    behind = (passes - mirrored) * (1.0 - vote.prior_uncertain_behind)
+    passes_again = second * (1.0 - pane_answers.least(np.full(len(first), np.nan)))
+    return (1.0 - vote.prior_uncertain) * np.stack([1.0 - passes, mirrored, behind * (1.0 - passes_again),
+                                                    behind * passes_again])
 
-    Echo powers as in the lidar equation for a diffuse target: T^2 / d3^2 behind the pane, R^2 / d2^2
-    by way of the mirror (Fresnel, unpolarised, two surfaces).
+
+def _chance_of_a_mirror(references: ReferenceRanges, max_range_m: float, gain: float) -> np.ndarray:
+    """(B,) chance that a mirrored echo is the strongest one, at sample 0; 0 where nothing can mirror.
+
+    Echo powers as in the lidar equation for diffuse targets: T^2 / d3^2 behind the pane, R^2 / d2^2 by way of the
+    mirror (Fresnel, unpolarised, two surfaces); one must be above what the lidar still sees of a dark wall at its
+    largest range. Reflectances of walls differ by factors: the chance rises over one decade.
     """
-    incidence = np.nan_to_num(references.pane_incidence)
+    incidence = np.nan_to_num(references.pane_incidence[0])
     inside = np.arcsin(np.sin(incidence) / _PANE_INDEX)
     parallel, across = np.cos(incidence), np.cos(inside)
     r_s = ((parallel - _PANE_INDEX * across) / (parallel + _PANE_INDEX * across)) ** 2
     r_p = ((across - _PANE_INDEX * parallel) / (across + _PANE_INDEX * parallel)) ** 2
     surface = 0.5 * (r_s + r_p)
-    reflected = 2.0 * surface / (1.0 + surface)
-    behind, mirrored = references.range_m[FIRST_PENETRATION - 1], references.range_m[SPECULAR - 1]
-    with np.errstate(invalid="ignore"):
-        return (behind * reflected > (1.0 - reflected) * mirrored).astype(float)
+    reflected = np.minimum(gain * 2.0 * surface / (1.0 + surface), 0.9)
+    behind_m, mirrored_m = references.range_m[FIRST_PENETRATION - 1, 0], references.range_m[SPECULAR - 1, 0]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        wins = (reflected * behind_m / ((1.0 - reflected) * mirrored_m)) ** 2
+        seen = (reflected * max_range_m / mirrored_m) ** 2 * _WALL_OVER_DARK
+        chance = 1.0 / (1.0 + 1.0 / wins) / (1.0 + 1.0 / seen)
+    return np.where(np.isfinite(mirrored_m), np.nan_to_num(chance, nan=0.0), 0.0)
+
+
+def _pulled(share: np.ndarray, answered: np.ndarray, pull: float) -> np.ndarray:
+    """(5, B) shares after neighbouring beams have pulled each other: mean field of a chain, a few rounds.
+
+    Neighbours mostly meet the same wall the same way; a single beam that fits a farther wall is mostly chance.
+    """
+    log_share = np.log(share + 1e-6)
+    belief = share
+    for _ in range(_ROUNDS):
+        around = _mean_of_neighbours(np.where(answered, belief, 0.0), answered)
+        belief = np.exp(log_share + pull * around)
+        belief /= belief.sum(axis=0)
+    return belief
+
+
+def _mean_of_neighbours(belief: np.ndarray, answered: np.ndarray) -> np.ndarray:
+    """(5, B) mean over the answering ones of the _REACH beams to either side."""
+    width = 2 * _REACH + 1
+    padded = np.pad(np.vstack([belief, answered]), ((0, 0), (_REACH + 1, _REACH)))
+    running = np.cumsum(padded, axis=1)
+    around = running[:, width:] - running[:, :-width] - np.vstack([belief, answered])
+    return around[:5] / np.maximum(around[5], 1.0)

@@ -2,8 +2,9 @@
 
 A wall seldom lets a beam through, a pane mostly does unless it is looked at head on, and where a mapped
 thing is gone every beam passes. Every beam that was known to cross a surface of the map is evidence on
-both questions: can it be seen through, and is it still there? Each is kept as log odds per cell. The seed document glass_localization.txt has no such memory (its
-cases are decided scan by scan); the formulation is ours. H rows, W columns, B beams.
+both questions: can it be seen through, and is it still there? Each is kept as log odds per cell. The
+seed document glass_localization.txt has no such memory (its cases are decided scan by scan); the
+formulation is ours. H rows, W columns, B beams.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Tuple
 
 import numpy as np
 
+from glass_nav.localization import pane_answers
 from glass_nav.localization.range_residuals import RangeResiduals
 from glass_nav.localization.reference_ranges import ReferenceRanges
 from glass_nav.world.grid_map import UNKNOWN, GridMap
@@ -20,21 +22,7 @@ from glass_nav.world.grid_map import UNKNOWN, GridMap
 _LEAST_COS = 0.3          # a wall seen flatter than that is passed or met by chance
 _BEHIND_M = 0.3          # a beam that goes on for so long has passed
 _ENDED_SIGMAS = 2.5
-_PANE_ANSWERS = 0.6                # share of the beams that a pane itself sends back, head on; about
-_OBLIQUE_ANSWERS = 0.06            # and from far to the side: dirt, frames
-_WIDE_RAD, _NARROW_RAD = np.radians(18.0), np.radians(6.0)  # lidars differ in how far from head on
-_POROUS_ANSWERS = 0.3              # of what is no straight wall: railings, shelves, plants
 _GONE_ANSWERS = 0.02
-
-
-def answers_of_a_pane(incidence_rad: np.ndarray, width_rad: float = _WIDE_RAD) -> np.ndarray:
-    """Share of the beams that come back from clear glass itself, by their angle to its normal [rad].
-
-    Between what is measured: 15-degree bins .56 .39 .11 .04 0 0 (URG-04LX) and .47 .09 .08 .10 .14 .10
-    (RPLidar) on ordinary windows; a 64-ring lidar 5 m away has .97 .91 .82 .36 .20 .14 per 5 degrees.
-    """
-    head_on = np.exp(-((incidence_rad / width_rad) ** 2))
-    return np.where(np.isnan(incidence_rad), _POROUS_ANSWERS, _OBLIQUE_ANSWERS + _PANE_ANSWERS * head_on)
 
 
 def crossings(measured_m: np.ndarray, references: ReferenceRanges,
@@ -132,9 +120,9 @@ class GlassMap:
     def _says(self, incidence_rad: np.ndarray, passed: np.ndarray) -> "Tuple[np.ndarray, np.ndarray]":
         """(B,) log odds of glass against wall, and against gone. What lidar it is is not known: each may be."""
         leak = self._evidence.glass_wall_leak
-        narrow, wide = answers_of_a_pane(incidence_rad, _NARROW_RAD), answers_of_a_pane(incidence_rad, _WIDE_RAD)
-        return (np.where(passed, np.log((1.0 - narrow) / leak), np.log(wide / (1.0 - leak))),
-                np.where(passed, np.log((1.0 - narrow) / (1.0 - _GONE_ANSWERS)), np.log(wide / _GONE_ANSWERS)))
+        least, most = pane_answers.least(incidence_rad), pane_answers.most(incidence_rad)
+        return (np.where(passed, np.log((1.0 - least) / leak), np.log(most / (1.0 - leak))),
+                np.where(passed, np.log((1.0 - least) / (1.0 - _GONE_ANSWERS)), np.log(most / _GONE_ANSWERS)))
 
     def _chances(self, log_odds: np.ndarray) -> np.ndarray:
         """(2, K) chances to be seen through, and to be there if so, from what beams added."""

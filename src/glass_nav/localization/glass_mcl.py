@@ -275,7 +275,9 @@ class GlassMcl:
         """Cases of all beams, by preliminary samples around a pose."""
         samples = preliminary_samples.around(map_from_base, covariance, self._params.samples)
         references = self._references(scan, samples)
-        return beam_cases.classify(scan.ranges_m, references, self._residuals, self._params.vote), references
+        seen_through, _ = self._glass_map.probability(references.cell[[0, 2], 0])
+        return beam_cases.classify(scan.ranges_m, references, self._residuals, self._params.vote, seen_through,
+                                   scan.range_max_m), references
 
     def _references(self, scan: Scan, samples: np.ndarray) -> ReferenceRanges:
         vote = self._params.vote
@@ -325,10 +327,9 @@ class GlassMcl:
 
     def _surfaces(self, scan: Scan, cases: BeamCases, references: ReferenceRanges, trusted: bool) -> SurfaceScan:
         across = np.maximum(references.cos_incidence[0, 0], LEAST_COS)
-        first_m = references.range_m[0, 0] + self._residuals.depth_share * references.thickness_m[0, 0] / across
         gate_m = beam_cases.gate_m(self._residuals, self._params.vote) / across
-        return surface_scan.of(scan.ranges_m, cases.case, first_m, self._glass_map.probability(references.cell[0, 0])[1],
-                               gate_m, trusted)
+        return surface_scan.of(scan.ranges_m, cases.case, references.line_m,
+                               self._glass_map.probability(references.cell[0, 0])[0], gate_m, trusted)
 
     def _start_with(self, particles: np.ndarray, searching: bool) -> None:
         self._particles = particles

@@ -3,7 +3,8 @@
 Seed document glass_localization.txt, step 2 (cut off there; the formulation is ours): one ray cast
 that goes on behind the first surface gives what a beam would measure if it came back from it (case 1),
 was mirrored at it (case 2), or passed one or two panes (cases 3 and 4). The map does not say what is
-glass. N samples, B beams; arrays by case have 4 rows, case k in row k - 1.
+glass. A corner or a post without a normal is drawn up to a cell too large, and beams that graze it on the
+map may miss it: half of the samples see past it. N samples, B beams; arrays by case have 4 rows, case k in row k - 1.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from glass_nav.geometry import se2
-from glass_nav.sensing.raycast import RayCaster
+from glass_nav.sensing.raycast import RayCaster, SurfaceHits
 from glass_nav.sensing.scan import Scan
 
 LEAST_COS = 0.2  # a surface seen flatter than 78 degrees is no worse placed than at that
+_FIRST, _SECOND = 0, 1
+_LINE_CELLS, _GRAZING_COS = 2.0, 0.02  # the line of a wall lies so near to the cells that a beam meets
 
 
 @dataclass(frozen=True)
@@ -25,8 +28,9 @@ class ReferenceRanges:
     range_m: np.ndarray          # (4, N, B) along the beam, inf where the map offers nothing
     cos_incidence: np.ndarray    # (4, N, B) |u . n| at the surface that answers; 1 where it has no normal
     thickness_m: np.ndarray      # (4, N, B) of the wall that answers, as drawn
-    cell: np.ndarray             # (3, N, B) int32 flat cell of the first, second, third surface, -1: none
+    cell: np.ndarray             # (4, N, B) int32 flat cell that answers, -1: none
     pane_incidence: np.ndarray   # (N, B) angle to the normal of the first surface [rad], NaN without one
+    line_m: np.ndarray           # (B,) range of sample 0's first surface by the line of its wall, inf: none
 
 
 def of(caster: RayCaster, thickness_m: np.ndarray, samples: np.ndarray, scan: Scan,
@@ -45,17 +49,58 @@ def of(caster: RayCaster, thickness_m: np.ndarray, samples: np.ndarray, scan: Sc
     hits = caster.cast_surfaces(from_laser, scan.angles_rad, scan.range_max_m,
                                 max_thickness_m=max_thickness_m, min_linearity=min_linearity)
     beam_rad = from_laser[:, 2:3] + scan.angles_rad
+    has_normal = hits.linearity >= min_linearity
+    mirrored_rad = 2.0 * hits.normal_rad + np.pi - beam_rad
+    cell = np.stack([hits.first_cell, hits.mirrored_cell, hits.second_cell, hits.third_cell])
+    cos = np.stack([cos_incidence(caster, mirrored_rad if row == 1 else beam_rad, cell[row], min_linearity)
+                    for row in range(4)])
+    incidence = np.where(has_normal, np.arccos(np.clip(cos[0], 0.0, 1.0)), np.nan)
+    line_m = np.where(has_normal[0], _by_line(caster, from_laser[0], beam_rad[0], hits.first_m[0], hits.first_cell[0]),
+                      hits.first_m[0])
+    range_m = np.stack([hits.first_m, hits.mirrored_m, hits.second_m, hits.third_m])
+    _, linearity = caster.normals()
+    second_is_corner = (hits.second_cell >= 0) & (linearity[hits.second_cell] < min_linearity)
+    missed = _misses_corners(*beam_rad.shape)
+    _miss(_SECOND, missed & second_is_corner, range_m, cos, cell)
+    _miss(_FIRST, missed & (hits.first_cell >= 0) & ~has_normal, range_m, cos, cell)
+    return ReferenceRanges(range_m, cos, thickness_m[cell], cell, incidence, line_m)
 
-    def cos_at(cell: np.ndarray) -> np.ndarray:
-        return cos_incidence(caster, beam_rad, cell, min_linearity)
 
-    first = cos_at(hits.first_cell)
-    return ReferenceRanges(
-        np.stack([hits.first_m, hits.mirrored_m, hits.second_m, hits.third_m]),
-        np.stack([first, first, cos_at(hits.second_cell), cos_at(hits.third_cell)]),
-        thickness_m[np.stack([hits.first_cell, hits.first_cell, hits.second_cell, hits.third_cell])],
-        np.stack([hits.first_cell, hits.second_cell, hits.third_cell]),
-        np.where(hits.linearity >= min_linearity, np.arccos(np.clip(first, 0.0, 1.0)), np.nan))
+def _misses_corners(samples: int, beams: int) -> np.ndarray:
+    """(N, B) bool: for each beam every other sample but the predicted pose itself, for each sample every other beam."""
+    missed = (np.arange(samples)[:, None] + np.arange(beams)) % 2 == 1
+    missed[0] = False
+    return missed
+
+
+def _miss(surface: int, beams: np.ndarray, range_m: np.ndarray, cos: np.ndarray, cell: np.ndarray) -> None:
+    """Take a surface out of the references (4, N, B) of the chosen beams (N, B); what is behind it moves up."""
+    order = (0, 2, 3)[surface:]
+    for values, nothing in ((range_m, np.inf), (cos, 1.0), (cell, -1)):
+        for to, source in zip(order, order[1:]):
+            values[to][beams] = values[source][beams]
+        values[order[-1]][beams] = nothing
+        if surface == _FIRST:
+            values[1][beams] = nothing
+
+
+def _by_line(caster: RayCaster, from_laser: np.ndarray, beam_rad: np.ndarray, first_m: np.ndarray,
+             cell: np.ndarray) -> np.ndarray:
+    """(B,) ranges at which the beams of one sample cross the lines of the walls whose cells (B,) they meet.
+
+    A grazing beam enters the staircase of a wall's cells decimetres before it comes to the wall.
+    """
+    grid_map = caster.grid_map
+    centre = grid_map.centres(*np.divmod(cell, grid_map.occupancy.shape[1]))
+    normal_rad, _ = caster.normals()
+    axis_rad = normal_rad[cell]
+    across = np.stack([np.cos(axis_rad), np.sin(axis_rad)], axis=-1)
+    distance_m = np.sum((centre - from_laser[:2]) * across, axis=-1) + caster.wall_offsets_m()[cell]
+    cos = np.cos(beam_rad - axis_rad)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        line_m = distance_m / cos
+        near = np.abs(line_m - first_m) * np.abs(cos) <= _LINE_CELLS * grid_map.resolution_m
+    return np.where(near & (np.abs(cos) >= _GRAZING_COS), line_m, first_m)
 
 
 def cos_incidence(caster: RayCaster, beam_rad: np.ndarray, cell: np.ndarray, min_linearity: float) -> np.ndarray:

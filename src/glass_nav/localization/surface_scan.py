@@ -12,7 +12,7 @@ import numpy as np
 
 from glass_nav.localization.beam_cases import FIRST_PENETRATION, SECOND_PENETRATION, SPECULAR
 
-_SURELY_GLASS = 0.5  # a beam without an answer, or with an unexplained one behind a wall, is cut at such a cell
+_SURE = 0.5  # a beam without an answer, or with an unexplained one behind a wall, is cut at such a cell
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class SurfaceScan:
     trusted: bool         # False: the pose is not to be relied on, and nothing is cut
 
 
-def of(ranges_m: np.ndarray, case: np.ndarray, first_m: np.ndarray, first_glass: np.ndarray, gate_m: np.ndarray,
+def of(ranges_m: np.ndarray, case: np.ndarray, first_m: np.ndarray, seen_through: np.ndarray, gate_m: np.ndarray,
        trusted: bool) -> SurfaceScan:
     """Cut a scan.
 
@@ -31,7 +31,7 @@ def of(ranges_m: np.ndarray, case: np.ndarray, first_m: np.ndarray, first_glass:
         ranges_m: (B,) as measured, REP 117.
         case: (B,) what each beam met.
         first_m: (B,) range of the first surface of the map at the pose, inf: none.
-        first_glass: (B,) chance of that surface to be glass.
+        seen_through: (B,) chance of that surface to let beams pass.
         gate_m: (B,) along the beam; what is measured within it of the first surface is that surface.
         trusted: whether the pose is.
     """
@@ -40,5 +40,5 @@ def of(ranges_m: np.ndarray, case: np.ndarray, first_m: np.ndarray, first_glass:
     with np.errstate(invalid="ignore"):
         behind = ranges_m > first_m + gate_m  # also without an answer (inf)
     explained = np.isin(case, (SPECULAR, FIRST_PENETRATION, SECOND_PENETRATION))
-    cut = np.isfinite(first_m) & behind & (explained | (first_glass > _SURELY_GLASS))
+    cut = np.isfinite(first_m) & behind & (explained | (seen_through > _SURE))
     return SurfaceScan(np.where(cut, first_m, ranges_m), cut, True)

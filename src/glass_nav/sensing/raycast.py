@@ -46,6 +46,7 @@ class SurfaceHits:
     normal_rad: np.ndarray          # of the first surface in map, towards the ray's origin; NaN: none
     linearity: np.ndarray           # of the first surface: 1 straight wall ... 0 no direction
     mirrored_m: np.ndarray          # origin -> first surface -> next surface by reflection; inf: none
+    mirrored_cell: np.ndarray       # int32 flat index of the cell where that ends, -1: none
 
 
 class RayCaster:
@@ -74,7 +75,7 @@ class RayCaster:
         self._grid_from_map = se2.inverse(grid_map.map_from_grid)
         self._grid = _mrpt_grid.Grid(grid_map.occupancy, grid_map.resolution_m, OCCUPIED_PERCENT, backend,
                                      unknown == "stop")
-        self._normals: Optional[Tuple[np.ndarray, np.ndarray]] = None
+        self._normals: Optional[Tuple[np.ndarray, np.ndarray, np.ndarray]] = None
 
     @property
     def grid_map(self) -> GridMap:
@@ -146,9 +147,19 @@ class RayCaster:
             normal_rad: (H * W,) float32 axis of the normal in map, up to half a turn; NaN: none.
             linearity: (H * W,) float32, 1 straight wall ... 0 no direction, or no normal.
         """
+        return self._walls()[:2]
+
+    def wall_offsets_m(self) -> np.ndarray:
+        """(H * W,) float32 from the centre of each cell to the line of its wall, along the normal; NaN: none.
+
+        A slanted wall is a staircase of cells; the line through them is the wall.
+        """
+        return self._walls()[2]
+
+    def _walls(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         if self._normals is None:  # two threads may both compute it: the same arrays
-            normal_rad, linearity = self._grid.normals()
-            self._normals = self._in_map(normal_rad), linearity
+            normal_rad, linearity, offset_m = self._grid.normals()
+            self._normals = self._in_map(normal_rad), linearity, offset_m
         return self._normals
 
     def _in_map(self, grid_angle_rad: np.ndarray) -> np.ndarray:
