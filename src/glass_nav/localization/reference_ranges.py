@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glass_nav.geometry import se2
-from glass_nav.sensing.raycast import RayCaster, SurfaceHits
+from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
 
 LEAST_COS = 0.2  # a surface seen flatter than 78 degrees is no worse placed than at that
