@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Does the filter keep up?  CPU time of one update, and of its parts, on a map of the data folder.
+"""Does the filter keep up?  CPU time of one update, and of the cases alone, on a map of the data folder.
 
     python test/benchmark/update_time.py
     python test/benchmark/update_time.py --map ../shared/data/logs/intel/map.yaml --beams 541 --particles 2000
@@ -32,14 +32,11 @@ sys.path.append(str(Path(__file__).resolve().parent))
 import baselines
 import drives
 from glass_nav import params
-from glass_nav.localization import beam_cases, beam_weights, preliminary_samples, reference_ranges
 from glass_nav.localization.beam_weights import BeamMixture
 from glass_nav.localization.glass_mcl import GlassMcl, GlassMclParams
-from glass_nav.localization.range_residuals import RangeResiduals
 from glass_nav.localization.resampling import ParticleCount
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
-from glass_nav.sensing.wall_thickness import wall_thickness
 from glass_nav.simulation import lidar
 from glass_nav.world import map_file
 from glass_nav.world.grid_map import GridMap
@@ -125,40 +122,21 @@ def main() -> int:
                                             "laser_max_beams": arguments.weighted_beams}, "update_time")
     rng = np.random.default_rng(arguments.seed)
     caster = RayCaster(grid_map)
-    caster.normals()  # once a map, not once an update
-    thickness_m = wall_thickness(grid_map)
-    vote, residuals = settings.vote, RangeResiduals(0.5, settings.mixture.laser_sigma_hit)
     mcl = GlassMcl(settings, grid_map, rng)
     whole: List[float] = []
     classified: List[float] = []
-    weighted: List[float] = []
     for pose in places(grid_map, arguments.runs, rng):
         mcl.set_pose(pose, np.diag([0.05, 0.05, 0.02]) ** 2)
         mcl.update(scan_at(caster, pose, arguments.beams, 0, rng), np.zeros(3))
         scan = scan_at(caster, pose, arguments.beams, 1, rng)
         mcl.request_update()
         whole.append(cpu_ms(lambda scan=scan: mcl.update(scan, np.zeros(3))))
-        samples = preliminary_samples.around(pose, np.zeros((3, 3)), settings.samples)
-
-        def classify(scan: Scan = scan, samples: np.ndarray = samples) -> beam_cases.BeamCases:
-            references = reference_ranges.of(caster, thickness_m, samples, scan, vote.glass_max_thickness_m,
-                                             vote.normal_min_linearity)
-            return beam_cases.classify(scan.ranges_m, references, residuals, vote)
-
-        classified.append(cpu_ms(classify))
-        cases = classify()
-        chosen = beam_weights.choose(cases.case, arguments.weighted_beams)
-        particles = pose + rng.normal(0.0, 1.0, (arguments.particles, 3)) * [0.05, 0.05, 0.02]
-        weighted.append(cpu_ms(lambda scan=scan, cases=cases, chosen=chosen, particles=particles:
-                               beam_weights.log_weights(
-                                   caster, thickness_m, particles, scan.angles_rad[chosen], scan.ranges_m[chosen],
-                                   cases.case[chosen], residuals, settings.mixture, MAX_RANGE_M,
-                                   vote.glass_max_thickness_m, vote.normal_min_linearity)))
+        classified.append(cpu_ms(lambda scan=scan: mcl.update(scan, np.zeros(3))))  # it has not moved: cases only
 
     print(f"{arguments.map}: {arguments.beams} beams classified by {settings.samples.sample_count} samples, "
           f"{arguments.particles} particles weighted on {arguments.weighted_beams} beams; "
           f"CPU ms, {arguments.runs} places")
-    for name, times in (("classify", classified), ("weigh", weighted), ("whole update", whole)):
+    for name, times in ((CLASSIFY, classified), ("whole update", whole)):
         print(f"  {name:12s}  median {np.median(times):6.1f}  min {min(times):6.1f}  max {max(times):6.1f}")
     limits = [(f"{arguments.limit_ms:g} ms for a whole update", float(np.median(whole)) <= arguments.limit_ms)]
     found = compare(arguments)
