@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
+import json
 import multiprocessing
 import os
 import sys
@@ -248,6 +249,20 @@ def number(value: Optional[float], digits: int = 3) -> str:
     return "" if value is None else f"{value:.{digits}f}"
 
 
+def baselines_from(path: Path, jobs: Sequence[Job]) -> List[Run]:
+    """What the baselines, and no other localizer, made of the drives of these jobs in an earlier benchmark."""
+    found = json.loads(path.read_text())
+    wanted = {(job.building, job.lidar, job.seed): job for job in jobs}
+    runs = []
+    for each in found["runs"]:
+        job = wanted.get((each["building"], each["lidar"], each["seed"]))
+        if (job is not None and found["changed"] == job.changed and each["localizer"] in baselines.BASELINES
+                and each["localizer"] not in job.localizers):
+            runs.append(Run(job.building, job.lidar, job.seed, each["localizer"], each["pose"], None, None,
+                            each["scans"], each["updates"], each["cpu_s"]))
+    return runs
+
+
 def settings_from(assignments: Sequence[str]) -> GlassMclParams:
     pairs = (assignment.partition("=") for assignment in assignments)
     return params.load(GlassMclParams, {name: yaml.safe_load(value) for name, _, value in pairs}, "glass_buildings")
@@ -268,6 +283,8 @@ def main() -> int:
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="one parameter of our filter")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=Path, help="JSON with all figures of all runs")
+    parser.add_argument("--reuse", type=Path, metavar="JSON", help="an earlier --out: its baselines, where they drove "
+                        "the same drives and are not to run again (as long as the simulator is the same)")
     arguments = parser.parse_args()
     settings = settings_from(arguments.set)
     lidars = arguments.lidars or drives.lidars()
@@ -283,6 +300,8 @@ def main() -> int:
             first = found[0]
             print(f"{done} of {len(jobs)} drives, {time.monotonic() - began:.0f} s: {first.building} {first.lidar} "
                   f"{first.seed}, {first.scans} scans", file=sys.stderr)
+    if arguments.reuse is not None:
+        runs += baselines_from(arguments.reuse, jobs)
     print("\nCases (P precision, R recall)\n")
     print_cases(runs, (lambda each: each.building, lambda each: each.lidar, lambda each: "all"))
     print()

@@ -66,6 +66,15 @@ def test_the_ratio_is_to_the_best_baseline_of_the_building_and_never_to_the_orac
     assert glass_buildings.to(runs, "hall", "position_rmse_m", "ours_oracle") == pytest.approx(20.0)
 
 
+def test_baselines_of_an_earlier_benchmark_count_where_they_drove_the_same(tmp_path):
+    runs = [a_run(name) for name in ("amcl_field60", "amcl_beam60", "ours", "ours_oracle")] + [a_run("ours_case1", "yard")]
+    replay_result.write_json(tmp_path / "x.json", {"changed": 0.0, "runs": [each.as_json() for each in runs]})
+    job = Job("hall", "weak", 100, 0.0, None, ("ours", "amcl_beam60"), GlassMclParams())
+    assert glass_buildings.baselines_from(tmp_path / "x.json", [job]) == [a_run("amcl_field60")]
+    assert glass_buildings.baselines_from(tmp_path / "x.json", [job._replace(changed=0.3)]) == []
+    assert glass_buildings.baselines_from(tmp_path / "x.json", [job._replace(seed=101)]) == []
+
+
 @pytest.mark.parametrize("changes, missed", [
     ({}, []), ({"rmse_m": 0.016}, ["hall: position_rmse_m / best baseline"]), ({"lost": 0.1}, ["largest lost share"]),
     ({"told": (1, 3, 3, 1)}, ["case accuracy", "macro F1", "precision of case 1"])])
