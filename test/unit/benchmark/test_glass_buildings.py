@@ -67,7 +67,8 @@ def test_the_ratio_is_to_the_best_baseline_of_the_building_and_never_to_the_orac
 
 
 def test_baselines_of_an_earlier_benchmark_count_where_they_drove_the_same(tmp_path):
-    runs = [a_run(name) for name in ("amcl_field60", "amcl_beam60", "ours", "ours_oracle")] + [a_run("ours_case1", "yard")]
+    runs = [a_run(name) for name in ("amcl_field60", "amcl_beam60", "ours", "ours_oracle")]
+    runs.append(a_run("ours_case1", "yard"))
     replay_result.write_json(tmp_path / "x.json", {"changed": 0.0, "runs": [each.as_json() for each in runs]})
     job = Job("hall", "weak", 100, 0.0, None, ("ours", "amcl_beam60"), GlassMclParams())
     assert glass_buildings.baselines_from(tmp_path / "x.json", [job]) == [a_run("amcl_field60")]
