@@ -7,7 +7,7 @@ between two crossings is where the middle of that stretch lies. Lengths are in c
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import List, Optional
+from typing import Callable, List, Optional
 
 import numpy as np
 
@@ -72,9 +72,13 @@ def first_hit(occupied: np.ndarray, x: float, y: float, direction_rad: float, t_
     return t, set((seen.row * occupied.shape[1] + seen.column)[here])
 
 
-def runs(occupied: np.ndarray, x: float, y: float, direction_rad: float, t_max: float,
-         min_gap: float) -> List[Run]:
-    """All surfaces that begin within t_max, gaps shorter than min_gap closed; t_out is inf beyond t_max."""
+def surfaces(occupied: np.ndarray, x: float, y: float, direction_rad: float, t_max: float, min_gap: float,
+             same_wall: Callable[[int, int], bool] = lambda passed, cell: False) -> List[Run]:
+    """All surfaces that begin within t_max, gaps shorter than min_gap closed; t_out is inf beyond t_max.
+
+    None begins at a cell for which same_wall(first cell of the surface before, cell) holds; but where such a cell is
+    nearer than the gap to the surface before, it belongs to that, as any other cell does.
+    """
     seen = visits(x, y, direction_rad, occupied.shape)
     found: List[Run] = []
     for t_in, t_out, row, column in zip(seen.t_in, seen.t_out, seen.row, seen.column):
@@ -85,7 +89,7 @@ def runs(occupied: np.ndarray, x: float, y: float, direction_rad: float, t_max: 
         if found and t_in - found[-1].t_out < max(min_gap, CORNER):
             last = found.pop()
             found.append(Run(last.t_in, max(t_out, last.t_out), last.cells + [cell]))
-        else:
+        elif not (found and same_wall(found[-1].cells[0], cell)):
             found.append(Run(t_in, t_out, [cell]))
     return found
 

@@ -7,6 +7,7 @@ import pytest
 
 import slow_raycast
 from glass_nav.geometry.angles import wrap
+from glass_nav.geometry.se2 import compose, inverse
 from glass_nav.sensing.raycast import RayCaster, SurfaceHits
 from glass_nav.world.grid_map import UNKNOWN, GridMap
 
@@ -171,6 +172,51 @@ def test_normals_of_straight_walls_are_good_to_a_fraction_of_a_degree(thickness_
     assert np.median(errors_deg) < 0.2 and np.percentile(errors_deg, 90) < 0.7
 
 
+@pytest.mark.parametrize("turned", [False, True], ids=["along x", "along y"])
+@pytest.mark.parametrize("rows", [(31,), (29,), (29, 31)], ids=["right", "left", "both sides"])
+@pytest.mark.parametrize("post_cells, limit_deg", [(1, 0.2), (2, 0.2), (4, 1.0)])
+def test_posts_that_stick_out_do_not_turn_the_normal_of_a_wall(post_cells, limit_deg, rows, turned):
+    """A glass wall with posts every 1.7 m, as wide as a frame (5 or 10 cm) or as a column."""
+    cells = np.zeros((60, 240), np.int8)
+    cells[30] = 100
+    for start in range(20, 240 - post_cells, 34):
+        cells[rows, start:start + post_cells] = 100
+    found_rad, _ = RayCaster(GridMap(cells.T.copy() if turned else cells, CELL_M, np.zeros(3))).normals()
+    flat = found_rad.reshape(240, 60).T if turned else found_rad.reshape(60, 240)
+    off_deg = np.degrees(np.abs(wrap(2.0 * (flat[30, 20:220] - (0.0 if turned else np.pi / 2))))) / 2.0
+    assert np.nanmax(off_deg) < limit_deg and np.isfinite(off_deg).mean() > 0.8  # the middle of a thick post has none
+
+
+@pytest.mark.parametrize("map_from_grid", [(0.0, 0.0, 0.0), (-7.0, 3.0, 0.9), (2.0, 5.0, -2.5)])
+@pytest.mark.parametrize("thickness_cells", [1.5, 2.0, 2.5])
+@pytest.mark.parametrize("slant_deg", [8.0, 27.0, 61.0, 100.0, 152.0, -8.0])
+def test_the_line_of_a_slanted_wall_is_where_the_wall_is(slant_deg, thickness_cells, map_from_grid):
+    """From the centre of each of its cells, on either side of the line, the offset leads to the line."""
+    row, column = np.mgrid[:80, :80] + 0.5
+    normal = np.array([np.cos(np.radians(slant_deg)), np.sin(np.radians(slant_deg))])
+    across = (np.stack([column, row], axis=-1) - 40.3) @ normal  # [cells]
+    cells = np.where(np.abs(across) <= thickness_cells / 2, 100, 0).astype(np.int8)
+    world = GridMap(cells, CELL_M, np.array(map_from_grid))
+    caster = RayCaster(world)
+    axis_rad, offset_m = caster.normals()[0], caster.wall_offsets_m()
+    assert offset_m.shape == (6400,) and (np.isnan(offset_m) == np.isnan(axis_rad)).all()
+    met = np.flatnonzero(np.isfinite(offset_m))
+    met = met[np.all(np.abs(np.stack(np.divmod(met, 80)) - 39.5) < 20.0, axis=0)]  # far from the ends of the wall
+    centres = world.centres(*np.divmod(met, 80))
+    on_line = centres + offset_m[met, None] * np.stack([np.cos(axis_rad[met]), np.sin(axis_rad[met])], axis=-1)
+    on_grid = compose(inverse(np.array(map_from_grid)), np.c_[on_line, np.zeros(len(met))])[:, :2] / CELL_M
+    assert len(met) > 30 and np.abs((on_grid - 40.3) @ normal).max() < 0.2
+    assert thickness_cells < 2.0 or (offset_m[met].min() < -0.2 * CELL_M and offset_m[met].max() > 0.2 * CELL_M)
+
+
+def test_cells_inside_a_block_and_free_cells_have_no_line():
+    cells = np.zeros((30, 30), np.int8)
+    cells[10:20, 10:20] = 100
+    offset_m = RayCaster(GridMap(cells, CELL_M, np.zeros(3))).wall_offsets_m().reshape(30, 30)
+    assert np.isnan(offset_m[12:18, 12:18]).all() and np.isnan(offset_m[:10]).all()
+    assert np.isfinite(offset_m[10, 14])
+
+
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("seed", range(4))
 def test_surfaces_are_the_runs_of_the_slow_traversal(seed, backend):
@@ -184,14 +230,21 @@ def test_surfaces_are_the_runs_of_the_slow_traversal(seed, backend):
     max_range_m, max_thickness_m, min_linearity, min_gap_m = 4.0, 0.2, 0.9, 0.12
     caster = RayCaster(world, backend)
     axis_rad, linearity = caster.normals()
+
+    def same_wall(passed, cell):
+        """Posts and steps: not farther than 1.5 cells from the line of the wall that the ray has passed."""
+        across = np.array([np.cos(axis_rad[passed]), np.sin(axis_rad[passed])])
+        way = np.subtract(np.divmod(cell, 110), np.divmod(passed, 110))[::-1]
+        return linearity[passed] >= min_linearity and abs(way @ across) <= 1.5
+
     poses = np.c_[rng.uniform(-0.5, 5.5, (60, 2)), rng.uniform(-np.pi, np.pi, 60)]
     angles_rad = rng.uniform(-np.pi, np.pi, 6)
     found = caster.cast_surfaces(poses, angles_rad, max_range_m, max_thickness_m, min_linearity, min_gap_m)
     for p, b in np.ndindex(len(poses), len(angles_rad)):
         direction = poses[p, 2] + angles_rad[b]
         expected_m, expected_thickness_m = np.full(3, np.inf), np.full(3, np.inf)
-        for i, run in enumerate(slow_raycast.runs(world.occupied, *poses[p, :2] / CELL_M, direction,
-                                                  max_range_m / CELL_M, min_gap_m / CELL_M)[:3]):
+        for i, run in enumerate(slow_raycast.surfaces(world.occupied, *poses[p, :2] / CELL_M, direction,
+                                                      max_range_m / CELL_M, min_gap_m / CELL_M, same_wall)[:3]):
             expected_m[i] = run.t_in * CELL_M
             straight = linearity[run.cells[0]] >= min_linearity
             cos = abs(np.cos(axis_rad[run.cells[0]] - direction)) if straight else 1.0
@@ -203,6 +256,45 @@ def test_surfaces_are_the_runs_of_the_slow_traversal(seed, backend):
         got_thickness_m = [found.first_thickness_m[p, b], found.second_thickness_m[p, b]]
         assert got_m == pytest.approx(expected_m, abs=1e-8), where
         assert got_thickness_m == pytest.approx(expected_thickness_m[:2], abs=1e-5), where
+
+
+def test_a_flat_ray_that_has_passed_a_wall_does_not_meet_its_posts():
+    """At 4 degrees a ray comes out 0.7 m behind where it went in, and would meet a post that sticks out a cell."""
+    cells = np.zeros((100, 400), np.int8)
+    cells[50] = 100
+    cells[51, 7:400:34] = 100
+    cells[90] = 100
+    starts = np.c_[np.linspace(0.3, 9.0, 30), np.full(30, 2.2), np.zeros(30)]
+    found = RayCaster(GridMap(cells, CELL_M, np.zeros(3))).cast_surfaces(starts, np.radians([4.0, 10.0, 40.0]), 60.0)
+    assert (found.first_cell // 400 == 50).all()
+    assert np.isin(found.second_cell // 400, [90, -1]).all() and (found.second_cell[:, 2] // 400 == 90)[:20].all()
+
+
+def test_what_stands_farther_than_the_steps_of_a_wall_is_another_surface():
+    cells = np.zeros((100, 100), np.int8)
+    cells[50] = cells[54] = 100
+    found = hits(GridMap(cells, CELL_M, np.zeros(3)), [2.51, 1.0, 0.0], np.pi / 2)
+    assert found.second_cell[0, 0] // 100 == 54
+
+
+def test_behind_a_corner_without_normal_nothing_is_left_out():
+    """A speck has no line: one three cells behind it is the next surface."""
+    cells = np.zeros((100, 100), np.int8)
+    cells[50, 40] = cells[50, 43] = 100
+    found = hits(GridMap(cells, CELL_M, np.zeros(3)), [0.1, 2.52, 0.0], 0.0)
+    assert [found.first_cell[0, 0] % 100, found.second_cell[0, 0] % 100] == [40, 43]
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_the_cell_where_the_mirrored_path_ends_is_told(backend):
+    """Head-on between two walls, each way: back to the wall behind the robot."""
+    cells = np.zeros((400, 160), np.int8)
+    cells[:, [10, 120]] = 100
+    world = GridMap(cells, CELL_M, np.zeros(3))
+    found = RayCaster(world, backend).cast_surfaces([[2.0, 10.02, 0.0]], [0.0, np.pi, np.pi / 2], 15.0)
+    assert (found.mirrored_cell[0] % 160)[:2].tolist() == [10, 120]
+    assert (found.mirrored_cell[0, :2] // 160 == 200).all()
+    assert found.mirrored_cell[0, 2] == -1 and found.mirrored_m[0, 2] == np.inf
 
 
 def test_threads_do_not_change_the_surfaces():
