@@ -24,15 +24,15 @@ CASE_NAMES = ("0 uncertain", "1 diffuse", "2 mirrored", "3 behind one pane", "4 
 CASE_COLOURS = np.array([[150, 150, 150], [0, 158, 115], [204, 121, 167], [86, 180, 233], [0, 114, 178]],
                         dtype=np.uint32)
 
-STATE_COLOURS = {"LOCALIZED": (0, 110, 70), "UNCERTAIN": (200, 110, 0), "LOST": (200, 0, 0),
-                 "GLOBAL_SEARCH": (110, 60, 160), "UNKNOWN": (90, 90, 90)}
+STATE_COLOURS = {"LOCALIZED": (0, 60, 35), "UNCERTAIN": (130, 60, 0), "LOST": (150, 0, 0),
+                 "GLOBAL_SEARCH": (70, 20, 110), "UNKNOWN": (40, 40, 40)}  # dark on free and unknown cells alike
 STATUS_NAMESPACE = "status"
 
 _POINT_M = 0.08         # edge of the square at the end of a beam
 _LINE_M = 0.018         # width of the line from the surface to that end
 _LINE_ALPHA = 0.6
-_TEXT_M = 0.35          # height of a capital letter
-_TEXT_ABOVE_M = 1.1     # of the robot: up, and to the north, which is up on the screen when seen from above
+_TEXT_M = 0.4           # height of a capital letter
+_TEXT_ABOVE_M = 0.75    # of the robot: up, and to the north, which is up on the screen when seen from above
 _REASON_WIDTH = 48      # letters of a line
 
 

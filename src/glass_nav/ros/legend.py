@@ -18,7 +18,7 @@ MARGIN, PATCH = 6, 22
 
 # In the order of the rows: as far as a beam gets.
 CASE_WORDS = {1: "1 diffuse: ended at first surface", 3: "3 behind one pane", 4: "4 behind two panes",
-              2: "2 mirrored at first surface", 0: "0 uncertain: not on the map"}
+              2: "2 mirrored at first surface", 0: "0 uncertain: nothing explains it"}
 WALL_WORDS = {2: "glass: chance of 75 % and more", 1: "undecided", 0: "solid: chance of glass below 25 %"}
 
 
