@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from buildings import CELL_M, Building
+from buildings import CELL_M, GLASS_ROOM, RANGE_MAX_M, Building
+from glass_nav.geometry import se2
 from glass_nav.localization import beam_cases, reference_ranges
 from glass_nav.localization.beam_cases import CaseVote
 from glass_nav.localization.range_residuals import RangeResiduals
@@ -13,25 +14,44 @@ from glass_nav.localization.reference_ranges import ReferenceRanges
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
 from glass_nav.sensing.wall_thickness import wall_thickness
+from glass_nav.world.grid_map import GridMap
 
 MODES = ("soft", "paper")
 AT_THE_BOUNDARY = RangeResiduals(depth_share=0.0, sigma_m=0.04)
-VOTE = dict(case_gate_m=0.15, case_min_share=0.5, prior_specular=0.02, prior_first_penetration=0.12,
-            prior_second_penetration=0.04, prior_uncertain=0.1)
+VOTE = dict(case_gate_m=0.15, case_min_share=0.5, prior_uncertain=0.1, prior_uncertain_behind=0.2, mirror_gain=2.0,
+            neighbour_pull=0.0)
 NEVER = np.inf
+OBLIQUE = np.radians(45.0)  # neither head on, where panes answer, nor grazing, where they mirror
 
 
-def references(first=NEVER, mirrored=NEVER, second=NEVER, third=NEVER, cos=1.0, thickness_m=0.05, incidence=np.nan):
+def references(first=NEVER, mirrored=NEVER, second=NEVER, third=NEVER, cos=1.0, thickness_m=0.05, incidence=OBLIQUE,
+               seen_side=True):
     """ReferenceRanges (4, N, B); each a number, a row of beams (B,), or samples and beams (N, B)."""
     ranges = np.stack(np.broadcast_arrays(*[np.atleast_2d(np.asarray(value, float))
                                             for value in (first, mirrored, second, third)]))
-    return ReferenceRanges(ranges, np.full(ranges.shape, cos), np.full(ranges.shape, thickness_m),
-                           np.full((3, *ranges.shape[1:]), -1), np.full(ranges.shape[1:], incidence))
+    beams = ranges.shape[2]
+    sides = np.broadcast_to(np.reshape(seen_side, (-1, 1)), (4, beams))
+    return ReferenceRanges(range_m=ranges, cos_incidence=np.full(ranges.shape, cos),
+                           thickness_m=np.full(ranges.shape, thickness_m), cell=np.zeros(ranges.shape, np.int32),
+                           pane_incidence=np.full(ranges.shape[1:], incidence), line_m=ranges[0, 0],
+                           normal_rad=np.zeros(beams), seen_side=sides)
 
 
-def classify(measured_m, offered, mode="soft", residuals=AT_THE_BOUNDARY, **values):
-    return beam_cases.classify(np.atleast_1d(np.asarray(measured_m, float)), offered, residuals,
-                               CaseVote(**{**VOTE, **values}, vote_mode=mode))
+def classify(measured_m, offered, mode="soft", residuals=AT_THE_BOUNDARY, through=0.5, there=1.0, max_range_m=20.0,
+             **values):
+    """through, there: chances to be seen through, and to be there if so, of both surfaces or of each."""
+    measured_m = np.atleast_1d(np.asarray(measured_m, float))
+    glass = np.stack([np.broadcast_to(np.reshape(chance, (-1, 1)), (2, len(measured_m)))
+                      for chance in (through, there)])
+    return beam_cases.classify(measured_m, offered, residuals, CaseVote(**{**VOTE, **values}, vote_mode=mode), glass,
+                               max_range_m)
+
+
+def weight_of_a_mirror(mirrored=3.0, second=5.0, incidence_deg=60.0, **values):
+    """Share of the vote that a beam gets for being mirrored whose range fits nothing else."""
+    cases = classify(mirrored, references(first=1.0, mirrored=mirrored, second=second,
+                                          incidence=np.radians(incidence_deg)), case_min_share=0.0, **values)
+    return float(cases.weight[0]) if cases.case[0] == 2 else 1.0 - float(cases.weight[0])
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -70,34 +90,111 @@ def test_without_beams_there_are_no_shares():
     assert classify(np.zeros(0), references(first=np.zeros((1, 0)))).share() == dict.fromkeys(range(5), 0.0)
 
 
-@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("equal, winner", [
     (dict(first=3.0, mirrored=3.0, second=3.0, third=3.0), 1), (dict(mirrored=3.0, second=3.0, third=3.0), 3),
     (dict(mirrored=3.0, third=3.0), 4), (dict(mirrored=3.0), 2), (dict(first=3.0, mirrored=3.0), 1)])
-def test_of_equal_references_the_plainest_explanation_wins(mode, equal, winner):
-    assert classify(3.0, references(**equal), mode).case.tolist() == [winner]
+def test_in_the_paper_the_plainest_of_equal_explanations_wins(equal, winner):
+    assert classify(3.0, references(**equal), "paper").case.tolist() == [winner]
 
 
-# By Fresnel with n = 1.51 a pane reflects 2 R / (1 + R), R of one surface. Head-on R = 0.0413, so
-# 7.9 %; at 80 degrees R = (0.543 + 0.236) / 2, so 56 %. A mirrored echo is the stronger one where
-# d3 / d2 > T / R: head-on 11.6, at 80 degrees 0.78.
-@pytest.mark.parametrize("incidence_deg, behind_m, mirrored_m, case", [
-    pytest.param(80.0, 5.0, 3.0, 2, id="grazing: the mirror wins"),
-    pytest.param(80.0, 2.2, 3.0, 0, id="grazing, but the wall behind is much nearer"),
-    pytest.param(80.0, 2.5, 3.0, 2, id="grazing, and the wall behind is a little nearer"),
-    pytest.param(0.0, 5.0, 3.0, 0, id="head-on: the wall behind wins"),
-    pytest.param(0.0, 36.0, 3.0, 2, id="head-on, but the wall behind is twelve times as far"),
-    pytest.param(0.0, 34.0, 3.0, 0, id="eleven times is not enough"),
-    pytest.param(0.0, NEVER, 3.0, 2, id="head-on with nothing behind")])
-def test_a_mirrored_echo_is_believed_where_fresnel_lets_it_win(incidence_deg, behind_m, mirrored_m, case):
-    offered = references(first=1.0, mirrored=mirrored_m, second=behind_m, incidence=np.radians(incidence_deg))
-    assert classify(mirrored_m, offered).case.tolist() == [case]
+@pytest.mark.parametrize("through, there, case", [
+    pytest.param(0.01, 1.0, 1, id="a wall"), pytest.param(0.99, 1.0, 3, id="a pane"),
+    pytest.param((0.99, 0.99), 1.0, 3, id="two panes: the one behind may be open or answer"),
+    pytest.param(0.99, 0.01, 0, id="a thing that is gone")])
+def test_of_equal_explanations_how_glassy_the_wall_proved_decides(through, there, case):
+    offered = references(first=3.0, second=3.0)
+    assert classify(3.0, offered, through=through, there=there).case.tolist() == [case]
+
+
+@pytest.mark.parametrize("second, case", [(0.01, 3), (0.99, 4)])
+def test_how_glassy_the_second_wall_proved_decides_between_one_pane_and_two(second, case):
+    offered = references(first=1.0, second=3.0, third=3.0)
+    assert classify(3.0, offered, through=(0.99, second)).case.tolist() == [case]
+
+
+def test_a_pane_answers_head_on_and_lets_pass_what_comes_from_the_side():
+    """Half a gate between a pane and the wall behind it, and a range from the middle."""
+    for incidence, case in ((0.0, 1), (OBLIQUE, 3)):
+        offered = references(first=2.0, second=2.1, incidence=incidence)
+        assert classify(2.05, offered, through=0.99).case.tolist() == [case]
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_wall_that_never_let_anybody_through_may_do_so_once(mode):
+    assert classify(5.0, references(first=2.0, second=5.0), mode, through=0.0).case.tolist() == [3]
+
+
+def test_what_ends_behind_a_thing_that_is_gone_has_passed_no_pane():
+    """It is at the second surface and yet in none of the cases 1 to 4."""
+    offered = references(first=2.0, second=5.0)
+    assert classify(5.0, offered, through=0.99, there=0.02).case.tolist() == [0]
+    assert classify(5.0, offered, through=0.99, there=0.98).case.tolist() == [3]
+    assert classify(5.0, offered, "paper", through=0.99, there=0.02).case.tolist() == [3]  # knows no glass map
+
+
+@pytest.mark.parametrize("row, measured_m", [(2, 5.0), (3, 8.0), (1, 3.0)])
+def test_a_wall_is_not_believed_to_be_met_from_a_side_that_nobody_saw(row, measured_m):
+    """Looking back into the building through its glass: the outer face of the wall is not on the map."""
+    offered = dict(first=2.0, mirrored=3.0, second=5.0, third=8.0)
+    sides = np.ones(4, bool)
+    seen = classify(measured_m, references(**offered), case_min_share=0.0)
+    sides[row] = False
+    unseen = classify(measured_m, references(**offered, seen_side=sides), case_min_share=0.0)
+    assert seen.case.tolist() == [row + 1]
+    assert unseen.case.tolist() == [0] or unseen.weight[0] < seen.weight[0]
+    sides[row], sides[0] = True, False  # the first surface stands before the lidar, whatever the mapper saw
+    assert classify(2.0, references(**offered, seen_side=sides)).case.tolist() == [1]
+
+
+# -- mirrors
+
+def test_a_mirrored_echo_is_believed_the_more_the_flatter_the_beam():
+    # By Fresnel with n = 1.51 a pane reflects 8 % head-on, 56 % at 80 degrees.
+    weights = [weight_of_a_mirror(incidence_deg=deg) for deg in (30.0, 50.0, 65.0, 80.0)]
+    assert np.all(np.diff(weights) > 0.0)
+
+
+def test_a_mirrored_echo_is_believed_the_less_the_nearer_the_wall_behind():
+    weights = [weight_of_a_mirror(second=behind_m) for behind_m in (NEVER, 12.0, 5.0, 2.2, 1.3)]
+    assert np.all(np.diff(weights) < 0.0)
+
+
+def test_a_mirrored_echo_is_believed_the_less_the_longer_its_way():
+    """Nothing behind the pane: the way alone makes the echo weak."""
+    weights = [weight_of_a_mirror(mirrored=mirrored_m, second=NEVER) for mirrored_m in (2.0, 6.0, 12.0, 18.0)]
+    assert np.all(np.diff(weights) < 0.0)
+
+
+def test_a_lidar_that_sees_farther_sees_fainter_mirrored_echoes():
+    assert weight_of_a_mirror(second=NEVER, max_range_m=30.0) > weight_of_a_mirror(second=NEVER, max_range_m=4.0)
+
+
+def test_coated_panes_mirror_more_and_panes_without_gain_not_at_all():
+    assert weight_of_a_mirror(mirror_gain=6.0) > weight_of_a_mirror(mirror_gain=1.0)
+    offered = references(first=1.0, mirrored=3.0, second=5.0, incidence=np.radians(80.0))
+    assert classify(3.0, offered, mirror_gain=0.0).case.tolist() == [0]
+
+
+@pytest.mark.parametrize("incidence_deg, case", [pytest.param(20.0, 3, id="nearly head-on"),
+                                                 pytest.param(82.0, 2, id="grazing")])
+def test_a_wall_behind_and_its_like_in_the_mirror_are_told_apart_by_the_incidence(incidence_deg, case):
+    """Both as far away: near head-on a pane mirrors a tenth of the light, grazing it mirrors most."""
+    offered = references(first=1.0, mirrored=4.0, second=4.0, incidence=np.radians(incidence_deg))
+    assert classify(4.0, offered, through=0.9).case.tolist() == [case]
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_where_nothing_is_mirrored_no_beam_is_said_to_be(mode):
+    offered = references(first=[1.0] * 3, second=[5.0] * 3, incidence=np.nan)
+    assert classify([3.0, NEVER, 5.0], offered, mode).case.tolist() == [0, 0, 3]
 
 
 def test_the_paper_believes_every_mirrored_echo():
     offered = references(first=1.0, mirrored=3.0, second=5.0, incidence=0.0)
     assert classify(3.0, offered, "paper").case.tolist() == [2]
 
+
+# -- samples
 
 def test_in_the_paper_every_sample_has_one_vote():
     offered = references(first=[[2.0], [2.0], [2.0], [9.0]], second=[[5.0], [5.0], [5.0], [2.0]])
@@ -133,13 +230,99 @@ def test_a_sample_that_explains_the_scan_is_heard_more():
     assert classify(measured_m, offered, "paper").case[-1] == 1  # one vote each: the plainer case
 
 
-def test_a_beam_is_not_told_to_have_met_what_the_pose_itself_does_not_see():
-    offered = references(first=[[NEVER], [2.0], [2.0], [2.0]])
-    for mode in MODES:
-        cases = classify(2.0, offered, mode)
-        assert cases.case.tolist() == [0]
-        assert np.isnan(cases.expected_m).all() and np.isnan(cases.residual_m).all()
+@pytest.mark.parametrize("mode", MODES)
+def test_a_beam_that_passes_an_edge_at_the_pose_itself_keeps_its_case(mode):
+    """What it is told to have met is what the sample sees that explains it best."""
+    offered = references(first=[[NEVER], [2.02], [1.9], [2.1]])
+    cases = classify(2.0, offered, mode)
+    assert cases.case.tolist() == [1]
+    np.testing.assert_allclose(cases.expected_m, 2.02)
+    np.testing.assert_allclose(cases.residual_m, -0.02)
 
+
+@pytest.mark.parametrize("mode", MODES)
+def test_what_the_pose_itself_sees_is_told_even_if_another_sample_fits_better(mode):
+    cases = classify(2.0, references(first=[[2.06], [2.0], [2.0]]), mode)
+    np.testing.assert_allclose(cases.expected_m, 2.06)
+
+
+def test_a_corner_that_some_samples_graze_is_no_pane():
+    """Half of them see it before the wall. Not each sample decides: without the corner the wall explains the beam."""
+    offered = references(first=[[2.0], [5.0]] * 4, second=[[5.0], [NEVER]] * 4)
+    cases = classify(5.0, offered, through=0.1)
+    assert cases.case.tolist() == [1]
+    assert cases.weight[0] > 0.85
+    np.testing.assert_allclose(cases.expected_m, 5.0)
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("seed", range(5))
+def test_the_order_of_the_samples_does_not_matter(seed, mode):
+    """But for the first of them, the pose itself."""
+    rng = np.random.default_rng(seed)
+    samples, beams = 12, 60
+    first = rng.uniform(1.0, 3.0, (1, beams)) + rng.normal(0.0, 0.06, (samples, beams))
+    second, third = first + rng.uniform(0.05, 2.0, beams), first + rng.uniform(2.0, 3.0, beams)
+    mirrored = np.where(rng.random(beams) < 0.5, first + rng.uniform(0.3, 2.0, beams), NEVER)
+    measured_m = np.where(rng.random(beams) < 0.5, first[0], second[0]) + rng.normal(0.0, 0.05, beams)
+    order = np.append(0, 1 + rng.permutation(samples - 1))
+    one = classify(measured_m, references(first, mirrored, second, third), mode, neighbour_pull=1.0)
+    other = classify(measured_m, references(*[rows[order] for rows in
+                                              (first, np.tile(mirrored, (samples, 1)), second, third)]), mode,
+                     neighbour_pull=1.0)
+    np.testing.assert_array_equal(one.case, other.case)
+    np.testing.assert_allclose(one.weight, other.weight)
+    np.testing.assert_allclose(one.expected_m, other.expected_m)
+
+
+# -- neighbours
+
+def walls_apart(measured_m):
+    """Every beam may end at a wall or, 0.2 m behind it, at another."""
+    return references(first=np.full(len(measured_m), 2.0), second=np.full(len(measured_m), 2.2))
+
+
+def test_a_beam_between_others_of_one_case_is_pulled_to_it():
+    measured_m = np.array([2.0, 2.0, 2.0, 2.12, 2.0, 2.0, 2.0])
+    assert classify(measured_m, walls_apart(measured_m)).case.tolist() == [1, 1, 1, 3, 1, 1, 1]
+    assert classify(measured_m, walls_apart(measured_m), neighbour_pull=8.0).case.tolist() == [1] * 7
+
+
+def test_neighbours_do_not_outvote_what_a_beam_measured():
+    measured_m = np.array([2.0, 2.0, 2.0, 2.2, 2.0, 2.0, 2.0])
+    assert classify(measured_m, walls_apart(measured_m), neighbour_pull=1.5).case.tolist() == [1, 1, 1, 3, 1, 1, 1]
+
+
+@pytest.mark.parametrize("around", [np.full(6, np.nan), np.full(6, np.inf)])
+def test_beams_without_an_answer_pull_nobody(around):
+    measured_m = np.insert(around, 3, 2.12)
+    alone = classify(measured_m, walls_apart(measured_m))
+    pulled = classify(measured_m, walls_apart(measured_m), neighbour_pull=8.0)
+    assert pulled.case.tolist() == alone.case.tolist() == [0, 0, 0, 3, 0, 0, 0]
+    np.testing.assert_allclose(pulled.weight, alone.weight, atol=1e-4)
+
+
+def test_beams_far_away_in_the_scan_pull_nobody():
+    measured_m = np.array([2.12] + [np.nan] * 20 + [2.0] * 20)  # and the scan does not go round
+    assert classify(measured_m, walls_apart(measured_m), neighbour_pull=8.0).case[0] == 3
+
+
+def test_in_the_paper_neighbours_pull_nobody():
+    measured_m = np.array([2.0, 2.0, 2.0, 2.12, 2.0, 2.0, 2.0])
+    assert classify(measured_m, walls_apart(measured_m), "paper", neighbour_pull=8.0).case[3] == 3
+
+
+@pytest.mark.parametrize("pull", [0.0, 1.5, 8.0])
+def test_a_scan_read_backwards_has_the_same_cases(pull):
+    rng = np.random.default_rng(3)
+    measured_m = rng.choice([2.0, 2.06, 2.1, 2.14, 2.2, 3.0, np.nan], 100)
+    one = classify(measured_m, walls_apart(measured_m), neighbour_pull=pull)
+    other = classify(measured_m[::-1], walls_apart(measured_m), neighbour_pull=pull)
+    np.testing.assert_array_equal(one.case, other.case[::-1])
+    np.testing.assert_allclose(one.weight, other.weight[::-1])
+
+
+# -- where beams end
 
 @pytest.mark.parametrize("mode", MODES)
 def test_a_grazing_beam_is_measured_across_the_wall(mode):
@@ -169,16 +352,37 @@ def test_a_map_that_fits_badly_gets_a_wider_gate(mode):
 def test_from_another_pose_the_cases_stay_and_the_ranges_change():
     measured_m = np.array([2.0, 5.0, 3.5, 2.0])
     cases = classify(measured_m, references(first=[2.0] * 4, second=[5.0] * 4))
-    moved = references(first=[2.1, 2.1, 2.1, NEVER], second=[5.2] * 4)
-    far = beam_cases.as_seen_from(cases, measured_m, references(first=[2.4] * 4, second=[5.4] * 4), AT_THE_BOUNDARY,
-                                  CaseVote(case_gate_m=0.15))
-    assert far.case.tolist() == [0, 0, 0, 0] and np.isnan(far.expected_m).all()
-    seen = beam_cases.as_seen_from(cases, measured_m, moved, AT_THE_BOUNDARY, CaseVote())
-    assert seen.case.tolist() == [1, 3, 0, 0]
-    np.testing.assert_allclose(seen.expected_m, [2.1, 5.2, np.nan, np.nan])
-    np.testing.assert_allclose(seen.residual_m, [-0.1, -0.2, np.nan, np.nan])
+    moved = references(first=[2.1, 2.1, 2.1, 2.0], second=[5.2] * 4)
+    seen = beam_cases.as_seen_from(cases, measured_m, moved, AT_THE_BOUNDARY, CaseVote(case_gate_m=0.15))
+    assert seen.case.tolist() == [1, 3, 0, 1]
+    np.testing.assert_allclose(seen.expected_m, [2.1, 5.2, np.nan, 2.0])
+    np.testing.assert_allclose(seen.residual_m, [-0.1, -0.2, np.nan, 0.0])
     np.testing.assert_array_equal(seen.weight, cases.weight)
 
+
+def test_from_another_pose_a_beam_that_passes_an_edge_keeps_its_range():
+    """There it would meet something a metre away, or nothing: an edge lies between the two poses."""
+    measured_m = np.array([2.0, 2.0, 5.0])
+    cases = classify(measured_m, references(first=[2.03] * 3, second=[5.02] * 3))
+    moved = references(first=[3.0, NEVER, 2.0], second=[NEVER, NEVER, 7.0])
+    seen = beam_cases.as_seen_from(cases, measured_m, moved, AT_THE_BOUNDARY, CaseVote(case_gate_m=0.15))
+    assert seen.case.tolist() == [1, 1, 3]
+    np.testing.assert_allclose(seen.expected_m, [2.03, 2.03, 5.02])
+
+
+def test_from_another_pose_a_beam_far_from_its_surface_is_uncertain():
+    """The same wall, yet it would stand two and a half gates away from where the beam ended."""
+    measured_m = np.array([2.14, 2.0])
+    cases = classify(measured_m, references(first=[2.0, 2.0]), "paper")
+    assert cases.case.tolist() == [1, 1]
+    seen = beam_cases.as_seen_from(cases, measured_m, references(first=[1.76, 1.76]), AT_THE_BOUNDARY,
+                                   CaseVote(case_gate_m=0.15))
+    assert seen.case.tolist() == [0, 1]
+    np.testing.assert_allclose(seen.expected_m, [np.nan, 1.76])
+    np.testing.assert_allclose(seen.residual_m, [np.nan, 0.24])
+
+
+# -- in a map
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("thickness_cells, case", [pytest.param(1, 3, id="glass"), pytest.param(4, 3, id="thick glass"),
@@ -194,24 +398,91 @@ def test_a_beam_goes_through_a_pane_but_not_through_a_thick_wall(mode, thickness
     assert cases.case.tolist() == [case, 1]
 
 
+def in_a_world(grid_map, samples, angles_rad, measured_m):
+    scan = Scan(0, measured_m, angles_rad, 0.05, RANGE_MAX_M, np.zeros(3))
+    seen = reference_ranges.of(RayCaster(grid_map), wall_thickness(grid_map), samples, scan, max_thickness_m=0.2,
+                               min_linearity=0.9)
+    return classify(measured_m, seen, residuals=RangeResiduals(0.5, 0.03), through=0.4, max_range_m=RANGE_MAX_M,
+                    neighbour_pull=1.5)
+
+
+def view(seed, beams=181):
+    """Samples around a place in the room of glass, and what the lidar measured there: half of it through the pane."""
+    rng = np.random.default_rng(seed)
+    pose = np.array([rng.uniform(1.0, 5.0), rng.uniform(0.5, 2.3), rng.uniform(-1.0, 1.0)])
+    samples = np.vstack([pose, pose + rng.normal(0.0, [0.03, 0.03, 0.01], (24, 3))])
+    angles_rad = np.linspace(-2.0, 2.0, beams)
+    measured_m, _ = GLASS_ROOM.measured(pose, angles_rad, rng.random(beams) < 0.5)
+    return samples, angles_rad, measured_m + rng.normal(0.0, 0.02, beams)
+
+
+def turned(poses, quarters, width, height):
+    """Poses in a world of width x height that is turned by quarters with its lower left corner kept at the origin."""
+    for _ in range(quarters):
+        poses = np.column_stack([height - poses[:, 1], poses[:, 0], poses[:, 2] + np.pi / 2])
+        width, height = height, width
+    return poses
+
+
+@pytest.mark.parametrize("quarters, mirrored", [(1, False), (2, False), (3, False), (0, True), (1, True)])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_world_turned_or_mirrored_has_the_same_cases(seed, quarters, mirrored):
+    """Its cells, not its frame; but for a beam or two that goes just through a corner of a cell."""
+    grid_map = GLASS_ROOM.grid_map()
+    samples, angles_rad, measured_m = view(seed)
+    straight = in_a_world(grid_map, samples, angles_rad, measured_m)
+    in_grid = samples - grid_map.map_from_grid
+    width, height = np.array(grid_map.occupancy.shape[::-1]) * grid_map.resolution_m
+    occupancy = grid_map.occupancy
+    if mirrored:
+        occupancy, angles_rad = occupancy[::-1], -angles_rad
+        in_grid = np.column_stack([in_grid[:, 0], height - in_grid[:, 1], -in_grid[:, 2]])
+    world = GridMap(np.ascontiguousarray(np.rot90(occupancy, -quarters)), grid_map.resolution_m, np.zeros(3))
+    other = in_a_world(world, turned(in_grid, quarters, width, height), angles_rad, measured_m)
+    assert {1, 3} <= set(straight.case)
+    assert np.mean(other.case == straight.case) > 0.98
+    same = other.case == straight.case
+    assert np.mean(np.abs(other.weight - straight.weight)[same] < 0.02) > 0.97
+    assert np.nanmean(np.abs(other.expected_m - straight.expected_m)[same] < 1e-6) > 0.97
+
+
+@pytest.mark.parametrize("where", [np.array([40.0, -7.0, 0.6]), np.array([-3.0, 2.0, -2.9])])
+@pytest.mark.parametrize("seed", range(3))
+def test_where_the_map_lies_does_not_change_the_cases(seed, where):
+    grid_map = GLASS_ROOM.grid_map()
+    samples, angles_rad, measured_m = view(seed)
+    straight = in_a_world(grid_map, samples, angles_rad, measured_m)
+    world = GridMap(grid_map.occupancy, grid_map.resolution_m, se2.compose(where, grid_map.map_from_grid))
+    other = in_a_world(world, se2.compose(where, samples), angles_rad, measured_m)
+    assert np.mean(other.case == straight.case) > 0.98
+    np.testing.assert_allclose(np.median(np.abs(other.weight - straight.weight)), 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_samples_that_see_the_same_corners_may_change_places(seed):
+    """Every other sample sees past corners: those of one parity are exchangeable."""
+    rng = np.random.default_rng(seed)
+    samples, angles_rad, measured_m = view(seed)
+    order = np.arange(len(samples))
+    order[1::2], order[2::2] = rng.permutation(order[1::2]), rng.permutation(order[2::2])
+    one = in_a_world(GLASS_ROOM.grid_map(), samples, angles_rad, measured_m)
+    other = in_a_world(GLASS_ROOM.grid_map(), samples[order], angles_rad, measured_m)
+    np.testing.assert_array_equal(one.case, other.case)
+    np.testing.assert_allclose(one.weight, other.weight)
+
+
 @pytest.mark.parametrize("values, text", [
     (dict(vote_mode="loud"), "~vote_mode must be one of soft, paper, got 'loud'"),
     (dict(case_gate_m=0.0), "~case_gate_m must be > 0 m, got 0.0"),
     (dict(glass_max_thickness_m=-0.1), "~glass_max_thickness_m must be > 0 m, got -0.1"),
     (dict(case_min_share=1.2), "~case_min_share must be in [0, 1], got 1.2"),
     (dict(normal_min_linearity=-0.5), "~normal_min_linearity must be in [0, 1], got -0.5"),
-    (dict(prior_specular=-0.01), "~prior_specular must be in [0, 1], got -0.01"),
-    (dict(prior_first_penetration=float("nan")), "~prior_first_penetration must be in [0, 1], got nan"),
-    (dict(prior_specular=0.5, prior_first_penetration=0.3, prior_second_penetration=0.2, prior_uncertain=0.1),
-     "~prior_specular, ~prior_first_penetration, ~prior_second_penetration and ~prior_uncertain must sum to less "
-     "than 1, got 1.1")])
+    (dict(prior_uncertain=0.0), "~prior_uncertain must be in (0, 1), got 0.0"),
+    (dict(prior_uncertain_behind=1.0), "~prior_uncertain_behind must be in (0, 1), got 1.0"),
+    (dict(mirror_gain=-1.0), "~mirror_gain must be finite and >= 0, got -1.0"),
+    (dict(neighbour_pull=float("nan")), "~neighbour_pull must be finite and >= 0, got nan"),
+    (dict(neighbour_pull=float("inf")), "~neighbour_pull must be finite and >= 0, got inf")])
 def test_wrong_values_are_refused_in_one_line(values, text):
     with pytest.raises(ValueError) as err:
         CaseVote(**values)
     assert str(err.value) == text
-
-
-def test_the_priors_sum_to_one():
-    vote = CaseVote(prior_specular=0.1, prior_first_penetration=0.2, prior_second_penetration=0.05,
-                    prior_uncertain=0.25)
-    assert vote.prior_diffuse == pytest.approx(0.4)
