@@ -27,6 +27,7 @@ _OTHER_SURFACE_M = 0.3    # of two expected ranges: an edge lies between them
 _TOLD_GATES = 2.0         # the samples that won the vote may stand one gate away from the pose told
 _PANE_INDEX = 1.51        # of soda-lime glass
 _WALL_OVER_DARK = 5.0     # reflectance of a wall over that of the darkest that is seen at the largest range
+_UNSEEN_SIDE = 0.02       # chance of a wall to be met from a side that no mapper saw, over that from the other
 _LEAST_SEEN_THROUGH = 0.05  # a cell may hold a post and the edge of the pane beside it
 _TEMPER = 0.2  # of a sample's evidence: beams err together, and the best sample shall not vote alone
 _REACH, _ROUNDS = 2, 3    # of the pull between neighbouring beams
@@ -77,7 +78,7 @@ class CaseVote:
 
 
 def classify(measured_m: np.ndarray, references: ReferenceRanges, residuals: RangeResiduals, vote: CaseVote,
-             seen_through: np.ndarray, max_range_m: float) -> BeamCases:
+             glass: np.ndarray, max_range_m: float) -> BeamCases:
     """Cases of the beams of one scan.
 
     Args:
@@ -86,8 +87,8 @@ def classify(measured_m: np.ndarray, references: ReferenceRanges, residuals: Ran
             passes an edge there, the sample that explains it best.
         residuals: where in a wall beams end, and how widely.
         vote: mode, gate and priors.
-        seen_through: (2, B) chance of the first and of the second surface at sample 0 to let beams pass; of the
-            soft vote.
+        glass: (2, 2, B) chances to be seen through, and if so to be there, of the first and of the second surface
+            at sample 0; of the soft vote.
         max_range_m: of the lidar: what it can still see; of the soft vote.
     """
     answered = np.isfinite(measured_m)
@@ -95,7 +96,7 @@ def classify(measured_m: np.ndarray, references: ReferenceRanges, residuals: Ran
     if vote.vote_mode == "paper":
         share = _paper_ballots(measured_m, references, residuals, vote)  # (5, B), column sums 1
     else:
-        prior = _priors(references, seen_through, max_range_m, vote)
+        prior = _priors(references, glass, max_range_m, vote)
         share = _pulled(_soft_ballots(measured_m, references, residuals, vote, prior), answered, vote.neighbour_pull)
     share[:, ~answered] = np.array([1.0, 0.0, 0.0, 0.0, 0.0])[:, None]
     won, beam = _winner(share), np.arange(len(measured_m))
@@ -167,13 +168,15 @@ def _soft_ballots(measured_m: np.ndarray, references: ReferenceRanges, residuals
                   vote: CaseVote, prior: np.ndarray) -> np.ndarray:
     """(5, B) posterior over the cases; samples count by how well each explains the scan.
 
-    prior (4, B) is the chance of cases 1 to 4 before the range is looked at.
+    prior (5, B) is what _priors() gives.
     """
     answered = np.isfinite(measured_m)
     z = np.where(answered, measured_m, 0.0)
     sigma_m, gate = residuals.sigma_m, gate_m(residuals, vote)
-    joint = prior[:, None] * _density(z, references, sigma_m, gate)  # (4, N, B)
-    nothing = vote.prior_uncertain * np.exp(-0.25 * (gate / sigma_m) ** 2)
+    density = _density(z, references, sigma_m, gate)
+    joint = prior[:4, None] * density  # (4, N, B)
+    nothing = (vote.prior_uncertain * np.exp(-0.25 * (gate / sigma_m) ** 2)
+               + prior[4] * density[FIRST_PENETRATION - 1])  # (N, B)
     total = joint.sum(axis=0) + nothing
     log_evidence = np.log(total) @ answered  # (N,)
     temper = _TEMPER / np.sqrt(max(answered.sum(), 1))
@@ -181,7 +184,7 @@ def _soft_ballots(measured_m: np.ndarray, references: ReferenceRanges, residuals
     sample_w /= sample_w.sum()
     # The samples are summed before the cases compete: a corner that some of them graze and others miss is no surface
     # to explain the beam by, if without it a likelier case does.
-    share = np.concatenate([np.full((1, len(measured_m)), nothing), np.einsum("n,cnb->cb", sample_w, joint)])
+    share = np.einsum("n,cnb->cb", sample_w, np.concatenate([nothing[None], joint]))
     return share / share.sum(axis=0)
 
 
@@ -199,16 +202,22 @@ def _density(z: np.ndarray, references: ReferenceRanges, sigma_m: float, gate: f
     return density
 
 
-def _priors(references: ReferenceRanges, seen_through: np.ndarray, max_range_m: float, vote: CaseVote) -> np.ndarray:
-    """(4, B) chance of cases 1 to 4, from how glassy the walls proved and how a pane answers at that incidence."""
+def _priors(references: ReferenceRanges, glass: np.ndarray, max_range_m: float, vote: CaseVote) -> np.ndarray:
+    """(5, B) chance of cases 1 to 4, and last to end at the second surface where the first is gone (case 0).
+
+    From how glassy the walls proved and how a pane answers at that incidence.
+    """
     incidence = references.pane_incidence[0]
-    first, second = np.clip(seen_through, _LEAST_SEEN_THROUGH, 1.0)
-    passes = first * (1.0 - pane_answers.least(incidence))
+    (first, second), (there, _) = glass
+    first = np.clip(first, _LEAST_SEEN_THROUGH, 1.0)
+    passes = first * there * (1.0 - pane_answers.least(incidence))
     mirrored = passes * _chance_of_a_mirror(references, max_range_m, vote.mirror_gain)
     behind = (passes - mirrored) * (1.0 - vote.prior_uncertain_behind)
     passes_again = second * (1.0 - pane_answers.least(np.full(len(first), np.nan)))
-    return (1.0 - vote.prior_uncertain) * np.stack([1.0 - passes, mirrored, behind * (1.0 - passes_again),
-                                                    behind * passes_again])
+    gone = first * (1.0 - there)
+    prior = np.stack([1.0 - passes - gone, mirrored, behind * (1.0 - passes_again), behind * passes_again, gone])
+    prior[1:4] *= np.where(references.seen_side[1:], 1.0, _UNSEEN_SIDE)
+    return (1.0 - vote.prior_uncertain) * prior
 
 
 def _chance_of_a_mirror(references: ReferenceRanges, max_range_m: float, gain: float) -> np.ndarray:

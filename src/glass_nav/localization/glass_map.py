@@ -22,7 +22,8 @@ from glass_nav.world.grid_map import UNKNOWN, GridMap
 _LEAST_COS = 0.3          # a wall seen flatter than that is passed or met by chance
 _BEHIND_M = 0.3          # a beam that goes on for so long has passed
 _ENDED_SIGMAS = 2.5
-_GONE_ANSWERS = 0.02
+_GONE_ANSWERS = 0.06     # by chance; as many as a pane far from head on, which therefore proves nothing
+_THERE = 0.95            # chance of what is seen through to be glass, before it answered or failed to
 
 
 def crossings(measured_m: np.ndarray, references: ReferenceRanges,
@@ -67,7 +68,8 @@ class GlassEvidence:
 class GlassMap:
     """Log odds of being glass for each wall cell of one map."""
 
-    _SPREAD = ((1.0, 0.7, 0.3), 0.25)  # weight of a crossing for cells 0, 1, 2 away; and of a scan as a whole
+    _SPREAD = (1.0, 0.7, 0.3)  # weight of a crossing for cells 0, 1, 2 away
+    _SCAN_SHARE = (0.25, 0.7)  # of a scan's evidence on each question: scans a step apart err alike
 
     def __init__(self, grid_map: GridMap, evidence: GlassEvidence) -> None:
         self._evidence = evidence
@@ -77,19 +79,25 @@ class GlassMap:
         # Log odds that beams added: can be seen through, and is there though it can; bordered by 2 cells.
         self._log_odds = np.zeros((2, len(self._occupied)), np.float32)
         self._crossed = np.zeros(len(self._occupied), bool)
-        self._prior = np.log([[evidence.glass_prior / (1.0 - evidence.glass_prior)], [1.0]])
+        self._prior = np.log([[evidence.glass_prior / (1.0 - evidence.glass_prior)], [_THERE / (1.0 - _THERE)]])
         self._kernel = self._neighbours()
 
-    def probability(self, cell: np.ndarray) -> "Tuple[np.ndarray, np.ndarray]":
-        """Chances (...) of flat cells (...) of the map to be seen through, and to be glass; the priors for -1."""
+    def chances(self, cell: np.ndarray) -> np.ndarray:
+        """(2, ...) chances of flat cells (...) of the map: to be seen through, and if so to be there, which is glass
+        and not a thing that is gone; the priors for -1."""
         at = self._bordered(np.maximum(cell, 0)).ravel()
-        chances = self._chances(np.where(cell.ravel() >= 0, self._log_odds[:, at], 0.0))
-        return chances[0].reshape(cell.shape), (chances[0] * chances[1]).reshape(cell.shape)
+        log_odds = np.where(cell.ravel() >= 0, self._log_odds[:, at], 0.0)
+        return (1.0 / (1.0 + np.exp(-(self._prior + log_odds)))).reshape(2, *cell.shape)
 
     def occupancy(self) -> np.ndarray:
-        """(H, W) int8 [percent]: how glassy each wall cell proved; -1 where no beam said anything."""
+        """(H, W) int8 [percent]: how glassy each wall cell proved; -1 where no beam said anything.
+
+        What lets beams pass and never answered any has not proved to be there: at most 50.
+        """
+        prior = np.stack([self._prior[0], [0.0]])
+        chances = 1.0 / (1.0 + np.exp(-(prior + self._log_odds[:, self._crossed])))
         percent = np.full(len(self._crossed), UNKNOWN, np.int8)
-        percent[self._crossed] = np.rint(100.0 * np.prod(self._chances(self._log_odds[:, self._crossed]), axis=0))
+        percent[self._crossed] = np.rint(100.0 * np.prod(chances, axis=0))
         return percent.reshape(-1, self._stride)[2:-2, 2:-2].copy()
 
     def learn(self, cell: np.ndarray, incidence_rad: np.ndarray, passed: np.ndarray) -> None:
@@ -110,10 +118,10 @@ class GlassMap:
         walls = self._occupied[touched]
         total = np.bincount(group, share)
         limit = self._evidence.glass_memory
-        for log_odds, said in zip(self._log_odds, says):
+        for log_odds, said, scan_share in zip(self._log_odds, says, self._SCAN_SHARE):
             # A wall cell that many beams of one scan hit has one piece of evidence, not many.
             mean = np.bincount(group, share * np.repeat(said, len(offsets))) / total
-            added = self._SPREAD[1] * mean[walls] * np.minimum(total[walls], 1.0)
+            added = scan_share * mean[walls] * np.minimum(total[walls], 1.0)
             log_odds[touched[walls]] = np.clip(log_odds[touched[walls]] + added, -limit, limit)
         self._crossed[touched[walls]] = True
 
@@ -124,10 +132,6 @@ class GlassMap:
         return (np.where(passed, np.log((1.0 - least) / leak), np.log(most / (1.0 - leak))),
                 np.where(passed, np.log((1.0 - least) / (1.0 - _GONE_ANSWERS)), np.log(most / _GONE_ANSWERS)))
 
-    def _chances(self, log_odds: np.ndarray) -> np.ndarray:
-        """(2, K) chances to be seen through, and to be there if so, from what beams added."""
-        return 1.0 / (1.0 + np.exp(-(self._prior + log_odds)))
-
     def _bordered(self, cell: np.ndarray) -> np.ndarray:
         row, column = np.divmod(cell, self._shape[1])
         return (row + 2) * self._stride + column + 2
@@ -136,4 +140,4 @@ class GlassMap:
         """Offsets (25,) of the cells around one, and what a crossing counts there."""
         step = np.arange(-2, 3)
         ring = np.maximum(np.abs(step)[:, None], np.abs(step))
-        return ((step[:, None] * self._stride + step).ravel(), np.array(self._SPREAD[0])[ring].ravel())
+        return ((step[:, None] * self._stride + step).ravel(), np.array(self._SPREAD)[ring].ravel())

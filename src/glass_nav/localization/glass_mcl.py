@@ -275,8 +275,8 @@ class GlassMcl:
         """Cases of all beams, by preliminary samples around a pose."""
         samples = preliminary_samples.around(map_from_base, covariance, self._params.samples)
         references = self._references(scan, samples)
-        seen_through, _ = self._glass_map.probability(references.cell[[0, 2], 0])
-        return beam_cases.classify(scan.ranges_m, references, self._residuals, self._params.vote, seen_through,
+        glass = self._glass_map.chances(references.cell[[0, 2], 0])
+        return beam_cases.classify(scan.ranges_m, references, self._residuals, self._params.vote, glass,
                                    scan.range_max_m), references
 
     def _references(self, scan: Scan, samples: np.ndarray) -> ReferenceRanges:
@@ -326,10 +326,11 @@ class GlassMcl:
                         self._particles, state, reason, used_share, updated)
 
     def _surfaces(self, scan: Scan, cases: BeamCases, references: ReferenceRanges, trusted: bool) -> SurfaceScan:
+        """The scan cut at glass; references are of the pose that is told."""
         across = np.maximum(references.cos_incidence[0, 0], LEAST_COS)
         gate_m = beam_cases.gate_m(self._residuals, self._params.vote) / across
-        return surface_scan.of(scan.ranges_m, cases.case, references.line_m,
-                               self._glass_map.probability(references.cell[0, 0])[0], gate_m, trusted)
+        return surface_scan.of(scan.ranges_m, cases.case, references, self._glass_map.chances(references.cell[0, 0]),
+                               gate_m, trusted)
 
     def _start_with(self, particles: np.ndarray, searching: bool) -> None:
         self._particles = particles

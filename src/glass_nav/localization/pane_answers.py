@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 _OBLIQUE_ANSWERS = 0.06            # from far to the side: dirt, frames
-_LEAST_HEAD_ON, _MOST_HEAD_ON = 0.6, 0.9   # more than that, head on; lidars differ
+_LEAST_HEAD_ON, _MOST_HEAD_ON = 0.85, 0.9   # more than that, head on; lidars differ
 _NARROW_RAD, _WIDE_RAD = np.radians(6.0), np.radians(18.0)  # and how far from head on
 _POROUS_ANSWERS = 0.3              # of what is no straight wall: railings, shelves, plants
 

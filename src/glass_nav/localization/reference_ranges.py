@@ -16,9 +16,11 @@ import numpy as np
 from glass_nav.geometry import se2
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
+from glass_nav.world.grid_map import UNKNOWN
 
 LEAST_COS = 0.2  # a surface seen flatter than 78 degrees is no worse placed than at that
 _FIRST, _SECOND = 0, 1
+_BESIDE_CELLS = 2.5  # in front of a surface: past the steps of its staircase
 _LINE_CELLS, _GRAZING_COS = 2.0, 0.02  # the line of a wall lies so near to the cells that a beam meets
 
 
@@ -31,6 +33,8 @@ class ReferenceRanges:
     cell: np.ndarray             # (4, N, B) int32 flat cell that answers, -1: none
     pane_incidence: np.ndarray   # (N, B) angle to the normal of the first surface [rad], NaN without one
     line_m: np.ndarray           # (B,) range of sample 0's first surface by the line of its wall, inf: none
+    normal_rad: np.ndarray       # (B,) axis of that wall's normal in map, up to half a turn; NaN without one
+    seen_side: np.ndarray        # (4, B) bool: sample 0's surfaces are met from a side that is not unknown
 
 
 def of(caster: RayCaster, thickness_m: np.ndarray, samples: np.ndarray, scan: Scan,
@@ -58,12 +62,33 @@ def of(caster: RayCaster, thickness_m: np.ndarray, samples: np.ndarray, scan: Sc
     line_m = np.where(has_normal[0], _by_line(caster, from_laser[0], beam_rad[0], hits.first_m[0], hits.first_cell[0]),
                       hits.first_m[0])
     range_m = np.stack([hits.first_m, hits.mirrored_m, hits.second_m, hits.third_m])
-    _, linearity = caster.normals()
+    normal_rad, linearity = caster.normals()
     second_is_corner = (hits.second_cell >= 0) & (linearity[hits.second_cell] < min_linearity)
     missed = _misses_corners(*beam_rad.shape)
     _miss(_SECOND, missed & second_is_corner, range_m, cos, cell)
     _miss(_FIRST, missed & (hits.first_cell >= 0) & ~has_normal, range_m, cos, cell)
-    return ReferenceRanges(range_m, cos, thickness_m[cell], cell, incidence, line_m)
+    directions_rad = np.stack([beam_rad[0], np.nan_to_num(mirrored_rad[0]), beam_rad[0], beam_rad[0]])
+    axis_rad = np.where(has_normal[0], normal_rad[hits.first_cell[0]], np.nan)
+    return ReferenceRanges(range_m, cos, thickness_m[cell], cell, incidence, line_m, axis_rad,
+                           _seen_side(caster, cell[:, 0], directions_rad, min_linearity))
+
+
+def _seen_side(caster: RayCaster, cell: np.ndarray, direction_rad: np.ndarray, min_linearity: float) -> np.ndarray:
+    """(4, B) bool: the side of the cells (4, B) that the beams come from is not unknown.
+
+    What a mapper drew it saw from somewhere. A lidar that looks back at a building through its glass meets the outer
+    faces of walls, which are on no map: decimetres in front of the inner ones.
+    """
+    grid_map = caster.grid_map
+    normal_rad, linearity = caster.normals()
+    facing_rad = np.where(np.cos(direction_rad - normal_rad[cell]) > 0.0, normal_rad[cell] + np.pi, normal_rad[cell])
+    facing_rad = np.where(linearity[cell] >= min_linearity, facing_rad, direction_rad + np.pi)
+    centre = grid_map.centres(*np.divmod(cell, grid_map.occupancy.shape[1]))
+    step = np.stack([np.cos(facing_rad), np.sin(facing_rad)], axis=-1)
+    rows, columns = grid_map.cells(centre + _BESIDE_CELLS * grid_map.resolution_m * step)
+    inside = grid_map.contains(rows, columns)
+    beside = grid_map.occupancy[np.where(inside, rows, 0), np.where(inside, columns, 0)]
+    return (cell < 0) | (inside & (beside != UNKNOWN))
 
 
 def _misses_corners(samples: int, beams: int) -> np.ndarray:

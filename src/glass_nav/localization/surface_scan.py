@@ -11,8 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from glass_nav.localization.beam_cases import FIRST_PENETRATION, SECOND_PENETRATION, SPECULAR
+from glass_nav.localization.reference_ranges import ReferenceRanges
 
-_SURE = 0.5  # a beam without an answer, or with an unexplained one behind a wall, is cut at such a cell
+_SURE = 0.5              # chance from which a wall is taken for glass, and for being there
+_SAME_WALL_M, _SAME_WALL_RAD = 0.05, np.radians(5.0)
 
 
 @dataclass(frozen=True)
@@ -23,22 +25,38 @@ class SurfaceScan:
     trusted: bool         # False: the pose is not to be relied on, and nothing is cut
 
 
-def of(ranges_m: np.ndarray, case: np.ndarray, first_m: np.ndarray, seen_through: np.ndarray, gate_m: np.ndarray,
+def of(ranges_m: np.ndarray, case: np.ndarray, references: ReferenceRanges, glass: np.ndarray, gate_m: np.ndarray,
        trusted: bool) -> SurfaceScan:
     """Cut a scan.
+
+    A beam is cut if its case says that it passed or was mirrored; if it ended beyond the middle of a wall that stands
+    there, whatever it met behind; and if it did not come back from where a pane is known.
 
     Args:
         ranges_m: (B,) as measured, REP 117.
         case: (B,) what each beam met.
-        first_m: (B,) range of the first surface of the map at the pose, inf: none.
-        seen_through: (B,) chance of that surface to let beams pass.
+        references: of the pose, its sample 0.
+        glass: (2, B) chances of the first surface to be seen through, and if so to be there.
         gate_m: (B,) along the beam; what is measured within it of the first surface is that surface.
         trusted: whether the pose is.
     """
     if not trusted:
         return SurfaceScan(ranges_m, np.zeros(len(ranges_m), bool), False)
+    seen_through, there = glass
     with np.errstate(invalid="ignore"):
-        behind = ranges_m > first_m + gate_m  # also without an answer (inf)
+        behind = np.isfinite(references.line_m) & (ranges_m > references.line_m + gate_m)  # also without an answer
     explained = np.isin(case, (SPECULAR, FIRST_PENETRATION, SECOND_PENETRATION))
-    cut = np.isfinite(first_m) & behind & (explained | (seen_through > _SURE))
-    return SurfaceScan(np.where(cut, first_m, ranges_m), cut, True)
+    passed = np.isfinite(ranges_m) & (there > _SURE) & _within_a_wall(references)
+    cut = behind & (explained | passed | (seen_through * there > _SURE))
+    return SurfaceScan(np.where(cut, references.line_m, ranges_m), cut, True)
+
+
+def _within_a_wall(references: ReferenceRanges) -> np.ndarray:
+    """(B,) bool: the beams to either side meet the same straight wall first; no edge is near that could be missed."""
+    with np.errstate(invalid="ignore"):
+        apart_m = np.abs(np.diff(references.line_m * references.cos_incidence[0, 0]))  # as distances from the lidar
+        turned_rad = np.abs(np.diff(references.normal_rad))
+        same = (apart_m < _SAME_WALL_M) & (np.minimum(turned_rad, np.pi - turned_rad) < _SAME_WALL_RAD)
+    both = np.zeros(len(references.line_m), bool)
+    both[1:-1] = same[1:] & same[:-1]
+    return both
