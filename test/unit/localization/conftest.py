@@ -1,4 +1,4 @@
-"""Makes the buildings beside these tests importable: buildings."""
+"""Makes what lies beside these tests importable: buildings, made_references."""
 
 import sys
 from pathlib import Path

@@ -10,31 +10,16 @@ from glass_nav.geometry import se2
 from glass_nav.localization import beam_cases, reference_ranges
 from glass_nav.localization.beam_cases import CaseVote
 from glass_nav.localization.range_residuals import RangeResiduals
-from glass_nav.localization.reference_ranges import ReferenceRanges
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
 from glass_nav.sensing.wall_thickness import wall_thickness
 from glass_nav.world.grid_map import GridMap
+from made_references import NEVER, OBLIQUE, references
 
 MODES = ("soft", "paper")
 AT_THE_BOUNDARY = RangeResiduals(depth_share=0.0, sigma_m=0.04)
 VOTE = dict(case_gate_m=0.15, case_min_share=0.5, prior_uncertain=0.1, prior_uncertain_behind=0.2, mirror_gain=2.0,
             neighbour_pull=0.0)
-NEVER = np.inf
-OBLIQUE = np.radians(45.0)  # neither head on, where panes answer, nor grazing, where they mirror
-
-
-def references(first=NEVER, mirrored=NEVER, second=NEVER, third=NEVER, cos=1.0, thickness_m=0.05, incidence=OBLIQUE,
-               seen_side=True):
-    """ReferenceRanges (4, N, B); each a number, a row of beams (B,), or samples and beams (N, B)."""
-    ranges = np.stack(np.broadcast_arrays(*[np.atleast_2d(np.asarray(value, float))
-                                            for value in (first, mirrored, second, third)]))
-    beams = ranges.shape[2]
-    sides = np.broadcast_to(np.reshape(seen_side, (-1, 1)), (4, beams))
-    return ReferenceRanges(range_m=ranges, cos_incidence=np.full(ranges.shape, cos),
-                           thickness_m=np.full(ranges.shape, thickness_m), cell=np.zeros(ranges.shape, np.int32),
-                           pane_incidence=np.full(ranges.shape[1:], incidence), line_m=ranges[0, 0],
-                           normal_rad=np.zeros(beams), seen_side=sides)
 
 
 def classify(measured_m, offered, mode="soft", residuals=AT_THE_BOUNDARY, through=0.5, there=1.0, max_range_m=20.0,
