@@ -211,10 +211,10 @@ def test_a_wall_is_missed_by_no_sample():
 
 def slanted(slant_rad, offset_m=4.0, map_from_grid=(-2.0, 3.0, 0.4), cell_m=CELL_M):
     """A wall across a map of 12 m, its normal at slant_rad in the grid, offset_m from the grid's centre: cells whose
-    centre is within 0.8 of a cell of the line."""
+    centre is within half a cell of the line."""
     row, column = np.mgrid[:240, :240] + 0.5
     across = (column - 120) * np.cos(slant_rad) + (row - 120) * np.sin(slant_rad) - offset_m / cell_m
-    return GridMap(np.where(np.abs(across) <= 0.8, 100, 0).astype(np.int8), cell_m, np.array(map_from_grid))
+    return GridMap(np.where(np.abs(across) <= 0.5, 100, 0).astype(np.int8), cell_m, np.array(map_from_grid))
 
 
 def on_map(grid_map, angles_rad, pose_in_grid):
@@ -237,6 +237,16 @@ def test_a_beam_crosses_the_line_of_a_wall_not_the_staircase_of_its_cells(slant_
     off_m = np.abs(offered.line_m - true_m) * np.cos(incidence)
     assert off_m[met].max() < 0.2 * CELL_M
     np.testing.assert_allclose(np.cos(2.0 * (offered.normal_rad[met] - slant - 0.4)), 1.0, atol=1e-3)
+
+
+def test_the_line_of_a_wall_that_is_drawn_thick_is_half_a_cell_behind_its_face():
+    """A costmap is to see the face of the wall that the robot drives at, from either side."""
+    thick = [(3 + CELL_M * cell, 0, 3 + CELL_M * cell, 4) for cell in range(3)]
+    building = Building([(-1, 0), (9, 0), (9, 4), (-1, 4)], walls=thick)
+    angle = np.radians(40.0)
+    for pose, to_face_m in (([0.5, 1.0, 0.0], 2.5), ([6.0, 1.0, np.pi], 3.0 - 2 * CELL_M)):
+        offered = seen(building, pose, [0.0, angle if pose[2] == 0.0 else -angle])
+        np.testing.assert_allclose(offered.line_m, to_face_m / np.cos([0.0, angle]), atol=0.05 * CELL_M)
 
 
 def test_the_line_is_nearer_the_truth_than_the_cells_are():
