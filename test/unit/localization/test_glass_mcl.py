@@ -106,6 +106,143 @@ def test_beams_are_told_apart_as_they_were(vote_mode):
     assert np.mean(told[truly == 1] == 1) > 0.97
 
 
+class GlassDrive(Drive):
+    """Along the pane of GLASS_ROOM with a lidar that it answers head on and lets pass from the side, or never."""
+
+    def __init__(self, seed=0, steps=40, head_on_answers=0.95, lobe_rad=np.radians(15.0), gone=False):
+        super().__init__(GLASS_ROOM, steps, seed, centre=(3.6, 1.8))
+        rng = np.random.default_rng(seed + 2000)
+        self.passed, self.pane_m = [], []  # by beam of each scan: went through the pane; its range
+        for index, (scan, pose) in enumerate(zip(self.scans, self.true)):
+            laser = se2.compose(pose, BASE_FROM_LASER)
+            incidence = np.abs(angles.wrap(scan.angles_rad + laser[2]))  # the pane is at x = 6, before the robot
+            passes = rng.random(len(scan)) > np.where(incidence < lobe_rad, head_on_answers, 0.04)
+            ranges_m, case = GLASS_ROOM.measured(laser, scan.angles_rad, passes)
+            self.passed.append(case == 3)
+            self.pane_m.append(GLASS_ROOM.measured(laser, scan.angles_rad)[0])
+            self.scans[index] = replace(scan, ranges_m=ranges_m + rng.normal(0.0, 0.01, len(scan)))
+
+    @staticmethod
+    def pane_and_walls():
+        """(H, W) bool: cells of the pane without its ends, and those of all walls a metre away from it."""
+        grid_map = MAPS[GLASS_ROOM]
+        rows, columns = np.indices(grid_map.occupancy.shape)
+        x, y = grid_map.centres(rows.ravel(), columns.ravel()).T.reshape(2, *rows.shape)
+        return (grid_map.occupied & (np.abs(x - 6.0) < 0.01) & (y > 0.3) & (y < 3.7),
+                grid_map.occupied & (np.abs(x - 6.0) > 1.0))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_pane_becomes_glass_over_a_drive_and_a_wall_does_not(seed):
+    drive = GlassDrive(seed)
+    mcl = started(GLASS_ROOM, drive.true[0], seed)
+    assert (mcl.glass_map.occupancy() == -1).all()  # nothing is known before
+    drive.through(mcl)
+    picture = mcl.glass_map.occupancy()
+    pane, walls = GlassDrive.pane_and_walls()
+    known_pane, known_walls = picture[pane & (picture >= 0)], picture[walls & (picture >= 0)]
+    assert len(known_pane) > 30 and len(known_walls) > 100
+    assert np.median(known_pane) > 60
+    assert np.percentile(known_walls, 95) < 15
+    assert (picture[~MAPS[GLASS_ROOM].occupied] == -1).all()
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_in_an_opaque_room_no_wall_becomes_glass(seed):
+    drive = Drive(seed=seed, steps=40)
+    mcl = started(seed=seed)
+    drive.through(mcl)
+    picture = mcl.glass_map.occupancy()
+    assert np.count_nonzero(picture >= 0) > 100 and np.mean(picture[picture >= 0] > 30) < 0.01
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_lidar_that_sees_no_glass_at_all_is_localized(seed):
+    """No beam ever comes back from the pane: the wall that the map has there is only in the way."""
+    drive = GlassDrive(seed, lobe_rad=0.0, head_on_answers=0.0)
+    estimates = drive.through(started(GLASS_ROOM, drive.true[0], seed))
+    way_m, turn_rad = drive.errors(estimates).T
+    assert way_m.max() < 0.05 and turn_rad.max() < np.radians(1.5)
+    assert estimates[-1].state == "LOCALIZED"
+
+
+def test_another_map_has_other_glass():
+    drive = GlassDrive()
+    mcl = started(GLASS_ROOM, drive.true[0])
+    drive.through(mcl, last=20)
+    assert (mcl.glass_map.occupancy() >= 0).any()
+    mcl.set_map(MAPS[GLASS_ROOM])  # the same cells, but who knows?
+    assert (mcl.glass_map.occupancy() == -1).all()
+    drive.through(mcl, first=20)
+    assert (mcl.glass_map.occupancy() >= 0).any()
+
+
+def test_a_new_pose_on_the_same_map_keeps_its_glass():
+    drive = GlassDrive()
+    mcl = started(GLASS_ROOM, drive.true[0])
+    drive.through(mcl, last=20)
+    before = mcl.glass_map.occupancy()
+    mcl.set_pose(drive.true[0], START_COVARIANCE)
+    np.testing.assert_array_equal(mcl.glass_map.occupancy(), before)
+
+
+# -- the scan in which glass is an obstacle
+
+def test_beams_behind_the_pane_are_cut_at_it_and_others_are_left():
+    """Nearly all beyond half a metre of its ends, where it meets walls and has no normal, and most there."""
+    drive = GlassDrive(seed=3)
+    cut, passed, at_ends, off_m = [], [], [], []
+    for index, estimate in enumerate(drive.through(started(GLASS_ROOM, drive.true[0], 3))):
+        scan, found = drive.scans[index], estimate.surface_scan
+        assert found.ranges_m.shape == scan.ranges_m.shape
+        assert np.all(found.ranges_m <= scan.ranges_m)
+        np.testing.assert_array_equal(found.ranges_m[~found.cut], scan.ranges_m[~found.cut])
+        laser = se2.compose(drive.true[index], BASE_FROM_LASER)
+        y = laser[1] + drive.pane_m[index] * np.sin(scan.angles_rad + laser[2])
+        at_ends.append((y < 0.5) | (y > 3.5))
+        across = np.abs(np.cos(scan.angles_rad + laser[2]))
+        right = found.cut & drive.passed[index]
+        off_m.append((np.abs(found.ranges_m - drive.pane_m[index]) * across)[right])
+        cut.append(found.cut)
+        passed.append(drive.passed[index])
+    cut, passed, at_ends = np.concatenate(cut), np.concatenate(passed), np.concatenate(at_ends)
+    assert np.count_nonzero(passed & ~at_ends) > 300
+    assert np.mean(cut[passed & ~at_ends]) > 0.97 and np.mean(cut[passed]) > 0.8 and np.mean(cut[~passed]) < 0.03
+    assert np.percentile(np.concatenate(off_m), 95) < 0.06
+
+
+def test_a_surface_scan_is_trusted_where_the_robot_is_localized_and_nowhere_else():
+    drive = GlassDrive(steps=35)
+    rng = np.random.default_rng(0)
+    for index in range(15, 30):  # a hand before the lidar
+        drive.scans[index] = replace(drive.scans[index], ranges_m=rng.uniform(0.1, 0.5, 180))
+    estimates = drive.through(started(GLASS_ROOM, drive.true[0]))
+    trusted = [estimate.surface_scan.trusted for estimate in estimates]
+    assert trusted == [estimate.state == "LOCALIZED" for estimate in estimates]
+    assert True in trusted and False in trusted
+    for estimate, scan in zip(estimates, drive.scans):
+        if not estimate.surface_scan.trusted:
+            assert not estimate.surface_scan.cut.any()
+            np.testing.assert_array_equal(estimate.surface_scan.ranges_m, scan.ranges_m)
+
+
+def test_while_a_robot_is_searched_for_nothing_is_cut():
+    drive = GlassDrive(steps=2)
+    mcl = GlassMcl(parameters(max_particles=2000), MAPS[GLASS_ROOM], np.random.default_rng(0))
+    mcl.scatter()
+    first = drive.through(mcl, last=1)[0]
+    assert first.state != "LOCALIZED" and not first.surface_scan.trusted and not first.surface_scan.cut.any()
+
+
+def test_a_scan_between_updates_is_cut_too():
+    drive = GlassDrive(steps=12)
+    mcl = started(GLASS_ROOM, drive.true[0])
+    last = drive.through(mcl)[-1]
+    again = mcl.update(replace(drive.scans[-1], stamp_ns=drive.scans[-1].stamp_ns + 1), drive.odometry[-1])
+    assert not again.updated and again.surface_scan.trusted
+    assert np.mean(again.surface_scan.cut == last.surface_scan.cut) > 0.97 and again.surface_scan.cut.any()
+
+
 def test_in_an_opaque_room_no_beam_is_said_to_pass(drive):
     cases = np.concatenate([estimate.cases.case for estimate in drive.through(started())])
     assert np.mean(cases == 1) > 0.99
