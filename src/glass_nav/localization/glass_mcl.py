@@ -330,7 +330,7 @@ class GlassMcl:
         across = np.maximum(references.cos_incidence[0, 0], LEAST_COS)
         gate_m = beam_cases.gate_m(self._residuals, self._params.vote) / across
         return surface_scan.of(scan.ranges_m, cases.case, references, self._glass_map.chances(references.cell[0, 0]),
-                               gate_m, trusted)
+                               gate_m, scan.range_max_m, trusted)
 
     def _start_with(self, particles: np.ndarray, searching: bool) -> None:
         self._particles = particles

@@ -59,7 +59,8 @@ def of(caster: RayCaster, thickness_m: np.ndarray, samples: np.ndarray, scan: Sc
     cos = np.stack([cos_incidence(caster, mirrored_rad if row == 1 else beam_rad, cell[row], min_linearity)
                     for row in range(4)])
     incidence = np.where(has_normal, np.arccos(np.clip(cos[0], 0.0, 1.0)), np.nan)
-    line_m = np.where(has_normal[0], _by_line(caster, from_laser[0], beam_rad[0], hits.first_m[0], hits.first_cell[0]),
+    line_m = np.where(has_normal[0], _by_line(caster, thickness_m, from_laser[0], beam_rad[0], hits.first_m[0],
+                                               hits.first_cell[0]),
                       hits.first_m[0])
     range_m = np.stack([hits.first_m, hits.mirrored_m, hits.second_m, hits.third_m])
     normal_rad, linearity = caster.normals()
@@ -109,9 +110,10 @@ def _miss(surface: int, beams: np.ndarray, range_m: np.ndarray, cos: np.ndarray,
             values[1][beams] = nothing
 
 
-def _by_line(caster: RayCaster, from_laser: np.ndarray, beam_rad: np.ndarray, first_m: np.ndarray,
+def _by_line(caster: RayCaster, thickness_m: np.ndarray, from_laser: np.ndarray, beam_rad: np.ndarray, first_m: np.ndarray,
              cell: np.ndarray) -> np.ndarray:
-    """(B,) ranges at which the beams of one sample cross the lines of the walls whose cells (B,) they meet.
+    """(B,) ranges at which the beams of one sample cross the lines of the walls whose cells (B,) they meet, half a
+    cell behind the near faces.
 
     A grazing beam enters the staircase of a wall's cells decimetres before it comes to the wall.
     """
@@ -122,6 +124,7 @@ def _by_line(caster: RayCaster, from_laser: np.ndarray, beam_rad: np.ndarray, fi
     across = np.stack([np.cos(axis_rad), np.sin(axis_rad)], axis=-1)
     distance_m = np.sum((centre - from_laser[:2]) * across, axis=-1) + caster.wall_offsets_m()[cell]
     cos = np.cos(beam_rad - axis_rad)
+    distance_m -= np.sign(distance_m) * 0.5 * np.maximum(thickness_m[cell] - grid_map.resolution_m, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         line_m = distance_m / cos
         near = np.abs(line_m - first_m) * np.abs(cos) <= _LINE_CELLS * grid_map.resolution_m

@@ -14,6 +14,8 @@ from glass_nav.localization.beam_cases import FIRST_PENETRATION, SECOND_PENETRAT
 from glass_nav.localization.reference_ranges import ReferenceRanges
 
 _SURE = 0.5              # chance from which a wall is taken for glass, and for being there
+_UNANSWERED_BY_GLASS, _UNANSWERED_BY_WALLS = 0.3, 0.01  # share of the beams that do not come back
+_DARK_TO_DIM = 3.0       # reflectance of nearly all walls over that of the darkest one a lidar sees
 _SAME_WALL_M, _SAME_WALL_RAD = 0.05, np.radians(5.0)
 
 
@@ -26,11 +28,12 @@ class SurfaceScan:
 
 
 def of(ranges_m: np.ndarray, case: np.ndarray, references: ReferenceRanges, glass: np.ndarray, gate_m: np.ndarray,
-       trusted: bool) -> SurfaceScan:
+       max_range_m: float, trusted: bool) -> SurfaceScan:
     """Cut a scan.
 
     A beam is cut if its case says that it passed or was mirrored; if it ended beyond the middle of a wall that stands
-    there, whatever it met behind; and if it did not come back from where a pane is known.
+    there, whatever it met behind; and if it did not come back though a wall would have been seen, unless the wall
+    proved solid.
 
     Args:
         ranges_m: (B,) as measured, REP 117.
@@ -38,16 +41,21 @@ def of(ranges_m: np.ndarray, case: np.ndarray, references: ReferenceRanges, glas
         references: of the pose, its sample 0.
         glass: (2, B) chances of the first surface to be seen through, and if so to be there.
         gate_m: (B,) along the beam; what is measured within it of the first surface is that surface.
+        max_range_m: at which the lidar still sees a dark wall, face on.
         trusted: whether the pose is.
     """
     if not trusted:
         return SurfaceScan(ranges_m, np.zeros(len(ranges_m), bool), False)
     seen_through, there = glass
+    stands = (there > _SURE) & _within_a_wall(references)
     with np.errstate(invalid="ignore"):
         behind = np.isfinite(references.line_m) & (ranges_m > references.line_m + gate_m)  # also without an answer
     explained = np.isin(case, (SPECULAR, FIRST_PENETRATION, SECOND_PENETRATION))
-    passed = np.isfinite(ranges_m) & (there > _SURE) & _within_a_wall(references)
-    cut = behind & (explained | passed | (seen_through * there > _SURE))
+    lost = np.isposinf(ranges_m) & _would_answer(references, max_range_m)
+    silent = _UNANSWERED_BY_GLASS * seen_through
+    gone_through = silent > _SURE * (silent + _UNANSWERED_BY_WALLS * (1.0 - seen_through))
+    known = seen_through * there > _SURE
+    cut = behind & (explained | known | stands & (np.isfinite(ranges_m) | gone_through & _in_company(lost)))
     return SurfaceScan(np.where(cut, references.line_m, ranges_m), cut, True)
 
 
@@ -60,3 +68,17 @@ def _within_a_wall(references: ReferenceRanges) -> np.ndarray:
     both = np.zeros(len(references.line_m), bool)
     both[1:-1] = same[1:] & same[:-1]
     return both
+
+
+def _would_answer(references: ReferenceRanges, max_range_m: float) -> np.ndarray:
+    """(B,) bool: a wall instead of the first surface would be bright enough: power falls with cosine and distance."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return _DARK_TO_DIM * references.cos_incidence[0, 0] > (references.line_m / max_range_m) ** 2
+
+
+def _in_company(beams: np.ndarray) -> np.ndarray:
+    """(B,) bool: those of the beams with another one beside them; a single one may be a fault of the lidar."""
+    beside = np.zeros_like(beams)
+    beside[1:] |= beams[:-1]
+    beside[:-1] |= beams[1:]
+    return beams & beside
