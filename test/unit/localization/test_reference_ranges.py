@@ -126,8 +126,8 @@ def test_every_sample_and_beam_has_its_own_place():
                 np.testing.assert_allclose(one[:, row, column], other[:, row, column])
             np.testing.assert_allclose(together.pane_incidence[row, column], alone.pane_incidence[row, column])
             if row == 0:
-                np.testing.assert_allclose(together.line_m[column], alone.line_m[column])
-                np.testing.assert_allclose(together.normal_rad[column], alone.normal_rad[column])
+                np.testing.assert_allclose(together.line_m[:, column], alone.line_m[:, column])
+                np.testing.assert_allclose(together.axis_rad[:, column], alone.axis_rad[:, column])
                 np.testing.assert_array_equal(together.seen_side[:, column], alone.seen_side[:, column])
 
 
@@ -234,9 +234,9 @@ def test_a_beam_crosses_the_line_of_a_wall_not_the_staircase_of_its_cells(slant_
     true_m = 0.8 / np.cos(incidence)
     met = np.isfinite(offered.range_m[0, 0])
     assert met[1:6].all()
-    off_m = np.abs(offered.line_m - true_m) * np.cos(incidence)
+    off_m = np.abs(offered.line_m[0] - true_m) * np.cos(incidence)
     assert off_m[met].max() < 0.2 * CELL_M
-    np.testing.assert_allclose(np.cos(2.0 * (offered.normal_rad[met] - slant - 0.4)), 1.0, atol=1e-3)
+    np.testing.assert_allclose(np.cos(2.0 * (offered.axis_rad[0, met] - slant - 0.4)), 1.0, atol=1e-3)
 
 
 def test_the_line_of_a_wall_that_is_drawn_thick_is_half_a_cell_behind_its_face():
@@ -246,7 +246,7 @@ def test_the_line_of_a_wall_that_is_drawn_thick_is_half_a_cell_behind_its_face()
     angle = np.radians(40.0)
     for pose, to_face_m in (([0.5, 1.0, 0.0], 2.5), ([6.0, 1.0, np.pi], 3.0 - 2 * CELL_M)):
         offered = seen(building, pose, [0.0, angle if pose[2] == 0.0 else -angle])
-        np.testing.assert_allclose(offered.line_m, to_face_m / np.cos([0.0, angle]), atol=0.05 * CELL_M)
+        np.testing.assert_allclose(offered.line_m[0], to_face_m / np.cos([0.0, angle]), atol=0.05 * CELL_M)
 
 
 def test_the_line_is_nearer_the_truth_than_the_cells_are():
@@ -258,25 +258,55 @@ def test_the_line_is_nearer_the_truth_than_the_cells_are():
         start = 6.0 + 2.5 * np.array([np.cos(slant), np.sin(slant)])
         offered = on_map(slanted(slant, 3.0), slant + incidence, [*start, 0.0])
         true_m = 0.5 / np.cos(incidence)
-        by_line.append(offered.line_m - true_m)
+        by_line.append(offered.line_m[0] - true_m)
         by_cells.append(offered.range_m[0, 0] - true_m)
     by_line, by_cells = np.abs(np.concatenate(by_line)), np.abs(np.concatenate(by_cells))
     assert np.median(by_line) < 0.2 * np.median(by_cells) and by_line.max() < by_cells.max()
 
 
+def test_the_lines_of_the_walls_behind_are_found_as_well():
+    angle = np.radians(18.0)
+    offered = seen(ROW, [0.5, 0.5, 0.0], [angle])
+    np.testing.assert_allclose(offered.line_m[[0, 2, 3], 0], np.array([2.5, 4.5, 8.5]) / np.cos(angle), atol=1e-3)
+    np.testing.assert_allclose(np.cos(offered.axis_rad[[0, 2, 3], 0]) ** 2, 1.0, atol=1e-4)
+    assert offered.face_m == pytest.approx(TO_BOUNDARY_M)
+
+
+def test_a_mirrored_path_goes_from_line_to_line():
+    """Head-on into the pane x = 3 and back to the wall x = -1, whose image stands at x = 7."""
+    offered = seen(ROW, [0.5, 2.0, 0.0], [0.0])
+    assert offered.line_m[1, 0] == pytest.approx(2.5 + 4.0, abs=0.1 * CELL_M)
+    assert np.cos(offered.axis_rad[1, 0]) ** 2 == pytest.approx(1.0, abs=1e-4)
+
+
+def test_the_axis_of_a_mirrored_wall_is_that_of_its_image():
+    """A pane of 45 degrees shows a wall along x as one along y."""
+    occupancy = np.zeros((240, 240), np.int8)
+    occupancy[230] = 100
+    row, column = np.indices(occupancy.shape)
+    occupancy[np.abs(row - column) <= 0.5] = 100  # the pane y = x
+    grid_map = GridMap(occupancy, CELL_M, np.zeros(3))
+    scan = Scan(0, np.full(1, np.nan), np.zeros(1), 0.1, 30.0, np.zeros(3))
+    offered = reference_ranges.of(RayCaster(grid_map), wall_thickness(grid_map), np.array([[2.0, 6.0, 0.0]]), scan,
+                                  0.2, 0.9)
+    assert np.isfinite(offered.range_m[1, 0, 0])  # along x to the pane at x = 6, then up to y = 11.5
+    assert offered.range_m[1, 0, 0] == pytest.approx(4.0 + 5.5, abs=0.1)
+    assert np.cos(2.0 * offered.axis_rad[1, 0]) == pytest.approx(1.0, abs=0.01)  # its normal along x
+
+
 def test_where_there_is_no_line_the_cell_is_told_or_nothing():
     post = seen(POST, [0.5, 2.0, 0.0], [0.0])
-    assert post.line_m[0] == post.range_m[0, 0, 0] and np.isnan(post.normal_rad[0])
+    assert post.line_m[0, 0] == pytest.approx(post.range_m[0, 0, 0] + TO_BOUNDARY_M) and np.isnan(post.axis_rad[0, 0])
     nothing = seen(ROW, [0.5, 2.0, 0.0], [0.0, 0.3], max_range_m=1.0)
-    assert np.isinf(nothing.line_m).all() and np.isnan(nothing.normal_rad).all()
+    assert np.isinf(nothing.line_m).all() and np.isnan(nothing.axis_rad).all()
 
 
 def test_a_beam_along_a_wall_ends_where_the_cells_begin():
     """Nearly parallel to it the line is crossed anywhere; the face of a wall is met where its cells are."""
     building = Building([(-1, 0), (9, 0), (9, 4), (-1, 4)], walls=[(4, 2, 8, 2)])
     offered = seen(building, [0.0, 2.0 + 0.01, 0.0], [np.radians(0.1), 0.0])
-    np.testing.assert_allclose(offered.line_m, offered.range_m[0, 0])
-    assert np.all(np.abs(offered.line_m - 4.0) < CELL_M)
+    assert np.all(np.abs(offered.range_m[0, 0] - 4.0) < CELL_M)
+    assert np.all(np.abs(offered.line_m[0] - 4.0) < 4 * CELL_M)
 
 
 # -- sides that nobody saw

@@ -88,15 +88,15 @@ def test_beside_an_edge_a_beam_may_have_missed_the_wall():
     """The wall ends, or turns, or has no normal, at the third beam."""
     edge = dict(first=[2.0, 2.0, 4.0, 2.0, 2.0])
     assert behind_a_wall(**edge, range_m=7.0)[1:4] == [False] * 3
-    corner = dict(normal_rad=[0.0, 0.0, 0.6, 0.0, 0.0])
+    corner = dict(axis_rad=[0.0, 0.0, 0.6, 0.0, 0.0])
     assert behind_a_wall(**corner)[1:4] == [False] * 3
-    post = dict(normal_rad=[0.0, 0.0, np.nan, 0.0, 0.0])
+    post = dict(axis_rad=[0.0, 0.0, np.nan, 0.0, 0.0])
     assert behind_a_wall(**post)[1:4] == [False] * 3
 
 
 def test_a_wall_along_the_axis_of_its_normal_is_one_wall():
     """An axis is known up to half a turn: -90 and 90 degrees are the same."""
-    assert behind_a_wall(normal_rad=np.radians([89.9, -89.9, 90.0, -90.0, 89.9]))[1:-1] == [True] * 3
+    assert behind_a_wall(axis_rad=np.radians([89.9, -89.9, 90.0, -90.0, 89.9]))[1:-1] == [True] * 3
 
 
 @pytest.mark.parametrize("beams", [1, 2])
@@ -151,7 +151,7 @@ def test_no_beam_is_ever_made_longer(seed):
     first[rng.random(beams) < 0.1] = np.inf
     ranges_m = rng.choice([np.nan, np.inf, -np.inf, *rng.uniform(0.1, 10.0, 40)], beams)
     found = cut(ranges_m, rng.integers(0, 5, beams), first, glass=rng.random((beams, 2)), line_m=first + 0.1,
-                gate_m=0.0, incidence=rng.choice([0.1, np.nan], beams), normal_rad=rng.choice([0.0, np.nan], beams))
+                gate_m=0.0, incidence=rng.choice([0.1, np.nan], beams), axis_rad=rng.choice([0.0, np.nan], beams))
     known = ~np.isnan(ranges_m)
     assert np.all(found.ranges_m[known] <= ranges_m[known]) and np.isnan(found.ranges_m[~known]).all()
     np.testing.assert_array_equal(found.cut, known & (found.ranges_m != ranges_m))
