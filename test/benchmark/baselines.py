@@ -13,7 +13,7 @@ weak, seed 100, the first 150 scans). P particles, B beams.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Callable, Dict, NamedTuple, Optional, Union
+from typing import Any, Callable, Dict, NamedTuple, Optional, Tuple, Union
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from glass_nav.geometry import angles, se2
 from glass_nav.localization import motion, pose_estimate, resampling
 from glass_nav.localization.beam_cases import DIFFUSE, UNCERTAIN, BeamCases
 from glass_nav.localization.glass_mcl import GlassMcl, GlassMclParams
+from glass_nav.localization.reference_ranges import ReferenceRanges
 from glass_nav.localization.resampling import ParticleCount
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.raycast import RayCaster
@@ -185,26 +186,27 @@ class OtherWeights(GlassMcl):
         super().__init__(params, grid_map, rng)
         self._model = model
 
-    def _log_weights(self, scan: Scan, particles: np.ndarray, cases: BeamCases, *_: Any) -> np.ndarray:
+    def _log_weights(self, scan: Scan, particles: np.ndarray, *_: Any) -> np.ndarray:
         return self._model.log_weights(particles, scan)
 
 
 class DiffuseOnly(GlassMcl):
-    """Our filter, with only the beams that are told to have ended at the first surface."""
+    """Our filter, going only by the beams that it takes for ended at the first surface."""
 
-    def _log_weights(self, scan: Scan, particles: np.ndarray, cases: BeamCases, *rest: Any) -> np.ndarray:
+    def _vote(self, scan: Scan, *pose: np.ndarray) -> Tuple[BeamCases, ReferenceRanges]:
+        cases, references = super()._vote(scan, *pose)
         diffuse = np.where(cases.case == DIFFUSE, cases.case, UNCERTAIN).astype(np.uint8)
-        return super()._log_weights(scan, particles, replace(cases, case=diffuse), *rest)
+        return replace(cases, case=diffuse), references
 
 
 class OracleCases(GlassMcl):
-    """Our filter, weighing by the true cases; set `true_case` (B,) before each update()."""
+    """Our filter, going by the true cases; set `true_case` (B,) before each update()."""
 
     true_case = np.zeros(0, np.uint8)
 
-    def _log_weights(self, scan: Scan, particles: np.ndarray, cases: BeamCases, *rest: Any) -> np.ndarray:
-        known = np.where(scan.answered, self.true_case, UNCERTAIN).astype(np.uint8)
-        return super()._log_weights(scan, particles, replace(cases, case=known), *rest)
+    def _vote(self, scan: Scan, *pose: np.ndarray) -> Tuple[BeamCases, ReferenceRanges]:
+        cases, references = super()._vote(scan, *pose)
+        return replace(cases, case=np.where(scan.answered, self.true_case, UNCERTAIN).astype(np.uint8)), references
 
 
 SETTINGS = {
