@@ -10,6 +10,7 @@ from glass_nav.geometry import se2
 from glass_nav.localization import beam_weights
 from glass_nav.localization.beam_weights import BeamMixture
 from glass_nav.localization.range_residuals import RangeResiduals
+from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.wall_thickness import wall_thickness
 
@@ -26,8 +27,8 @@ class Map:
 
     def log_weights(self, poses, angles_rad, measured_m, case, residuals=MID_WALL, mixture=MIXTURE):
         from_laser = se2.compose(np.atleast_2d(poses), BASE_FROM_LASER)
-        return beam_weights.log_weights(self.caster, self.thickness_m, from_laser, angles_rad, measured_m,
-                                        np.asarray(case, np.uint8), residuals, mixture, RANGE_MAX_M, 0.2, 0.9)
+        return beam_weights.by_ranges(self.caster, self.thickness_m, from_laser, angles_rad, measured_m,
+                                      np.asarray(case, np.uint8), residuals, mixture, RANGE_MAX_M, 0.2, 0.9)
 
 
 @pytest.fixture(scope="module")
@@ -166,6 +167,70 @@ def test_without_beams_all_particles_are_alike(l_room):
                                   np.zeros(5))
 
 
+# -- by how far beams end from walls
+
+def ends_on_walls(building, true, rng, glass_share=0.0, beams=120):
+    """(B, 2) end points in the robot's frame of the beams that ended at a mapped surface."""
+    scan = building.scan(true, rng=rng, beams=beams, glass_share=glass_share)
+    return scan.points_in_base()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_by_the_field_too_the_robot_is_where_beams_end_on_walls(l_room, seed):
+    rng = np.random.default_rng(seed)
+    true = np.array([rng.uniform(1.5, 4.0), rng.uniform(1.0, 2.5), rng.uniform(-3.0, 3.0)])
+    ends_m = ends_on_walls(L_ROOM, true, rng)
+    log_w = beam_weights.by_field(DistanceField(l_room.grid_map), np.vstack([true, poses_around(true, rng)]), ends_m,
+                                  MID_WALL, MIXTURE)
+    assert np.all(log_w[0] > log_w[1:] + 1.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_by_the_field_beams_through_glass_count_by_the_wall_behind(glass_room, seed):
+    rng = np.random.default_rng(seed)
+    true = np.array([rng.uniform(2.0, 5.0), rng.uniform(0.8, 2.2), rng.uniform(-0.5, 0.5)])
+    ends_m = ends_on_walls(GLASS_ROOM, true, rng, glass_share=1.0)
+    log_w = beam_weights.by_field(DistanceField(glass_room.grid_map), np.vstack([true, poses_around(true, rng)]),
+                                  ends_m, MID_WALL, MIXTURE)
+    assert np.all(log_w[0] > log_w[1:] + 1.0)
+
+
+def test_by_the_field_one_end_weighs_as_the_mixture_says(l_room):
+    """The wall x = 6 runs along the centres of its cells: an end 0.05 m before it is 0.05 m away."""
+    def log_w(x_m):
+        return beam_weights.by_field(DistanceField(l_room.grid_map), np.array([[4.0, 1.5, 0.0]]),
+                                     np.array([[x_m - 4.0, 0.0]]), MID_WALL, MIXTURE)[0]
+
+    assert log_w(6.0) == pytest.approx(0.0, abs=1e-4)
+    assert log_w(5.95) == pytest.approx(np.log(0.95 * np.exp(-0.5 * 1.25**2) + 0.05), abs=1e-3)
+    assert log_w(5.0) == pytest.approx(np.log(0.05), abs=1e-3)
+
+
+def test_by_the_field_particles_and_ends_have_no_order_and_ends_no_weight_beyond_their_number(l_room):
+    rng = np.random.default_rng(0)
+    true = np.array([2.5, 1.5, 0.3])
+    ends_m, poses = ends_on_walls(L_ROOM, true, rng, beams=20), poses_around(true, rng)
+    field = DistanceField(l_room.grid_map)
+    log_w = beam_weights.by_field(field, poses, ends_m, MID_WALL, MIXTURE)
+    order, ends_order = rng.permutation(len(poses)), rng.permutation(len(ends_m))
+    np.testing.assert_allclose(beam_weights.by_field(field, poses[order], ends_m[ends_order], MID_WALL, MIXTURE),
+                               log_w[order], rtol=1e-5)
+    thrice = beam_weights.by_field(field, poses, np.tile(ends_m, (3, 1)), MID_WALL, MIXTURE)
+    np.testing.assert_allclose(thrice, log_w * 30.0 / 20.0, rtol=1e-5)  # MIXTURE: 30 of the 60 are independent
+
+
+def test_by_the_field_without_ends_all_particles_are_alike(l_room):
+    np.testing.assert_array_equal(beam_weights.by_field(DistanceField(l_room.grid_map), np.zeros((5, 3)),
+                                                        np.zeros((0, 2)), MID_WALL, MIXTURE), np.zeros(5))
+
+
+def test_ends_on_walls_are_those_of_cases_one_three_and_four():
+    """What was mirrored ends where nothing is, what is not understood anywhere."""
+    assert beam_weights.known_ends(np.arange(5, dtype=np.uint8)).tolist() == [False, True, False, True, True]
+
+
+# -- which beams
+
 def test_beams_are_chosen_evenly_over_those_that_are_understood():
     case = np.zeros(360, np.uint8)
     case[90:270] = 3
@@ -181,6 +246,7 @@ def test_few_beams_are_all_chosen():
 
 
 @pytest.mark.parametrize("values, text", [
+    (dict(weight_mode="rays"), "~weight_mode must be one of field, ranges, got 'rays'"),
     (dict(laser_max_beams=1), "~laser_max_beams must be >= 2, got 1"),
     (dict(laser_z_hit=0.0), "~laser_z_hit must be > 0, got 0.0"),
     (dict(laser_z_rand=0.0), "~laser_z_rand must be > 0, got 0.0"),

@@ -87,6 +87,15 @@ def test_a_robot_beside_glass_is_tracked_within_centimetres(seed, glass_share):
     assert turn_rad.max() < np.radians(1.5)
 
 
+@pytest.mark.parametrize("weight_mode", ["field", "ranges"])
+@pytest.mark.parametrize("seed", range(2))
+def test_either_way_to_weigh_particles_tracks_a_robot_beside_glass(seed, weight_mode):
+    drive = Drive(GLASS_ROOM, seed=seed, glass_share=0.5, centre=(3.6, 1.8))
+    way_m, turn_rad = drive.errors(drive.through(started(GLASS_ROOM, drive.true[0], seed,
+                                                         weight_mode=weight_mode))).T
+    assert way_m.max() < 0.05 and turn_rad.max() < np.radians(1.5)
+
+
 @pytest.mark.parametrize("vote_mode", ["soft", "paper"])
 def test_beams_are_told_apart_as_they_were(vote_mode):
     """Half of the beams pass the pane. Those told wrong are few, and few are not told."""

@@ -32,6 +32,18 @@ def test_at_cell_centres_it_is_the_distance_to_the_nearest_of_all_walls(seed, or
     np.testing.assert_allclose(distance, nearest, atol=1e-5)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_the_distance_alone_is_the_one_with_its_gradient(seed):
+    """Also outside the map, in any shape, and without touching what was given."""
+    rng = np.random.default_rng(seed)
+    field = DistanceField(scattered(seed, TURNED))
+    x_m, y_m = rng.uniform(-3.0, 8.0, (2, 40, 7))
+    given = x_m.copy(), y_m.copy()
+    np.testing.assert_allclose(field.distance(x_m, y_m), field.at(x_m, y_m)[0], atol=1e-6)
+    np.testing.assert_array_equal((x_m, y_m), given)
+    np.testing.assert_array_equal(field.distance(x_m, y_m), field.distance(x_m, y_m))
+
+
 def test_between_cell_centres_it_is_bilinear():
     # One wall cell with its centre at (1.05, 1.05). The four centres around (1.28, 1.17) lie (0.2 or 0.3, 0.1 or
     # 0.2) from it, and the point at 0.3 and 0.2 of the way between them.
