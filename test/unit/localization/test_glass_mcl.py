@@ -195,6 +195,19 @@ def test_a_new_pose_on_the_same_map_keeps_its_glass():
     np.testing.assert_array_equal(mcl.glass_map.occupancy(), before)
 
 
+def test_scans_that_fit_nowhere_teach_nothing():
+    """A robot that was carried away would take all walls for glass."""
+    drive = GlassDrive(steps=20)
+    mcl = started(GLASS_ROOM, drive.true[0])
+    drive.through(mcl, last=12)
+    before = mcl.glass_map.occupancy()
+    rng = np.random.default_rng(0)
+    for index in range(12, 20):
+        drive.scans[index] = replace(drive.scans[index], ranges_m=rng.uniform(4.0, 11.0, 180))
+    drive.through(mcl, first=12)
+    np.testing.assert_array_equal(mcl.glass_map.occupancy(), before)
+
+
 # -- the scan in which glass is an obstacle
 
 def test_beams_behind_the_pane_are_cut_at_it_and_others_are_left():

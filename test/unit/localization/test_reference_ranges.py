@@ -292,6 +292,7 @@ def test_the_axis_of_a_mirrored_wall_is_that_of_its_image():
     assert np.isfinite(offered.range_m[1, 0, 0])  # along x to the pane at x = 6, then up to y = 11.5
     assert offered.range_m[1, 0, 0] == pytest.approx(4.0 + 5.5, abs=0.1)
     assert np.cos(2.0 * offered.axis_rad[1, 0]) == pytest.approx(1.0, abs=0.01)  # its normal along x
+    assert offered.cos_incidence[1, 0, 0] == pytest.approx(1.0, abs=0.02)  # met face on, though the beam goes along it
 
 
 def test_where_there_is_no_line_the_cell_is_told_or_nothing():
