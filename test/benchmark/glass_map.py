@@ -82,7 +82,8 @@ def draw(path: Path, grid_map: GridMap, percent: np.ndarray, other_m: Optional[n
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--logs", nargs="+", default=["uob_trace0", "olin_mac", "mit_csail", "intel", "aces", "seattle"])
+    parser.add_argument("--logs", nargs="+",
+                        default=["uob_trace0", "olin_mac", "mit_csail", "intel", "aces", "seattle"])
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--threshold", type=float, default=50.0, help="percent from which a cell is called glass")
@@ -93,7 +94,8 @@ def main() -> int:
     given = {name: json.loads(value) for name, _, value in (each.partition("=") for each in arguments.set)}
     settings = params.load(GlassMclParams, given, "glass_map")
     rows: List[Dict[str, Any]] = []
-    print("| log | seed | glass cells | share of walls | seen through | precision | recall | case 3 | case 4 | case 2 |\n"
+    print("| log | seed | glass cells | share of walls | seen through | precision | recall | case 3 | case 4 | case 2 "
+          "|\n"
           "|---|---|---|---|---|---|---|---|---|---|")
     for name in arguments.logs:
         other_m = see_through(name)

@@ -31,7 +31,7 @@ def crossings(measured_m: np.ndarray, references: ReferenceRanges,
     """What a scan says about walls: cell, incidence and passed of GlassMap.learn().
 
     Only beams for which all samples agree: a wall that stands in the beam's way from each of them was passed, not
-    missed at its edge. A cell without a normal is no pane: nothing is learnt about it.
+    missed at its edge. The incidence of a cell without a normal is NaN.
 
     Args:
         measured_m: (B,) ranges by REP 117.

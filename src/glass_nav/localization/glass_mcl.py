@@ -26,6 +26,7 @@ from glass_nav.localization.proposal import Proposal
 from glass_nav.localization.range_residuals import RangeResiduals
 from glass_nav.localization.reference_ranges import LEAST_COS, ReferenceRanges
 from glass_nav.localization.resampling import ParticleCount
+from glass_nav.localization.scan_alignment import Alignment
 from glass_nav.localization.scan_anchor import ScanAnchor
 from glass_nav.localization.surface_scan import SurfaceScan
 from glass_nav.sensing.distance_field import DistanceField
@@ -35,6 +36,7 @@ from glass_nav.sensing.wall_thickness import wall_thickness
 from glass_nav.world.grid_map import GridMap
 
 _WIDEST_PLACE = np.array([1.0, 1.0, 0.7])  # deviations [m, m, rad] that preliminary samples can cover
+_LEAST_ENDS = 20       # of beams of known case that a pose is refined by
 _NATS_OF_A_FULL_FIT = 20.0  # of log weight between a scan that fits nowhere and one that fits everywhere
 
 
@@ -229,16 +231,30 @@ class GlassMcl:
             best = pose_estimate.of(predicted, self._weights)
             return self._vote(scan, best.map_from_base, best.covariance)[0]
         aligned = self._anchor.find(best.map_from_base, best.covariance, odom_from_base, points)
-        independent = beam_weights.independent_beams(self._residuals, self._params.mixture)
-        beam_information = min(1.0, independent / len(beams)) / self._residuals.sigma_m**2
-        particles, log_ratio = proposal.draw(predicted, self._weights, best, aligned, beam_information,
-                                             self._params.proposal, self._rng)
         cases, references = self._vote(scan, aligned.poses[0], np.zeros((3, 3)))
         if self._anchor.fits:
             self._learn(scan, references)
-        self._particles = particles
-        self._weights = resampling.tempered(log_ratio + self._log_weights(scan, particles, cases))
+        ends = beam_weights.known_ends(cases.case)
+        aligned = self._refined(aligned, best.map_from_base, scan.points_in_base()[ends], len(beams))
+        independent = beam_weights.independent_beams(self._residuals, self._params.mixture)
+        beam_information = min(1.0, independent / len(beams)) / self._residuals.sigma_m**2
+        self._particles, log_ratio = proposal.draw(predicted, self._weights, best, aligned, beam_information,
+                                                   self._params.proposal, self._rng)
+        self._weights = resampling.tempered(log_ratio + self._log_weights(scan, self._particles, cases))
         return cases
+
+    def _refined(self, aligned: Alignment, predicted: np.ndarray, points: np.ndarray, aligned_beams: int) -> Alignment:
+        """The alignments once more, and from the predicted pose, by all beams that ended at a known surface.
+
+        What stands unmapped behind glass may have drawn the first alignment away. Information is as of aligned_beams.
+        """
+        if len(points) < _LEAST_ENDS:
+            return aligned
+        scale_m = self._residuals.sigma_m
+        again = scan_alignment.align(self._field, points, np.vstack([aligned.poses, predicted]), iterations=4,
+                                     first_scale_m=2.0 * scale_m, last_scale_m=scale_m)
+        found = scan_alignment.distinct(again)
+        return Alignment(found.poses, found.information * aligned_beams / max(aligned_beams, len(points)), found.fit)
 
     def _is_one_place(self, best: pose_estimate.PoseEstimate) -> bool:
         """A cloud over a whole room is one cluster too, but no pose to align a scan from."""
@@ -288,18 +304,23 @@ class GlassMcl:
         """Where beams end in walls, and which walls let them pass; references are of a pose that is believed."""
         mixture = self._params.mixture
         with np.errstate(invalid="ignore"):
-            across = (scan.ranges_m - references.range_m[0, 0]) * references.cos_incidence[0, 0]
+            across = (scan.ranges_m - references.line_m[0]) * references.cos_incidence[0, 0] + references.face_m
         met = np.isfinite(across)
         self._residuals = self._residuals.learn(across[met], references.thickness_m[0, 0][met],
                                                 mixture.laser_sigma_hit, mixture.laser_sigma_hit_max)
         self._glass_map.learn(*glass_map.crossings(scan.ranges_m, references, self._residuals))
 
     def _log_weights(self, scan: Scan, particles: np.ndarray, cases: BeamCases) -> np.ndarray:
-        chosen = beam_weights.choose(cases.case, self._params.mixture.laser_max_beams)
-        return beam_weights.log_weights(
+        mixture, vote = self._params.mixture, self._params.vote
+        if mixture.weight_mode == "field":
+            chosen = beam_weights.choose(beam_weights.known_ends(cases.case), mixture.laser_max_beams)
+            ends_m = scan.points_in_base()[chosen]
+            return beam_weights.by_field(self._field, particles, ends_m, self._residuals, mixture)
+        chosen = beam_weights.choose(cases.case, mixture.laser_max_beams)
+        return beam_weights.by_ranges(
             self._caster, self._thickness_m, se2.compose(particles, scan.base_from_laser), scan.angles_rad[chosen],
-            scan.ranges_m[chosen], cases.case[chosen], self._residuals, self._params.mixture, scan.range_max_m,
-            self._params.vote.glass_max_thickness_m, self._params.vote.normal_min_linearity)
+            scan.ranges_m[chosen], cases.case[chosen], self._residuals, mixture, scan.range_max_m,
+            vote.glass_max_thickness_m, vote.normal_min_linearity)
 
     def _resample(self) -> None:
         self._updates += 1

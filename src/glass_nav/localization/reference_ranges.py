@@ -21,6 +21,7 @@ from glass_nav.world.grid_map import UNKNOWN
 LEAST_COS = 0.2  # a surface seen flatter than 78 degrees is no worse placed than at that
 _FIRST, _SECOND = 0, 1
 _BESIDE_CELLS = 2.5  # in front of a surface: past the steps of its staircase
+_BOTH_FACES_CELLS = 3.0  # a wall up to so thick has one line through all its cells
 _LINE_CELLS, _GRAZING_COS = 2.0, 0.02  # the line of a wall lies so near to the cells that a beam meets
 
 
@@ -32,8 +33,9 @@ class ReferenceRanges:
     thickness_m: np.ndarray      # (4, N, B) of the wall that answers, as drawn
     cell: np.ndarray             # (4, N, B) int32 flat cell that answers, -1: none
     pane_incidence: np.ndarray   # (N, B) angle to the normal of the first surface [rad], NaN without one
-    line_m: np.ndarray           # (B,) range of sample 0's first surface by the line of its wall, inf: none
-    normal_rad: np.ndarray       # (B,) axis of that wall's normal in map, up to half a turn; NaN without one
+    line_m: np.ndarray           # (4, B) range of sample 0 by the lines of the walls, face_m behind the near faces
+    axis_rad: np.ndarray         # (4, B) axes of their normals in map, up to half a turn; NaN: none. Case 2: mirrored
+    face_m: float                # half a cell
     seen_side: np.ndarray        # (4, B) bool: sample 0's surfaces are met from a side that is not unknown
 
 
@@ -59,9 +61,6 @@ def of(caster: RayCaster, thickness_m: np.ndarray, samples: np.ndarray, scan: Sc
     cos = np.stack([cos_incidence(caster, mirrored_rad if row == 1 else beam_rad, cell[row], min_linearity)
                     for row in range(4)])
     incidence = np.where(has_normal, np.arccos(np.clip(cos[0], 0.0, 1.0)), np.nan)
-    line_m = np.where(has_normal[0], _by_line(caster, thickness_m, from_laser[0], beam_rad[0], hits.first_m[0],
-                                               hits.first_cell[0]),
-                      hits.first_m[0])
     range_m = np.stack([hits.first_m, hits.mirrored_m, hits.second_m, hits.third_m])
     normal_rad, linearity = caster.normals()
     second_is_corner = (hits.second_cell >= 0) & (linearity[hits.second_cell] < min_linearity)
@@ -69,8 +68,12 @@ def of(caster: RayCaster, thickness_m: np.ndarray, samples: np.ndarray, scan: Sc
     _miss(_SECOND, missed & second_is_corner, range_m, cos, cell)
     _miss(_FIRST, missed & (hits.first_cell >= 0) & ~has_normal, range_m, cos, cell)
     directions_rad = np.stack([beam_rad[0], np.nan_to_num(mirrored_rad[0]), beam_rad[0], beam_rad[0]])
-    axis_rad = np.where(has_normal[0], normal_rad[hits.first_cell[0]], np.nan)
-    return ReferenceRanges(range_m, cos, thickness_m[cell], cell, incidence, line_m, axis_rad,
+    axis_rad = np.where((cell[:, 0] >= 0) & (linearity[cell[:, 0]] >= min_linearity), normal_rad[cell[:, 0]], np.nan)
+    line_m = _by_line(caster, thickness_m, from_laser[0], beam_rad[0], range_m[:, 0], cell[:, 0], axis_rad)
+    face_m = 0.5 * caster.grid_map.resolution_m
+    line_m[1] = range_m[1, 0] + face_m / np.maximum(cos[1, 0], LEAST_COS) + 2.0 * face_m * cos[0, 0]
+    axis_rad[1] = 2.0 * hits.normal_rad[0] + np.pi - axis_rad[1]
+    return ReferenceRanges(range_m, cos, thickness_m[cell], cell, incidence, line_m, axis_rad, face_m,
                            _seen_side(caster, cell[:, 0], directions_rad, min_linearity))
 
 
@@ -106,29 +109,29 @@ def _miss(surface: int, beams: np.ndarray, range_m: np.ndarray, cos: np.ndarray,
         for to, source in zip(order, order[1:]):
             values[to][beams] = values[source][beams]
         values[order[-1]][beams] = nothing
-        if surface == _FIRST:
-            values[1][beams] = nothing
 
 
-def _by_line(caster: RayCaster, thickness_m: np.ndarray, from_laser: np.ndarray, beam_rad: np.ndarray, first_m: np.ndarray,
-             cell: np.ndarray) -> np.ndarray:
-    """(B,) ranges at which the beams of one sample cross the lines of the walls whose cells (B,) they meet, half a
-    cell behind the near faces.
+def _by_line(caster: RayCaster, thickness_m: np.ndarray, from_laser: np.ndarray, beam_rad: np.ndarray,
+             range_m: np.ndarray, cell: np.ndarray, axis_rad: np.ndarray) -> np.ndarray:
+    """(4, B) ranges at which the beams of one sample cross the lines of the walls whose cells (4, B) they meet, half a
+    cell behind the near faces; range_m (4, B) and half a cell where there is no line.
 
     A grazing beam enters the staircase of a wall's cells decimetres before it comes to the wall.
     """
     grid_map = caster.grid_map
     centre = grid_map.centres(*np.divmod(cell, grid_map.occupancy.shape[1]))
-    normal_rad, _ = caster.normals()
-    axis_rad = normal_rad[cell]
-    across = np.stack([np.cos(axis_rad), np.sin(axis_rad)], axis=-1)
-    distance_m = np.sum((centre - from_laser[:2]) * across, axis=-1) + caster.wall_offsets_m()[cell]
+    normal = np.stack([np.cos(axis_rad), np.sin(axis_rad)], axis=-1)
+    distance_m = np.sum((centre - from_laser[:2]) * normal, axis=-1) + caster.wall_offsets_m()[cell]
+    cells = thickness_m[cell] / grid_map.resolution_m
+    middle = np.where(cells <= _BOTH_FACES_CELLS, 0.5 * (cells - 1.0), 0.0)  # a thicker wall has a line for each face
+    distance_m -= np.sign(distance_m) * np.maximum(middle, 0.0) * grid_map.resolution_m
     cos = np.cos(beam_rad - axis_rad)
-    distance_m -= np.sign(distance_m) * 0.5 * np.maximum(thickness_m[cell] - grid_map.resolution_m, 0.0)
+    half_m = 0.5 * grid_map.resolution_m
     with np.errstate(divide="ignore", invalid="ignore"):
         line_m = distance_m / cos
-        near = np.abs(line_m - first_m) * np.abs(cos) <= _LINE_CELLS * grid_map.resolution_m
-    return np.where(near & (np.abs(cos) >= _GRAZING_COS), line_m, first_m)
+        holds = np.abs(line_m - range_m) * np.abs(cos) <= _LINE_CELLS * grid_map.resolution_m
+        return np.where(holds & (np.abs(cos) >= _GRAZING_COS), line_m,
+                        range_m + half_m / np.where(np.isnan(cos), 1.0, np.maximum(np.abs(cos), LEAST_COS)))
 
 
 def cos_incidence(caster: RayCaster, beam_rad: np.ndarray, cell: np.ndarray, min_linearity: float) -> np.ndarray:

@@ -16,6 +16,9 @@ from glass_nav.geometry import angles
 from glass_nav.sensing.distance_field import DistanceField
 
 _FIT_SCALE_M = 0.1     # a beam that ends this far from a wall fits by one half
+_KEEP = 4                     # alignments that are different places
+_AS_GOOD = 0.9                # of the best fit: worth particles
+_SAME_M, _SAME_RAD = 0.05, np.radians(1.5)
 _RIDGE = 1e-3          # keeps directions that no wall constrains where they are
 
 
@@ -82,3 +85,16 @@ def _normal_equations(distance: np.ndarray, jacobian: np.ndarray,
     weighted = jacobian * weight
     information = np.einsum("ikb,jkb->kij", weighted, jacobian)
     return information, np.einsum("ikb,kb->ki", weighted, distance)
+
+
+def distinct(aligned: Alignment) -> Alignment:
+    """At most 4 different places that fit about as well as the best, best first."""
+    chosen: "list[int]" = []
+    for index in np.argsort(-aligned.fit):
+        off = aligned.poses[chosen] - aligned.poses[index]
+        same = (np.hypot(off[:, 0], off[:, 1]) < _SAME_M) & (np.abs(angles.wrap(off[:, 2])) < _SAME_RAD)
+        if not same.any() and aligned.fit[index] > _AS_GOOD * aligned.fit.max():
+            chosen.append(int(index))
+        if len(chosen) == _KEEP:
+            break
+    return Alignment(aligned.poses[chosen], aligned.information[chosen], aligned.fit[chosen])

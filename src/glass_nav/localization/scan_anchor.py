@@ -31,9 +31,6 @@ _LEVELS = (  # limits of the starts' spread: as predicted, a bad step of odometr
                        sample_max_radius_m=0.5, sample_max_heading_rad=0.4),
     PreliminarySamples(sample_min_radius_m=0.4, sample_min_heading_rad=0.5 * np.pi,
                        sample_max_radius_m=0.5, sample_max_heading_rad=0.5 * np.pi))
-_KEEP = 4                     # alignments that are different places
-_AS_GOOD = 0.9                # of the best fit: worth particles
-_SAME_M, _SAME_RAD = 0.05, np.radians(1.5)
 _POOR_FIT = 0.75              # of the usual fit: odometry is not believed
 _REACH = 3.0                  # deviations: farther away a poor fit is chance
 _CONVINCING_FIT = 0.9         # of the usual fit: a place that odometry did not lead to
@@ -109,7 +106,7 @@ class ScanAnchor:
         if count > _ALIGNED_STARTS:
             fit = scan_alignment.fit(self._field, points_m, starts)
             starts = starts[np.argsort(-fit)[:_ALIGNED_STARTS]]
-        return _distinct(scan_alignment.align(self._field, points_m, starts, last_scale_m=self._scale_m))
+        return scan_alignment.distinct(scan_alignment.align(self._field, points_m, starts, last_scale_m=self._scale_m))
 
 
 def _within_reach(poses: np.ndarray, mean: np.ndarray, covariance: np.ndarray) -> np.ndarray:
@@ -123,16 +120,3 @@ def _spread(covariance: np.ndarray, shape: PreliminarySamples) -> np.ndarray:
     """(3,) deviations [m, m, rad] within the limits of the starts."""
     return np.clip(np.sqrt(np.diag(covariance)), [shape.sample_min_radius_m] * 2 + [shape.sample_min_heading_rad],
                    [shape.sample_max_radius_m] * 2 + [shape.sample_max_heading_rad])
-
-
-def _distinct(aligned: Alignment) -> Alignment:
-    """The best of each place, best first."""
-    chosen: "list[int]" = []
-    for index in np.argsort(-aligned.fit):
-        off = aligned.poses[chosen] - aligned.poses[index]
-        same = (np.hypot(off[:, 0], off[:, 1]) < _SAME_M) & (np.abs(angles.wrap(off[:, 2])) < _SAME_RAD)
-        if not same.any() and aligned.fit[index] > _AS_GOOD * aligned.fit.max():
-            chosen.append(int(index))
-        if len(chosen) == _KEEP:
-            break
-    return Alignment(aligned.poses[chosen], aligned.information[chosen], aligned.fit[chosen])

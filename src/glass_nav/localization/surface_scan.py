@@ -47,25 +47,27 @@ def of(ranges_m: np.ndarray, case: np.ndarray, references: ReferenceRanges, glas
     if not trusted:
         return SurfaceScan(ranges_m, np.zeros(len(ranges_m), bool), False)
     seen_through, there = glass
+    first_m = references.line_m[0]
     stands = (there > _SURE) & _within_a_wall(references)
     with np.errstate(invalid="ignore"):
-        behind = np.isfinite(references.line_m) & (ranges_m > references.line_m + gate_m)  # also without an answer
+        behind = np.isfinite(first_m) & (ranges_m > first_m + gate_m)  # also without an answer
     explained = np.isin(case, (SPECULAR, FIRST_PENETRATION, SECOND_PENETRATION))
     lost = np.isposinf(ranges_m) & _would_answer(references, max_range_m)
     silent = _UNANSWERED_BY_GLASS * seen_through
     gone_through = silent > _SURE * (silent + _UNANSWERED_BY_WALLS * (1.0 - seen_through))
     known = seen_through * there > _SURE
     cut = behind & (explained | known | stands & (np.isfinite(ranges_m) | gone_through & _in_company(lost)))
-    return SurfaceScan(np.where(cut, references.line_m, ranges_m), cut, True)
+    return SurfaceScan(np.where(cut, first_m, ranges_m), cut, True)
 
 
 def _within_a_wall(references: ReferenceRanges) -> np.ndarray:
     """(B,) bool: the beams to either side meet the same straight wall first; no edge is near that could be missed."""
+    first_m = references.line_m[0]
     with np.errstate(invalid="ignore"):
-        apart_m = np.abs(np.diff(references.line_m * references.cos_incidence[0, 0]))  # as distances from the lidar
-        turned_rad = np.abs(np.diff(references.normal_rad))
+        apart_m = np.abs(np.diff(first_m * references.cos_incidence[0, 0]))  # as distances from the lidar
+        turned_rad = np.abs(np.diff(references.axis_rad[0]))
         same = (apart_m < _SAME_WALL_M) & (np.minimum(turned_rad, np.pi - turned_rad) < _SAME_WALL_RAD)
-    both = np.zeros(len(references.line_m), bool)
+    both = np.zeros(len(first_m), bool)
     both[1:-1] = same[1:] & same[:-1]
     return both
 
@@ -73,7 +75,7 @@ def _within_a_wall(references: ReferenceRanges) -> np.ndarray:
 def _would_answer(references: ReferenceRanges, max_range_m: float) -> np.ndarray:
     """(B,) bool: a wall instead of the first surface would be bright enough: power falls with cosine and distance."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        return _DARK_TO_DIM * references.cos_incidence[0, 0] > (references.line_m / max_range_m) ** 2
+        return _DARK_TO_DIM * references.cos_incidence[0, 0] > (references.line_m[0] / max_range_m) ** 2
 
 
 def _in_company(beams: np.ndarray) -> np.ndarray:

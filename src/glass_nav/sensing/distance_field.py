@@ -49,14 +49,7 @@ class DistanceField:
         Returns:
             distance [m] and its derivatives along x and y of the frame map, each (...).
         """
-        dx, dy = x_m - self._origin[0], y_m - self._origin[1]
-        column = (self._cos * dx + self._sin * dy) / self._resolution_m + 0.5  # of the padded grid
-        row = (self._cos * dy - self._sin * dx) / self._resolution_m + 0.5
-        column = np.clip(column, 0.0, self._last[0] + 0.999)
-        row = np.clip(row, 0.0, self._last[1] + 0.999)
-        left, below = column.astype(np.int32), row.astype(np.int32)
-        right_share, up_share = column - left, row - below
-        at = below * self._stride + left
+        at, right_share, up_share = self._between(x_m, y_m)
         d00, d01 = self._distance[at], self._distance[at + 1]
         d10, d11 = self._distance[at + self._stride], self._distance[at + self._stride + 1]
         lower, upper = d00 + (d01 - d00) * right_share, d10 + (d11 - d10) * right_share
@@ -65,6 +58,29 @@ class DistanceField:
         return (lower + (upper - lower) * up_share,
                 self._cos * along_column - self._sin * along_row,
                 self._sin * along_column + self._cos * along_row)
+
+    def distance(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
+        """The distance of at() alone (...) [m]."""
+        at, right_share, up_share = self._between(x_m, y_m)
+        lower = self._distance[at]
+        lower += (self._distance[at + 1] - lower) * right_share
+        at += self._stride
+        upper = self._distance[at]
+        upper += (self._distance[at + 1] - upper) * right_share
+        upper -= lower
+        upper *= up_share
+        lower += upper
+        return lower
+
+    def _between(self, x_m: np.ndarray, y_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of the four cells around points (...): flat index of the first, and shares of the next column and row."""
+        dx, dy = x_m - self._origin[0], y_m - self._origin[1]
+        column = (self._cos * dx + self._sin * dy) / self._resolution_m + 0.5  # of the padded grid
+        row = (self._cos * dy - self._sin * dx) / self._resolution_m + 0.5
+        column = np.clip(column, 0.0, self._last[0] + 0.999)
+        row = np.clip(row, 0.0, self._last[1] + 0.999)
+        left, below = column.astype(np.int32), row.astype(np.int32)
+        return below * self._stride + left, column - left, row - below
 
 
 def _surface(grid_map: GridMap) -> np.ndarray:
