@@ -23,10 +23,12 @@ from glass_nav.localization.start_pose import StartPose
 from glass_nav.recording.log_file import open_log
 from glass_nav.recording.recording import LogOptions, Recording
 from glass_nav.world import map_file
+from glass_nav.world.grid_map import GridMap
 
 HELP = "run the localization on a recorded log"
 DESCRIPTION = """Runs the localization on a recorded log, every scan of it, and writes metrics.json,
-trajectory.tum, per_scan.csv, beam_cases.npz and trajectory.png; where the log has the truth about its beams, as
+trajectory.tum, per_scan.csv, beam_cases.npz, glass_map.yaml (how glassy each wall cell proved) and
+trajectory.png; where the log has the truth about its beams, as
 simulated ones do, also the scores of the cases and cases.png. Needs no roscore."""
 CASE_NAMES = ("uncertain", "diffuse", "specular", "first penetration", "second penetration")
 
@@ -110,6 +112,8 @@ def main(arguments: argparse.Namespace) -> None:
     about = {"log": str(arguments.log), "map": str(arguments.map), "start": origin, "notes": notes,
              "params": params.as_mapping(settings.mcl), "versions": versions()}
     replay_result.write(result, arguments.out, about)
+    glass = GridMap(mcl.glass_map.occupancy(), grid_map.resolution_m, grid_map.map_from_grid)
+    map_file.save(glass, arguments.out / "glass_map.yaml", image_suffix=".png")
     if not arguments.no_picture:
         image = pictures.MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid)
         pictures.draw_trajectory(arguments.out / "trajectory.png", image, result, recording.name)

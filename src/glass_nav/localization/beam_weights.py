@@ -31,10 +31,10 @@ WEIGHT_MODES = ("field", "ranges")
 class BeamMixture:
     """How often a beam ends where its case says, and how sharply; AMCL's names where it has them."""
     weight_mode: str = "field"
-    laser_max_beams: int = 180
+    laser_max_beams: int = 720
     laser_z_hit: float = 0.95
     laser_z_rand: float = 0.05
-    laser_sigma_hit: float = 0.05        # [m] across the surface, lidar and map together; at least
+    laser_sigma_hit: float = 0.04        # [m] across the surface, lidar and map together; at least
     laser_sigma_hit_max: float = 0.2     # [m] at most: the filter learns how well map and lidar agree
     laser_independent_beams: float = 80.0
 

@@ -18,6 +18,7 @@ from glass_nav.cli.replay_run import Window
 from glass_nav.params import ParamError
 from glass_nav.recording.recording import Recording, Refusal, Step
 from glass_nav.sensing.scan import Scan
+from glass_nav.world import map_file
 
 REPO = Path(__file__).resolve().parents[3]
 RAWLOGS = REPO / "test" / "data" / "mrpt"
@@ -43,7 +44,9 @@ def test_a_replay_follows_the_robot_and_writes_everything(run, room_bag, tmp_pat
     code, out, err = run(room_bag().write())
     assert code == 0
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
-        "metrics.json", "trajectory.tum", "per_scan.csv", "beam_cases.npz", "trajectory.png"}
+        "metrics.json", "trajectory.tum", "per_scan.csv", "beam_cases.npz", "trajectory.png", "glass_map.yaml",
+        "glass_map.png"}
+    assert (map_file.load(tmp_path / "out" / "glass_map.yaml").occupancy >= 0).any()
     result = figures(tmp_path)
     assert result["scans"] == 20
     assert result["scans_refused"] == 0
