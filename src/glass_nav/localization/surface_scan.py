@@ -7,6 +7,7 @@ the robot's way, whatever the lidar sees behind. B beams.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Tuple
 
 import numpy as np
 
@@ -48,7 +49,7 @@ def of(ranges_m: np.ndarray, case: np.ndarray, references: ReferenceRanges, glas
         return SurfaceScan(ranges_m, np.zeros(len(ranges_m), bool), False)
     seen_through, there = glass
     first_m = references.line_m[0]
-    stands = (there > _SURE) & _within_a_wall(references)
+    beside, within = _walls_beside(references)
     with np.errstate(invalid="ignore"):
         behind = np.isfinite(first_m) & (ranges_m > first_m + gate_m)  # also without an answer
     explained = np.isin(case, (SPECULAR, FIRST_PENETRATION, SECOND_PENETRATION))
@@ -56,20 +57,24 @@ def of(ranges_m: np.ndarray, case: np.ndarray, references: ReferenceRanges, glas
     silent = _UNANSWERED_BY_GLASS * seen_through
     gone_through = silent > _SURE * (silent + _UNANSWERED_BY_WALLS * (1.0 - seen_through))
     known = seen_through * there > _SURE
-    cut = behind & (explained | known | stands & (np.isfinite(ranges_m) | gone_through & _in_company(lost)))
+    passed = (there > _SURE) & np.where(np.isfinite(ranges_m), within,
+                                        beside & gone_through & lost & _has_beside(behind))
+    cut = behind & (explained | known | passed)
     return SurfaceScan(np.where(cut, first_m, ranges_m), cut, True)
 
 
-def _within_a_wall(references: ReferenceRanges) -> np.ndarray:
-    """(B,) bool: the beams to either side meet the same straight wall first; no edge is near that could be missed."""
+def _walls_beside(references: ReferenceRanges) -> "Tuple[np.ndarray, np.ndarray]":
+    """(B,) bool each: a beam beside it, and both of them, meet the same straight wall first.
+
+    Where both do, no edge is near that a beam could have missed the wall at.
+    """
     first_m = references.line_m[0]
     with np.errstate(invalid="ignore"):
         apart_m = np.abs(np.diff(first_m * references.cos_incidence[0, 0]))  # as distances from the lidar
         turned_rad = np.abs(np.diff(references.axis_rad[0]))
         same = (apart_m < _SAME_WALL_M) & (np.minimum(turned_rad, np.pi - turned_rad) < _SAME_WALL_RAD)
-    both = np.zeros(len(first_m), bool)
-    both[1:-1] = same[1:] & same[:-1]
-    return both
+    before, after = np.append(False, same), np.append(same, False)
+    return before | after, before & after
 
 
 def _would_answer(references: ReferenceRanges, max_range_m: float) -> np.ndarray:
@@ -78,9 +83,6 @@ def _would_answer(references: ReferenceRanges, max_range_m: float) -> np.ndarray
         return _DARK_TO_DIM * references.cos_incidence[0, 0] > (references.line_m[0] / max_range_m) ** 2
 
 
-def _in_company(beams: np.ndarray) -> np.ndarray:
-    """(B,) bool: those of the beams with another one beside them; a single one may be a fault of the lidar."""
-    beside = np.zeros_like(beams)
-    beside[1:] |= beams[:-1]
-    beside[:-1] |= beams[1:]
-    return beams & beside
+def _has_beside(beams: np.ndarray) -> np.ndarray:
+    """(B,) bool: one of the beams is beside it; a single one without an answer may be a fault of the lidar."""
+    return np.append(False, beams[:-1]) | np.append(beams[1:], False)
