@@ -165,7 +165,8 @@ class Demo(unittest.TestCase):
                         "cmd_vel does not move the robot")
         self.assertTrue(wait_until(lambda: self.blocked.last is not None and self.blocked.last.data, 60.0),
                         f"no obstacle stops the robot, which is at {self.position()}")
-        self.assertTrue(self.lines.having("an obstacle stops the robot at x"))
+        self.assertTrue(wait_until(lambda: self.lines.having("an obstacle stops the robot at x"), 10.0),
+                        "no line about the obstacle")
         self.hear_scans(2)  # the truth comes with the scans, the flag at once
         there = self.position()
         self.hear_scans(10)

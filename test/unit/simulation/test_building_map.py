@@ -114,9 +114,13 @@ def test_seven_buildings_ship():
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_shipped_map_is_what_its_building_draws(name):
-    """After a change: python3 -c "from glass_nav.simulation.building_map import redraw; redraw('maps/NAME')"."""
+    """After a change: python3 -c "from glass_nav.simulation.building_map import redraw; redraw('maps/NAME')".
+
+    A cell that a line just touches may fall either way with another numpy.
+    """
     drawn, shipped = building_map.draw(building_file.load(MAPS / name)), map_file.load(MAPS / name / "map.yaml")
-    np.testing.assert_array_equal(shipped.occupancy, drawn.occupancy)
+    assert shipped.occupancy.shape == drawn.occupancy.shape
+    assert np.mean(shipped.occupancy != drawn.occupancy) < 5e-4
     np.testing.assert_allclose(shipped.map_from_grid, drawn.map_from_grid)
     assert shipped.resolution_m == drawn.resolution_m
 
