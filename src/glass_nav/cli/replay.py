@@ -16,7 +16,7 @@ from glass_nav.cli.progress import Progress
 from glass_nav.cli.replay_params import Frames, ReplayParams
 from glass_nav.cli.replay_run import Window
 from glass_nav.evaluation import pictures, replay_result
-from glass_nav.evaluation.case_scores import NEAR_M
+from glass_nav.evaluation.case_scores import CASE_NAMES, NEAR_M
 from glass_nav.evaluation.replay_result import ReplayResult
 from glass_nav.localization.glass_mcl import GlassMcl
 from glass_nav.localization.start_pose import StartPose
@@ -30,7 +30,6 @@ DESCRIPTION = """Runs the localization on a recorded log, every scan of it, and 
 trajectory.tum, per_scan.csv, beam_cases.npz, glass_map.yaml (how glassy each wall cell proved) and
 trajectory.png; where the log has the truth about its beams, as
 simulated ones do, also the scores of the cases and cases.png. Needs no roscore."""
-CASE_NAMES = ("uncertain", "diffuse", "specular", "first penetration", "second penetration")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

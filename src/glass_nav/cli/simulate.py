@@ -13,6 +13,7 @@ from typing import Optional
 import numpy as np
 
 from glass_nav.cli.progress import Progress
+from glass_nav.evaluation.case_scores import CASE_NAMES
 from glass_nav.recording.bag_writer import BagWriter
 from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings
 from glass_nav.simulation.lidar import ECHOES, LidarModel
@@ -25,7 +26,6 @@ HELP = "drive a robot through a building of glass and record a bag"
 DESCRIPTION = """Drives a robot along a path through a building, and writes a bag of what it records (/scan, /odom, /tf,
 /clock) with the truth beside (/ground_truth, /true_beams: the case of every beam), and the map of the building.
 Needs no roscore. The same seed gives the same bag."""
-CASES = ("uncertain", "diffuse", "specular", "first penetration", "second penetration")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -134,7 +134,7 @@ class _Tally:
         seconds = (self._last_ns - self._first_ns) * 1e-9
         times = seconds / max(time.perf_counter() - self._began_s, 1e-9)
         total = sum(self._cases.values())
-        shares = ", ".join(f"{name} {100.0 * self._cases[case] / total:.1f} %" for case, name in enumerate(CASES))
+        shares = ", ".join(f"{name} {100.0 * self._cases[case] / total:.1f} %" for case, name in enumerate(CASE_NAMES))
         return (f"{self._scans} scans, {self.way_m:.1f} m, {seconds:.1f} s ({times:.0f} times real time); "
                 f"beams: {shares}")
 

@@ -62,32 +62,24 @@ class SurfaceFinder {
   }
 
  private:
-  /// The line of a wall within the patch that gave its normal: cells of the mirror itself, which the staircase of a
-  /// slanted wall puts in the way of the mirrored ray.
-  struct MirrorItself {
+  /// The line of a wall through one of its cells; with a normal of NaN no cell is on it.
+  struct WallLine {
     int width;
     std::int32_t cell;
     double nx, ny;
 
-    bool operator()(std::int32_t other) const {
-      const int dx = other % width - cell % width, dy = other / width - cell / width;
-      const bool near = std::max(std::abs(dx), std::abs(dy)) <= WallNormals::kRadiusCells;
-      return near && std::abs(nx * dx + ny * dy) <= 1.5;  // cells; a wall drawn one to two cells thick
+    bool has(std::int32_t other) const {
+      return std::abs(nx * columns_to(other) + ny * rows_to(other)) <= kHalfThickness;
     }
-  };
-
-  /// The line of the wall that a ray has passed: a flat ray would meet its posts and the steps of its staircase again.
-  struct PassedWall {
-    int width = 1;
-    std::int32_t cell = 0;
-    double nx = 0.0, ny = 0.0;
-    bool has_line = false;
-
-    bool operator()(std::int32_t other) const {
-      if (!has_line) return false;
-      const int dx = other % width - cell % width, dy = other / width - cell / width;
-      return std::abs(nx * dx + ny * dy) <= 1.5;  // cells
+    bool has_nearby(std::int32_t other, int radius) const {
+      return std::max(std::abs(columns_to(other)), std::abs(rows_to(other))) <= radius && has(other);
     }
+
+   private:
+    static constexpr double kHalfThickness = 1.5;  // cells to either side; a wall drawn one to two cells thick
+
+    int columns_to(std::int32_t other) const { return other % width - cell % width; }
+    int rows_to(std::int32_t other) const { return other / width - cell / width; }
   };
 
   /// Sends the rays on to their surface number k; `going` keeps those that meet one.
@@ -102,9 +94,10 @@ class SurfaceFinder {
     if (k == 0) {
       seeker_.seek_all(going.size(), search, NothingIgnored{}, found);
     } else {
-      std::vector<PassedWall> passed(going.size());
-      for (std::size_t j = 0; j < going.size(); ++j) passed[j] = passed_wall(surfaces[going[j]].cell[k - 1]);
-      seeker_.seek_all(going.size(), search, [&](std::size_t j, std::int32_t cell) { return passed[j](cell); }, found);
+      std::vector<WallLine> passed;  // a flat ray would meet the posts and steps of the wall it has passed again
+      for (const std::size_t i : going) passed.push_back(wall_line(surfaces[i].cell[k - 1]));
+      const auto on_passed = [&](std::size_t j, std::int32_t cell) { return passed[j].has(cell); };
+      seeker_.seek_all(going.size(), search, on_passed, found);
     }
     const auto ended = [&](std::size_t i) { return surfaces[i].cell[k] < 0; };
     going.erase(std::remove_if(going.begin(), going.end(), ended), going.end());
@@ -129,7 +122,7 @@ class SurfaceFinder {
   void mirror(const std::vector<std::size_t>& hits, const std::vector<Search>& searches,
               std::vector<Surfaces>& surfaces, double t_max) const {
     std::vector<std::size_t> mirrored;
-    std::vector<MirrorItself> mirrors;
+    std::vector<WallLine> mirrors;
     for (const std::size_t i : hits) {
       surfaces[i].normal = facing(normals_.at(surfaces[i].cell[0]), searches[i].ray);
       if (!usable(surfaces[i].normal)) continue;
@@ -143,7 +136,8 @@ class SurfaceFinder {
           const Ray ray = reflected(searches[mirrored[j]].ray, t, surfaces[mirrored[j]].normal);
           return Search{ray, GridWalk(ray, cells_.width, cells_.height, t_max - t)};
         },
-        [&](std::size_t j, std::int32_t cell) { return mirrors[j](cell); },
+        // Cells of the mirror itself, within the patch that gave its normal: the staircase of a slanted wall.
+        [&](std::size_t j, std::int32_t cell) { return mirrors[j].has_nearby(cell, WallNormals::kRadiusCells); },
         [&](std::size_t j, const GridWalk& walk, std::int32_t met) {
           Surfaces& at = surfaces[mirrored[j]];
           at.mirrored_cell = met;
@@ -151,10 +145,10 @@ class SurfaceFinder {
         });
   }
 
-  PassedWall passed_wall(std::int32_t cell) const {
+  WallLine wall_line(std::int32_t cell) const {
     const WallNormals::Normal normal = normals_.at(cell);
-    if (!usable(normal)) return {};
-    return {cells_.width, cell, normal.x, normal.y, true};
+    if (!usable(normal)) return {cells_.width, cell, std::nan(""), std::nan("")};
+    return {cells_.width, cell, normal.x, normal.y};
   }
 
   static Ray reflected(const Ray& ray, double t, const WallNormals::Normal& normal) {

@@ -12,6 +12,7 @@ from typing import Any, Dict, Optional
 import numpy as np
 
 CASES = 5
+CASE_NAMES = ("uncertain", "diffuse", "specular", "first penetration", "second penetration")
 LEAST_SHARE = 0.01  # of all beams; a case that is rarer counts in no macro F1
 NEAR_M = 0.15       # a beam cut that near the pane shows a costmap where it is
 

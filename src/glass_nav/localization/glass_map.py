@@ -87,7 +87,7 @@ class GlassMap:
         and not a thing that is gone; the priors for -1."""
         at = self._bordered(np.maximum(cell, 0)).ravel()
         log_odds = np.where(cell.ravel() >= 0, self._log_odds[:, at], 0.0)
-        return (1.0 / (1.0 + np.exp(-(self._prior + log_odds)))).reshape(2, *cell.shape)
+        return _chance(self._prior + log_odds).reshape(2, *cell.shape)
 
     def occupancy(self) -> np.ndarray:
         """(H, W) int8 [percent]: how glassy each wall cell proved; -1 where no beam said anything.
@@ -95,7 +95,7 @@ class GlassMap:
         What lets beams pass and never answered any has not proved to be there: at most 50.
         """
         prior = np.stack([self._prior[0], [0.0]])
-        chances = 1.0 / (1.0 + np.exp(-(prior + self._log_odds[:, self._crossed])))
+        chances = _chance(prior + self._log_odds[:, self._crossed])
         percent = np.full(len(self._crossed), UNKNOWN, np.int8)
         percent[self._crossed] = np.rint(100.0 * np.prod(chances, axis=0))
         return percent.reshape(-1, self._stride)[2:-2, 2:-2].copy()
@@ -113,7 +113,7 @@ class GlassMap:
         says = self._says(incidence_rad, passed)
         offsets, weights = self._kernel
         at = (self._bordered(cell)[:, None] + offsets).ravel()
-        share = (np.ones(len(cell))[:, None] * weights).ravel()
+        share = np.tile(weights, len(cell))
         touched, group = np.unique(at, return_inverse=True)
         walls = self._occupied[touched]
         total = np.bincount(group, share)
@@ -141,3 +141,7 @@ class GlassMap:
         step = np.arange(-2, 3)
         ring = np.maximum(np.abs(step)[:, None], np.abs(step))
         return ((step[:, None] * self._stride + step).ravel(), np.array(self._SPREAD)[ring].ravel())
+
+
+def _chance(log_odds: np.ndarray) -> np.ndarray:
+    return 1.0 / (1.0 + np.exp(-log_odds))

@@ -224,18 +224,18 @@ class GlassMcl:
         beams = beam_weights.choose(scan.answered, self._params.proposal.proposal_max_beams)
         if not len(beams):
             return self._vote(scan, best.map_from_base, best.covariance)[0]
-        points = scan.points_in_base()[beams]
+        points = scan.points_in_base()
         if not self._is_one_place(best):
-            fit = scan_alignment.fit(self._field, points, predicted)
+            fit = scan_alignment.fit(self._field, points[beams], predicted)
             self._weights = resampling.normalised(np.log(self._weights) + _NATS_OF_A_FULL_FIT * fit)
             best = pose_estimate.of(predicted, self._weights)
             return self._vote(scan, best.map_from_base, best.covariance)[0]
-        aligned = self._anchor.find(best.map_from_base, best.covariance, odom_from_base, points)
+        aligned = self._anchor.find(best.map_from_base, best.covariance, odom_from_base, points[beams])
         cases, references = self._vote(scan, aligned.poses[0], np.zeros((3, 3)))
         if self._anchor.fits:
             self._learn(scan, references)
         ends = beam_weights.known_ends(cases.case)
-        aligned = self._refined(aligned, best.map_from_base, scan.points_in_base()[ends], len(beams))
+        aligned = self._refined(aligned, best.map_from_base, points[ends], len(beams))
         independent = beam_weights.independent_beams(self._residuals, self._params.mixture)
         beam_information = min(1.0, independent / len(beams)) / self._residuals.sigma_m**2
         self._particles, log_ratio = proposal.draw(predicted, self._weights, best, aligned, beam_information,

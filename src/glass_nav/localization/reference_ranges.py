@@ -16,7 +16,7 @@ import numpy as np
 from glass_nav.geometry import se2
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
-from glass_nav.world.grid_map import UNKNOWN
+from glass_nav.world.grid_map import UNKNOWN, GridMap
 
 LEAST_COS = 0.2  # a surface seen flatter than 78 degrees is no worse placed than at that
 _FIRST, _SECOND = 0, 1
@@ -71,22 +71,20 @@ def of(caster: RayCaster, thickness_m: np.ndarray, samples: np.ndarray, scan: Sc
     axis_rad = np.where((cell[:, 0] >= 0) & (linearity[cell[:, 0]] >= min_linearity), normal_rad[cell[:, 0]], np.nan)
     line_m = _by_line(caster, thickness_m, from_laser[0], beam_rad[0], range_m[:, 0], cell[:, 0], axis_rad)
     face_m = 0.5 * caster.grid_map.resolution_m
+    seen_side = _seen_side(caster.grid_map, cell[:, 0], axis_rad, directions_rad)
     line_m[1] = range_m[1, 0] + face_m / np.maximum(cos[1, 0], LEAST_COS) + 2.0 * face_m * cos[0, 0]
     axis_rad[1] = 2.0 * hits.normal_rad[0] + np.pi - axis_rad[1]
-    return ReferenceRanges(range_m, cos, thickness_m[cell], cell, incidence, line_m, axis_rad, face_m,
-                           _seen_side(caster, cell[:, 0], directions_rad, min_linearity))
+    return ReferenceRanges(range_m, cos, thickness_m[cell], cell, incidence, line_m, axis_rad, face_m, seen_side)
 
 
-def _seen_side(caster: RayCaster, cell: np.ndarray, direction_rad: np.ndarray, min_linearity: float) -> np.ndarray:
+def _seen_side(grid_map: GridMap, cell: np.ndarray, axis_rad: np.ndarray, direction_rad: np.ndarray) -> np.ndarray:
     """(4, B) bool: the side of the cells (4, B) that the beams come from is not unknown.
 
     What a mapper drew it saw from somewhere. A lidar that looks back at a building through its glass meets the outer
     faces of walls, which are on no map: decimetres in front of the inner ones.
     """
-    grid_map = caster.grid_map
-    normal_rad, linearity = caster.normals()
-    facing_rad = np.where(np.cos(direction_rad - normal_rad[cell]) > 0.0, normal_rad[cell] + np.pi, normal_rad[cell])
-    facing_rad = np.where(linearity[cell] >= min_linearity, facing_rad, direction_rad + np.pi)
+    facing_rad = np.where(np.cos(direction_rad - axis_rad) > 0.0, axis_rad + np.pi, axis_rad)
+    facing_rad = np.where(np.isnan(axis_rad), direction_rad + np.pi, facing_rad)
     centre = grid_map.centres(*np.divmod(cell, grid_map.occupancy.shape[1]))
     step = np.stack([np.cos(facing_rad), np.sin(facing_rad)], axis=-1)
     rows, columns = grid_map.cells(centre + _BESIDE_CELLS * grid_map.resolution_m * step)

@@ -16,8 +16,8 @@ from glass_nav.geometry import angles
 from glass_nav.sensing.distance_field import DistanceField
 
 _FIT_SCALE_M = 0.1     # a beam that ends this far from a wall fits by one half
-_KEEP = 4                     # alignments that are different places
-_AS_GOOD = 0.9                # of the best fit: worth particles
+_KEEP = 4              # alignments that are different places
+_AS_GOOD = 0.9         # of the best fit: worth particles
 _SAME_M, _SAME_RAD = 0.05, np.radians(1.5)
 _RIDGE = 1e-3          # keeps directions that no wall constrains where they are
 

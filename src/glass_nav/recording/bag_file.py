@@ -150,12 +150,18 @@ def _scan_topic(bag: _Bag, wanted: Optional[str], notes: List[str]) -> str:
     found = bag.topics_of(SCAN)
     if not found:
         raise RecordingError(f"{bag.path}: no topic of {SCAN}; it has {bag.listing()}")
-    if len(found) > 1 and "/scan" not in found:
-        raise RecordingError(f"{bag.path}: {len(found)} topics of {SCAN} ({', '.join(found)}), "
-                             "choose one with --scan-topic")
-    topic = found[0] if len(found) == 1 else "/scan"
+    topic = _only_or_usual(bag, found, "/scan", f"topics of {SCAN}", "--scan-topic")
     notes.append(f"scans from {topic}")
     return topic
+
+
+def _only_or_usual(bag: _Bag, found: List[str], usual: str, what: str, option: str) -> str:
+    """Of the topics found, at least one, the only one or the one that is usual."""
+    if len(found) == 1:
+        return found[0]
+    if usual not in found:
+        raise RecordingError(f"{bag.path}: {len(found)} {what} ({', '.join(found)}), choose one with {option}")
+    return usual
 
 
 def _frame_tree(bag: _Bag) -> FrameTree:
@@ -250,10 +256,7 @@ def _true_beams_topic(bag: _Bag, wanted: Optional[str], notes: List[str]) -> Opt
                                              if topic.rpartition("/")[2] == "true_cases"]
         if not found:
             return None
-        if len(found) > 1 and "/true_beams" not in found:
-            raise RecordingError(f"{bag.path}: {len(found)} topics with the truth about beams ({', '.join(found)}), "
-                                 "choose one with --true-beams")
-        topic = found[0] if len(found) == 1 else "/true_beams"
+        topic = _only_or_usual(bag, found, "/true_beams", "topics with the truth about beams", "--true-beams")
     notes.append(f"true cases from {topic}")
     return topic
 

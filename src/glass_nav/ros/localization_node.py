@@ -21,7 +21,6 @@ Parameters: LocalizationNodeParams and GlassMclParams, read once; explained in c
 from __future__ import annotations
 
 import logging
-import signal
 import sys
 import threading
 import time
@@ -41,7 +40,7 @@ from visualization_msgs.msg import MarkerArray
 from glass_nav.geometry import se2
 from glass_nav.localization.glass_mcl import Estimate, GlassMcl
 from glass_nav.msg import BeamCases, LocalizationStatus
-from glass_nav.ros import beam_displays, conversions, legend, params, wall_display
+from glass_nav.ros import beam_displays, conversions, endings, legend, params, wall_display
 from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Errand, Mailbox, WaitingScans
@@ -533,12 +532,8 @@ def _refuse_outside(guess: conversions.PoseGuess, grid_map: GridMap) -> None:
 
 def main(name: str = "glass_localization") -> None:
     """Start the node; exit code 2 if a parameter cannot be used."""
-    # rospy's own handler shuts down from within whatever the main thread is doing; within a call of the
-    # parameter server, as in save_pose(), it waits for itself. Ours only asks the loop to end.
     rospy.init_node(name, disable_signals=True)
-    ending = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ending.set())
+    ending = endings.event_on_signals()
     core_log = logging.getLogger("glass_nav")
     core_log.handlers = logging.getLogger("rosout").handlers
     core_log.setLevel(logging.INFO)

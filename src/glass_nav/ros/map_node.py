@@ -11,10 +11,9 @@ import sys
 from typing import Any, List
 
 import rospy
-from nav_msgs.msg import MapMetaData, OccupancyGrid
-from nav_msgs.srv import GetMap, GetMapRequest, GetMapResponse
 
 from glass_nav.ros import conversions
+from glass_nav.ros.served_map import ServedMap
 from glass_nav.world import map_file
 
 
@@ -23,10 +22,8 @@ class MapNode:
 
     def __init__(self, path: str, frame: str) -> None:
         self._frame = conversions.frame_id(frame)
-        self._maps = rospy.Publisher("map", OccupancyGrid, queue_size=1, latch=True)
-        self._metadata = rospy.Publisher("map_metadata", MapMetaData, queue_size=1, latch=True)
+        self._map = ServedMap()
         self._serve(path)
-        rospy.Service("static_map", GetMap, self._answer)
         try:
             from nav_msgs.srv import LoadMap
         except ImportError:  # nav_msgs before 1.14
@@ -36,14 +33,10 @@ class MapNode:
     def _serve(self, path: str) -> None:
         grid_map = map_file.load(path)
         self._msg = conversions.msg_from_map(grid_map, rospy.Time.now(), self._frame)
-        self._maps.publish(self._msg)
-        self._metadata.publish(self._msg.info)
+        self._map.give(self._msg)
         info = self._msg.info
         rospy.loginfo(f"{path}: {info.width} x {info.height} cells of {info.resolution:g} m, "
                       f"frame {self._frame!r}")
-
-    def _answer(self, _request: GetMapRequest) -> GetMapResponse:
-        return GetMapResponse(self._msg)
 
     def _change(self, request: Any) -> Any:
         from nav_msgs.srv import LoadMapResponse

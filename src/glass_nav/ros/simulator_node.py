@@ -14,7 +14,6 @@ Parameters: SimulatorNodeParams, read once; explained in config/simulator.yaml.
 from __future__ import annotations
 
 import math
-import signal
 import sys
 import threading
 import time
@@ -25,8 +24,7 @@ import numpy as np
 import rospy
 import tf2_ros
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist
-from nav_msgs.msg import MapMetaData, OccupancyGrid, Odometry
-from nav_msgs.srv import GetMap, GetMapResponse
+from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
@@ -34,10 +32,11 @@ from tf2_msgs.msg import TFMessage
 
 from glass_nav import params
 from glass_nav.msg import TrueBeams
-from glass_nav.ros import conversions, frame_messages
+from glass_nav.ros import conversions, endings, frame_messages
 from glass_nav.ros.frame_messages import FrameNames
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Mailbox
+from glass_nav.ros.served_map import ServedMap
 from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings
 from glass_nav.simulation.path_follower import FollowerParams, PathFollower
 from glass_nav.simulation.robot import RobotParams
@@ -237,15 +236,11 @@ class SimulatorNode:
             publish(frame_messages.initial_pose_msg(frame, names))
 
     def _serve_map(self) -> None:
-        """As map_node does, of what the package draws of the building."""
+        """What the package draws of the building."""
         stamp = conversions.stamp_from_ns(self._simulation.stamp_ns)
         grid_map = building_map.draw(self._simulation.building, self._p.map_resolution_m)
-        msg = conversions.msg_from_map(grid_map, stamp, self._names.map)
-        self._maps = rospy.Publisher("map", OccupancyGrid, queue_size=1, latch=True)
-        self._metadata = rospy.Publisher("map_metadata", MapMetaData, queue_size=1, latch=True)
-        self._maps.publish(msg)
-        self._metadata.publish(msg.info)
-        rospy.Service("static_map", GetMap, lambda _: GetMapResponse(msg))
+        self._map = ServedMap()
+        self._map.give(conversions.msg_from_map(grid_map, stamp, self._names.map))
 
     def _await_answer(self, ending: threading.Event) -> None:
         """Let the localization keep up: wait for its transform of this scan, unless it has fallen silent."""
@@ -285,10 +280,8 @@ def _drive(p: SimulatorNodeParams) -> _Drive:
 
 def main() -> None:
     """Start the node; exit code 2 if a parameter cannot be used."""
-    rospy.init_node("simulator", disable_signals=True)  # why: see localization_node.main()
-    ending = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ending.set())
+    rospy.init_node("simulator", disable_signals=True)
+    ending = endings.event_on_signals()
     given: Dict[str, Any] = rospy.get_param("~", {})
     try:
         node = SimulatorNode(params.load(SimulatorNodeParams, given, rospy.get_name()))
