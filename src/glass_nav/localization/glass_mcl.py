@@ -8,11 +8,11 @@ the beams that are understood. GlassMcl.update() reads as the document does.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Optional, Tuple
+from typing import Dict, Optional, Set, Tuple
 
 import numpy as np
 
-from glass_nav.geometry import angles, se2
+from glass_nav.geometry import angles, polygons, se2
 from glass_nav.localization import (beam_cases, beam_weights, glass_map, motion, pose_estimate, pose_quality,
                                     preliminary_samples, proposal, reference_ranges, resampling,
                                     scan_alignment, surface_scan)
@@ -101,6 +101,7 @@ class Estimate:
     reason: str                 # the state in words
     used_share: float           # share of the answering beams that a case 1-4 explains
     updated: bool               # whether this scan moved the particles
+    reliability: float = float("nan")  # chance that the pose is right, 0..1
 
 
 class GlassMcl:
@@ -122,9 +123,9 @@ class GlassMcl:
         self._odom_from_base: Optional[np.ndarray] = None  # at that update
         self._best: pose_estimate.PoseEstimate           # once started
         self._map_from_odom = np.zeros(3)                 # since the last update of the particles
-        self._stamp_ns: Optional[int] = None
+        self._stamps_ns: Dict[str, int] = {}              # of the last scan of each lidar
         self._quality = pose_quality.PoseQuality(params.quality)
-        self._update_due = True
+        self._up_to_date: Set[str] = set()                # lidars that had an update since the robot moved
         self._updates = 0
 
     def set_map(self, grid_map: GridMap) -> None:
@@ -136,7 +137,15 @@ class GlassMcl:
         self._anchor = ScanAnchor(self._field)
         self._residuals = RangeResiduals(0.5, self._params.mixture.laser_sigma_hit)
         self._glass_map = GlassMap(grid_map, self._params.glass)
-        self._update_due = True
+        self._up_to_date = set()
+
+    def reconfigure(self, params: GlassMclParams) -> None:
+        """Other parameters from the next scan on; the particles, the glass map and what the filter learnt stay."""
+        if params.schedule.raycast_threads != self._params.schedule.raycast_threads:
+            self._caster = RayCaster(self._grid_map, threads=params.schedule.raycast_threads)
+        self._glass_map.weigh_by(params.glass)
+        self._quality._limits = params.quality
+        self._params = params
 
     @property
     def glass_map(self) -> GlassMap:
@@ -170,15 +179,24 @@ class GlassMcl:
         particles[:, 2] = angles.wrap(particles[:, 2])
         self._start_with(particles, searching=False)
 
-    def scatter(self) -> None:
+    def scatter(self, area: Optional[np.ndarray] = None) -> None:
         """Start over anywhere in the free cells of the map (service global_localization).
 
+        Args:
+            area: (N, 2) corners [m, in map] of a polygon; the robot is in it. None: anywhere.
+
         Raises:
-            ValueError: the map has no free cell; nothing is changed then.
+            ValueError: the area is no polygon, or there is no free cell; nothing is changed then.
         """
         rows, columns = np.nonzero(self._grid_map.free)
+        if area is not None:
+            area = np.asarray(area, float)
+            if area.ndim != 2 or area.shape[1] != 2 or len(area) < 3 or not np.all(np.isfinite(area)):
+                raise ValueError(f"an area needs at least 3 corners of finite x, y, got {area.tolist()}")
+            within = polygons.inside(area, self._grid_map.centres(rows, columns))
+            rows, columns = rows[within], columns[within]
         if not len(rows):
-            raise ValueError("the map has no free cell to put particles on")
+            raise ValueError(f"the {'map' if area is None else 'area'} has no free cell to put particles on")
         count = self._params.count.max_particles
         chosen = self._rng.integers(len(rows), size=count)
         inside = self._rng.uniform(-0.5, 0.5, (2, count))
@@ -187,8 +205,8 @@ class GlassMcl:
         self._start_with(np.column_stack([points, yaw]), searching=True)
 
     def request_update(self) -> None:
-        """The next scan is used even if the robot did not move (service request_nomotion_update)."""
-        self._update_due = True
+        """The next scan of each lidar is used even if the robot did not move (service request_nomotion_update)."""
+        self._up_to_date = set()
 
     def update(self, scan: Scan, odom_from_base: np.ndarray) -> Estimate:
         """One scan and the odometry at its stamp -> pose.
@@ -203,7 +221,7 @@ class GlassMcl:
         """
         scan = scan.limited(self._params.limits.laser_min_range, self._params.limits.laser_max_range)
         odom_from_base = self._checked(scan, odom_from_base)
-        if not self._is_due(odom_from_base):
+        if not self._is_due(scan.lidar, odom_from_base):
             map_from_base = se2.compose(self._map_from_odom, odom_from_base)
             cases, references = self._vote(scan, map_from_base, self._best.covariance)
             return self._estimate(scan, odom_from_base, cases, references)
@@ -213,7 +231,7 @@ class GlassMcl:
         self._resample()
         self._map_from_odom = se2.compose(self._best.map_from_base, se2.inverse(odom_from_base))
         self._odom_from_base = odom_from_base
-        self._update_due = False
+        self._up_to_date.add(scan.lidar)
         map_from_base = se2.compose(self._map_from_odom, odom_from_base)  # the vote was held at the aligned pose
         return self._estimate(scan, odom_from_base, cases, self._references(scan, map_from_base[None]), updated=True)
 
@@ -268,17 +286,20 @@ class GlassMcl:
         if odom_from_base.shape != (3,) or not np.all(np.isfinite(odom_from_base)):
             raise ScanError(f"scan at {scan.stamp_ns * 1e-9:.3f} s: odometry must be finite x, y, yaw, "
                             f"got {odom_from_base}")
-        if self._stamp_ns is not None and scan.stamp_ns < self._stamp_ns:
+        last_ns = self._stamps_ns.get(scan.lidar, scan.stamp_ns)
+        if scan.stamp_ns < last_ns:
             raise ScanError(f"scan at {scan.stamp_ns * 1e-9:.3f} s: time runs backwards, the last scan was "
-                            f"at {self._stamp_ns * 1e-9:.3f} s")
-        self._stamp_ns = scan.stamp_ns
+                            f"at {last_ns * 1e-9:.3f} s")
+        self._stamps_ns[scan.lidar] = scan.stamp_ns
         return odom_from_base
 
-    def _is_due(self, odom_from_base: np.ndarray) -> bool:
-        if self._update_due or self._odom_from_base is None:
-            return True
-        way, turn = motion.travelled(se2.compose(se2.inverse(self._odom_from_base), odom_from_base))
-        return way >= self._params.schedule.update_min_d or turn >= self._params.schedule.update_min_a
+    def _is_due(self, lidar: str, odom_from_base: np.ndarray) -> bool:
+        """As in AMCL: after enough way or turn, each lidar has one update."""
+        if self._odom_from_base is not None:
+            way, turn = motion.travelled(se2.compose(se2.inverse(self._odom_from_base), odom_from_base))
+            if way >= self._params.schedule.update_min_d or turn >= self._params.schedule.update_min_a:
+                self._up_to_date = set()
+        return lidar not in self._up_to_date
 
     def _predict(self, odom_from_base: np.ndarray) -> np.ndarray:
         if self._odom_from_base is None:  # the first scan: nothing to move from
@@ -344,7 +365,7 @@ class GlassMcl:
         state, reason = self._quality.judge(self._best)
         surfaces = self._surfaces(scan, cases, references, state == pose_quality.LOCALIZED)
         return Estimate(scan.stamp_ns, map_from_base, self._best.covariance, self._map_from_odom, cases, surfaces,
-                        self._particles, state, reason, used_share, updated)
+                        self._particles, state, reason, used_share, updated, reliability=used_share)
 
     def _surfaces(self, scan: Scan, cases: BeamCases, references: ReferenceRanges, trusted: bool) -> SurfaceScan:
         """The scan cut at glass; references are of the pose that is told."""
@@ -358,7 +379,7 @@ class GlassMcl:
         self._weights = np.full(len(particles), 1.0 / len(particles))
         self._best = pose_estimate.of(particles, self._weights)
         self._odom_from_base = None
-        self._stamp_ns = None
+        self._stamps_ns = {}
         self._anchor = ScanAnchor(self._field)
         self._quality = pose_quality.PoseQuality(self._params.quality, searching)
-        self._update_due = True
+        self._up_to_date = set()

@@ -23,6 +23,7 @@ class Scan:
     range_min_m: float
     range_max_m: float
     base_from_laser: np.ndarray  # (3,) planar pose of the laser on the robot
+    lidar: str = ""              # which one of several: by its frame
 
     def __len__(self) -> int:
         return len(self.ranges_m)
@@ -61,7 +62,7 @@ class Scan:
 
 def scan_from_fields(stamp_ns: int, ranges_m: np.ndarray, angle_min_rad: float,
                      angle_increment_rad: float, range_min_m: float, range_max_m: float,
-                     base_from_laser: np.ndarray, upside_down: bool = False) -> Scan:
+                     base_from_laser: np.ndarray, upside_down: bool = False, lidar: str = "") -> Scan:
     """The fields of a LaserScan as a Scan, by REP 117.
 
     A range at or beyond range_max is +inf (nothing met), one below range_min -inf (too near),
@@ -75,6 +76,7 @@ def scan_from_fields(stamp_ns: int, ranges_m: np.ndarray, angle_min_rad: float,
         range_min_m, range_max_m: the sensor's limits.
         base_from_laser: (3,) planar pose of the laser on the robot.
         upside_down: the laser's z points down; its angles run clockwise seen from above.
+        lidar: name of the lidar where there are several.
 
     Raises:
         ScanError: no beams, or fields that describe no lidar.
@@ -100,4 +102,4 @@ def scan_from_fields(stamp_ns: int, ranges_m: np.ndarray, angle_min_rad: float,
         ranges_m[ranges_m < range_min_m] = -np.inf
         ranges_m[failed] = np.nan
     return Scan(int(stamp_ns), ranges_m, -angles_rad if upside_down else angles_rad,
-                float(range_min_m), float(range_max_m), np.asarray(base_from_laser, float))
+                float(range_min_m), float(range_max_m), np.asarray(base_from_laser, float), lidar)
