@@ -53,4 +53,4 @@ def load(path: Path) -> "Tuple[ReplayParams, List[str]]":
     if not isinstance(mapping, dict):
         raise ParamError(f"{path}: must hold names and values, got {type(mapping).__name__}")
     ours, unused = amcl_parameters.without_unused(mapping, ReplayParams, NODE_ONLY)
-    return params.load(ReplayParams, ours, str(path)), unused
+    return params.load(ReplayParams, amcl_parameters.adapted(ours, ReplayParams), str(path)), unused
