@@ -1,8 +1,5 @@
 #!/usr/bin/env python3
-"""The running node's services, its answers to bad input, its start and its end, on a simulated scan of a room.
-
-The room's map is turned in its frame (an origin with yaw), and served by this file as static_map.
-"""
+"""The running node's services, its answers to bad input, its start and its end, on a simulated scan of a room."""
 
 from __future__ import annotations
 
@@ -10,123 +7,24 @@ import math
 import re
 import signal
 import sys
-import threading
-import time
-import unittest
 from pathlib import Path
-from typing import Any, Callable, Optional
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import numpy as np
 import rospy
 import rostest
-import tf2_ros
 from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped, Quaternion
 from nav_msgs.msg import OccupancyGrid
-from nav_msgs.srv import GetMap, GetMapResponse, SetMap, SetMapRequest
-from rostest_support import Heard, LogLines, Process, wait_until
-from sensor_msgs.msg import LaserScan
+from nav_msgs.srv import SetMap, SetMapRequest
+from room_robot import BEAMS, changed, pose_message
+from room_test import RoomTest
+from rostest_support import Heard, wait_until
 from std_srvs.srv import Empty
-from tf2_msgs.msg import TFMessage
 
-from glass_nav.geometry import angles, se2
 from glass_nav.msg import LocalizationStatus
 from glass_nav.ros import conversions
-from glass_nav.sensing.raycast import RayCaster
-from glass_nav.world.grid_map import GridMap
-
-MAP_FROM_ODOM = np.array([1.0, 2.0, 0.5])
-BEAMS = np.linspace(-2.0, 2.0, 181)
-RATE_HZ = 10.0
-
-
-def room() -> GridMap:
-    """10 x 7 m of free space, a cabinet in one corner so that it looks the same from nowhere else."""
-    occupancy = np.zeros((150, 210), dtype=np.int8)
-    occupancy[:5], occupancy[-5:], occupancy[:, :5], occupancy[:, -5:] = 100, 100, 100, 100
-    occupancy[100:, 150:] = 100
-    return GridMap(occupancy, 0.05, np.array([-1.0, -2.0, 0.4]))
-
-
-class Robot:
-    """Drives a circle in the room and publishes tf and scans by the wall clock."""
-
-    def __init__(self, grid_map: GridMap, caster: Any = None) -> None:
-        self._caster = RayCaster(grid_map) if caster is None else caster
-        self._centre = se2.compose(grid_map.map_from_grid, np.array([4.5, 3.2, 0.0]))
-        self._turned_rad = 0.0
-        self._steps = 0
-        self.moving = True
-        self.silent = False
-        self.upside_down = False
-        self.spoil: Callable[[LaserScan], Optional[LaserScan]] = lambda msg: msg
-        self._scans = rospy.Publisher("scan", LaserScan, queue_size=10)
-        self._broadcaster = tf2_ros.TransformBroadcaster()
-        threading.Thread(target=self._run, daemon=True).start()
-
-    def map_from_base(self) -> np.ndarray:
-        """Where the robot truly is."""
-        turned = self._turned_rad
-        return se2.compose(self._centre, np.array([1.2 * math.cos(turned), 1.2 * math.sin(turned),
-                                                   turned + math.pi / 2]))
-
-    def _run(self) -> None:
-        while not rospy.is_shutdown():
-            self._step(rospy.Time.now())
-            self._steps += 1
-            time.sleep(1.0 / RATE_HZ)
-
-    def make_steps(self, count: int) -> None:
-        """Returns after so many more turns of the lidar."""
-        wanted = self._steps + count
-        if not wait_until(lambda: self._steps >= wanted, 30.0):
-            raise AssertionError(f"the robot of the test made no {count} steps within 30 s")
-
-    def _step(self, stamp: rospy.Time) -> None:
-        if self.moving:
-            self._turned_rad += 0.25 / RATE_HZ
-        stamp_ns = conversions.ns_from_stamp(stamp)
-        odom_from_base = se2.compose(se2.inverse(MAP_FROM_ODOM), self.map_from_base())
-        mounting = np.array([0.2, 0.0, 0.3])
-        laser = conversions.transform_stamped(stamp_ns, "base_link", "laser", mounting)
-        if self.upside_down:  # turned about its own x axis by pi, after the yaw of 0.3
-            laser.transform.rotation = Quaternion(math.cos(0.15), math.sin(0.15), 0.0, 0.0)
-        self._broadcaster.sendTransform(
-            [conversions.transform_stamped(stamp_ns, "odom", "base_link", odom_from_base), laser])
-        if self.silent:
-            return
-        map_from_laser = se2.compose(self.map_from_base(), mounting)
-        bearings = -BEAMS if self.upside_down else BEAMS
-        ranges = self._caster.cast(map_from_laser[None], bearings, 20.0)[0]
-        msg = LaserScan(header=conversions.header(stamp_ns, "/laser"), angle_min=BEAMS[0], angle_max=BEAMS[-1],
-                        angle_increment=BEAMS[1] - BEAMS[0], range_min=0.05, range_max=20.0,
-                        ranges=ranges.tolist())
-        spoilt = self.spoil(msg)
-        if spoilt is not None:
-            self._scans.publish(spoilt)
-
-
-def pose_message(planar: np.ndarray, variance: float = 0.01) -> PoseWithCovarianceStamped:
-    msg = PoseWithCovarianceStamped()
-    msg.header.frame_id, msg.header.stamp = "map", rospy.Time.now()
-    msg.pose.pose = conversions.pose_from_planar(planar)
-    spatial = np.zeros((6, 6))
-    spatial[[0, 1, 5], [0, 1, 5]] = variance
-    msg.pose.covariance = spatial.ravel().tolist()
-    return msg
-
-
-def changed(msg: Any, **values: Any) -> Any:
-    """The message with fields set by dotted name, dots written as __."""
-    for name, value in values.items():
-        *parents, last = name.split("__")
-        part = msg
-        for parent in parents:
-            part = getattr(part, parent)
-        setattr(part, last, value)
-    return msg
-
 
 def with_covariance(msg: PoseWithCovarianceStamped, row: int, column: int, value: float) -> PoseWithCovarianceStamped:
     spatial = np.array(msg.pose.covariance).reshape(6, 6)
@@ -135,61 +33,13 @@ def with_covariance(msg: PoseWithCovarianceStamped, row: int, column: int, value
     return msg
 
 
-class LocalizationInterface(unittest.TestCase):
+class LocalizationInterface(RoomTest):
 
     @classmethod
     def setUpClass(cls) -> None:
-        cls.grid_map = room()
-        cls.lines = LogLines()
-        cls.poses = Heard("amcl_pose", PoseWithCovarianceStamped)
-        cls.status = Heard("/glass_localization/status", LocalizationStatus)
+        super().setUpClass()
         cls.particles = Heard("particlecloud", PoseArray)
-        cls.transforms = Heard("/tf", TFMessage, lambda msg: msg.transforms[0].header.frame_id == "map")
-        cls.initialpose = rospy.Publisher("initialpose", PoseWithCovarianceStamped, queue_size=1)
-        cls.map_msg = conversions.msg_from_map(cls.grid_map, rospy.Time.now(), "map")
-        rospy.Service("static_map", GetMap, lambda _: GetMapResponse(cls.map_msg))
-        cls.robot = Robot(cls.grid_map)
-        for service in ("global_localization", "request_nomotion_update", "set_map"):
-            rospy.wait_for_service(service, timeout=20.0)
         cls.set_map = rospy.ServiceProxy("set_map", SetMap)
-
-    def setUp(self) -> None:
-        self.robot.moving, self.robot.silent, self.robot.upside_down = True, False, False
-        self.robot.spoil = lambda msg: msg
-        self.assertTrue(wait_until(self.initialpose.get_num_connections, 20.0), "nobody listens to initialpose")
-        self.assertTrue(wait_until(lambda: len(self.transforms), 20.0), "no map -> odom within 20 s")
-        self.poses.clear()
-        self.initialpose.publish(pose_message(self.robot.map_from_base()))
-        self.expect_right_pose()
-        self.lines.clear()
-
-    def tearDown(self) -> None:
-        for msg in self.transforms.all:
-            numbers = conversions.planar_from_transform(msg.transforms[0].transform)  # raises on NaN
-            self.assertTrue(np.all(np.isfinite(numbers)))
-        for msg in self.poses.all:
-            conversions.planar_from_pose(msg.pose.pose)
-            self.assertTrue(np.all(np.isfinite(msg.pose.covariance)))
-
-    def error_m(self) -> float:
-        """How far the last map -> odom puts the robot off; its yaw counts as 1 m per rad."""
-        map_from_odom = conversions.planar_from_transform(self.transforms.last.transforms[0].transform)
-        truth = self.robot.map_from_base()
-        odom_from_base = se2.compose(se2.inverse(MAP_FROM_ODOM), truth)
-        off = se2.compose(map_from_odom, odom_from_base) - truth
-        return float(np.hypot(off[0], off[1]) + abs(angles.wrap(off[2])))
-
-    def expect_right_pose(self, timeout_s: float = 10.0) -> None:
-        """A transform of a scan from now on puts the robot where it is."""
-        self.transforms.clear()
-        self.assertTrue(wait_until(lambda: len(self.transforms) and self.error_m() < 0.25, timeout_s),
-                        f"no right pose within {timeout_s:g} s; heard {len(self.transforms)} transforms, "
-                        f"error {self.error_m() if len(self.transforms) else math.nan:.2f} m; "
-                        f"{self.lines.having('')[-5:]}")
-
-    def expect_line(self, *words: str) -> None:
-        self.assertTrue(wait_until(lambda: self.lines.having(*words), 15.0),
-                        f"no log line with {words}; there are {self.lines.having('')[-10:]}")
 
     # -- services
 
@@ -359,11 +209,11 @@ class LocalizationInterface(unittest.TestCase):
         self.expect_right_pose()
 
     def test_silence_of_the_scan_is_told_in_the_status(self) -> None:
-        self.robot.silent = True
+        self.robot.lidar.silent = True
         self.assertTrue(wait_until(lambda: self.status.last.reason.startswith("no scan on /scan for"), 10.0),
                         str(self.status.last))
         self.assertEqual(self.status.last.state, LocalizationStatus.UNCERTAIN)
-        self.robot.silent = False
+        self.robot.lidar.silent = False
         self.expect_right_pose()
 
     def test_stamps_of_other_times_do_no_harm(self) -> None:
@@ -376,11 +226,11 @@ class LocalizationInterface(unittest.TestCase):
                 self.expect_right_pose()  # and not only when the stamps have caught up
 
     def test_a_laser_that_hangs_upside_down(self) -> None:
-        self.robot.silent = True
+        self.robot.lidar.silent = True
         self.robot.make_steps(2)
-        self.robot.upside_down = True
+        self.robot.lidar.upside_down = True
         self.robot.make_steps(2)  # no interpolation between the two mountings
-        self.robot.silent = False
+        self.robot.lidar.silent = False
         self.initialpose.publish(pose_message(self.robot.map_from_base()))
         self.robot.make_steps(20)
         self.expect_right_pose()
@@ -388,12 +238,6 @@ class LocalizationInterface(unittest.TestCase):
         self.assertGreater(self.status.last.used_share, 0.8)
 
     # -- start and end of a node of its own
-
-    def start(self, name: str, *private: str, script: str = "localization_node") -> Process:
-        return Process(script, f"__name:={name}", "_tf_broadcast:=false", f"amcl_pose:=/{name}/pose",
-                       f"particlecloud:=/{name}/particlecloud", f"set_map:=/{name}/set_map",
-                       f"global_localization:=/{name}/global_localization",
-                       f"request_nomotion_update:=/{name}/request_nomotion_update", *private)
 
     def test_an_unknown_parameter_ends_the_start(self) -> None:
         code, printed = self.start("misspelt", "_min_particle:=100").wait(30.0)

@@ -13,6 +13,7 @@ from io import BytesIO
 import numpy as np
 import rospy
 from geometry_msgs.msg import (
+    PolygonStamped,
     Pose,
     PoseArray,
     PoseWithCovarianceStamped,
@@ -194,7 +195,7 @@ def scan_from_msg(msg: LaserScan, mounting: Mounting) -> Scan:
     """
     return scan_from_fields(ns_from_stamp(msg.header.stamp), np.array(msg.ranges, float), msg.angle_min,
                             msg.angle_increment, msg.range_min, msg.range_max, mounting.base_from_laser,
-                            mounting.upside_down)
+                            mounting.upside_down, frame_id(msg.header.frame_id))
 
 
 # What the `intensities` of scan_surfaces say of a beam.
@@ -296,9 +297,21 @@ def is_finite(estimate: Estimate) -> bool:
                 and np.all(np.isfinite(estimate.covariance)))
 
 
-def status_msg(stamp_ns: int, map_frame: str, state: str, reason: str,
-               used_share: float) -> LocalizationStatus:
-    return LocalizationStatus(header(stamp_ns, map_frame), STATES[state], state, reason, used_share)
+def status_msg(stamp_ns: int, map_frame: str, state: str, reason: str, used_share: float,
+               reliability: float) -> LocalizationStatus:
+    return LocalizationStatus(header(stamp_ns, map_frame), STATES[state], state, reason, used_share, reliability)
+
+
+def area_from_msg(msg: PolygonStamped, map_frame: str) -> np.ndarray:
+    """(N, 2) corners [m, in map] of an area to search; ValueError if it is none."""
+    if frame_id(msg.header.frame_id) != map_frame:
+        raise ValueError(f"the area must be given in frame {map_frame!r}, got {msg.header.frame_id!r}")
+    corners = np.array([(point.x, point.y) for point in msg.polygon.points], float).reshape(-1, 2)
+    if len(corners) < 3:
+        raise ValueError(f"an area needs at least 3 corners, got {len(corners)}")
+    if not np.all(np.isfinite(corners)):
+        raise ValueError(f"the corners of an area must be finite, got {corners.tolist()}")
+    return corners
 
 
 def beam_cases_msg(scan_header: Header, cases: BeamCases) -> BeamCasesMsg:

@@ -18,10 +18,14 @@ class Diagnostics:
 
     def __init__(self, p: LocalizationNodeParams, counts: ScanCounts) -> None:
         self._name = rospy.get_name().strip("/")
-        self._levels = np.array([p.std_warn_level_x, p.std_warn_level_y, p.std_warn_level_yaw])
         self._counts = counts
+        self.reconfigure(p)
         self._cpu_s: List[float] = []  # of the updates since the last report
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=2)
+
+    def reconfigure(self, p: LocalizationNodeParams) -> None:
+        """Other parameters from now on."""
+        self._levels = np.array([p.std_warn_level_x, p.std_warn_level_y, p.std_warn_level_yaw])
 
     def add_update(self, cpu_s: float) -> None:
         """The filter took that much CPU time for one scan."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from io import BytesIO
 
 import numpy as np
 import pytest
 import rospy
-from geometry_msgs.msg import Pose, PoseArray, PoseWithCovarianceStamped, Quaternion, Transform, Vector3
+from geometry_msgs.msg import (Point32, PolygonStamped, Pose, PoseArray, PoseWithCovarianceStamped, Quaternion,
+                               Transform, Vector3)
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
@@ -170,8 +172,32 @@ def test_an_estimate_with_nan_is_told_from_one_without(field):
 
 
 def test_the_status_says_the_state_as_number_and_word():
-    msg = sent_and_received(conversions.status_msg(7, "map", "LOST", "nothing fits", 0.1))
+    msg = sent_and_received(conversions.status_msg(7, "map", "LOST", "nothing fits", 0.1, 0.25))
     assert (msg.state, msg.state_name, msg.reason) == (LocalizationStatus.LOST, "LOST", "nothing fits")
+    assert (msg.used_share, msg.reliability) == pytest.approx((0.1, 0.25))
+
+
+def area(*corners, frame="/map"):
+    msg = PolygonStamped(header=Header(frame_id=frame))
+    msg.polygon.points = [Point32(x, y, 0.0) for x, y in corners]
+    return msg
+
+
+def test_an_area_is_its_corners():
+    corners = conversions.area_from_msg(area((0.0, 0.0), (2.0, 0.0), (2.0, 1.5)), "map")
+    assert corners.tolist() == [[0.0, 0.0], [2.0, 0.0], [2.0, 1.5]]
+
+
+@pytest.mark.parametrize("msg, text", [
+    (area((0.0, 0.0), (1.0, 0.0)), "an area needs at least 3 corners, got 2"),
+    (area(), "an area needs at least 3 corners, got 0"),
+    (area((0.0, 0.0), (1.0, 0.0), (math.nan, 1.0)), "the corners of an area must be finite, got [[0.0, 0.0], "
+                                                    "[1.0, 0.0], [nan, 1.0]]"),
+    (area((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), frame="odom"), "the area must be given in frame 'map', got 'odom'")])
+def test_an_area_that_is_none_is_refused(msg, text):
+    with pytest.raises(ValueError) as err:
+        conversions.area_from_msg(msg, "map")
+    assert str(err.value) == text
 
 
 def test_beam_cases_arrive_beam_by_beam():
