@@ -17,7 +17,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap, GetMapResponse
 from room_robot import Robot, pose_message, room
-from rostest_support import Heard, LogLines, wait_until
+from rostest_support import Heard, LogLines, part, wait_until
 
 from glass_nav.msg import LocalizationStatus
 from glass_nav.ros import conversions
@@ -47,14 +47,14 @@ class AmclLaunchFiles(unittest.TestCase):
 
     def test_each_of_them_localizes_the_robot(self) -> None:
         for name in ROBOTS:
-            with self.subTest(name):
+            with part(name):
                 self.assertTrue(wait_until(self.starts[name].get_num_connections, 30.0),
                                 "nobody listens to initialpose")
                 self.assertTrue(wait_until(lambda name=name: self.poses[name].last is not None, 30.0), "no amcl_pose")
                 self.starts[name].publish(pose_message(self.robot.map_from_base()))
         self.robot.make_steps(20)
         for name in ROBOTS:
-            with self.subTest(name):
+            with part(name):
                 def is_right(name: str = name) -> bool:
                     said = conversions.planar_from_pose(self.poses[name].last.pose.pose)
                     return bool(np.hypot(*(said - self.robot.map_from_base())[:2]) < 0.35)

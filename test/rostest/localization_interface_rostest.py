@@ -20,7 +20,7 @@ from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import SetMap, SetMapRequest
 from room_robot import BEAMS, changed, pose_message
 from room_test import RoomTest
-from rostest_support import Heard, wait_until
+from rostest_support import Heard, part, wait_until
 from std_srvs.srv import Empty
 
 from glass_nav.msg import LocalizationStatus
@@ -83,7 +83,7 @@ class LocalizationInterface(RoomTest):
                  pose_message(here), "origin"),
                 (fresh(), changed(pose_message(here), header__frame_id="odom"), "frame 'map'"),
                 (fresh(), pose_message(outside), "outside the map")):
-            with self.subTest(words):
+            with part(words):
                 self.lines.clear()
                 self.assertFalse(self.set_map(SetMapRequest(msg, pose)).success)
                 self.expect_line("set_map refused", words)
@@ -91,7 +91,7 @@ class LocalizationInterface(RoomTest):
 
     def test_maps_without_walls_or_without_room_do_no_harm(self) -> None:
         for value in (0, -1, 100):
-            with self.subTest(value):
+            with part(f"cells of {value}"):
                 msg = changed(conversions.msg_from_map(self.grid_map, rospy.Time.now(), "map"), data=[value] * 31500)
                 self.set_map(SetMapRequest(msg, pose_message(self.robot.map_from_base())))
                 self.transforms.clear()
@@ -142,7 +142,7 @@ class LocalizationInterface(RoomTest):
                 ("frame 'map', got 'odom'", changed(pose_message(here), header__frame_id="odom")),
                 ("frame 'map', got ''", changed(pose_message(here), header__frame_id="")),
                 ("outside the map", pose_message(np.array([1e4, 0.0, 0.0])))):
-            with self.subTest(words):
+            with part(words):
                 self.lines.clear()
                 self.initialpose.publish(msg)
                 self.expect_line("initialpose refused", words)
@@ -192,7 +192,7 @@ class LocalizationInterface(RoomTest):
                 (None, {"ranges": [-math.inf] * n}),
                 (None, {"ranges": [0.0] * n}),
                 (None, {"ranges": [1.0]})):
-            with self.subTest(words=words, fields={name: str(value)[:20] for name, value in fields.items()}):
+            with part(f"{words}: " + ", ".join(f"{name} {str(value)[:20]}" for name, value in fields.items())):
                 self.lines.clear()
                 self.robot.spoil = lambda msg, fields=fields: changed(msg, **fields)
                 if words is None:
@@ -218,7 +218,7 @@ class LocalizationInterface(RoomTest):
 
     def test_stamps_of_other_times_do_no_harm(self) -> None:
         for shift_s in (-30.0, 30.0):
-            with self.subTest(shift_s):
+            with part(f"{shift_s} s"):
                 self.robot.spoil = lambda msg, shift_s=shift_s: changed(
                     msg, header__stamp=msg.header.stamp + rospy.Duration(shift_s))
                 self.robot.make_steps(5)

@@ -14,7 +14,7 @@ import rospy
 import rostest
 from room_robot import Lidar, changed
 from room_test import RoomTest
-from rostest_support import Heard
+from rostest_support import Heard, part
 from sensor_msgs.msg import LaserScan
 
 from glass_nav.ros import conversions
@@ -53,7 +53,7 @@ class LocalizationLidars(RoomTest):
 
     def test_each_one_alone_knows_where_the_robot_is(self) -> None:
         for lidar in self.lidars:
-            with self.subTest(lidar.frame):
+            with part(lidar.frame):
                 for other in self.lidars:
                     other.silent = other is not lidar
                 self.robot.make_steps(3)
