@@ -20,7 +20,7 @@ from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import SetMap, SetMapRequest
 from room_robot import BEAMS, changed, pose_message
 from room_test import RoomTest
-from rostest_support import Heard, part, wait_until
+from rostest_support import Heard, Process, part, wait_until
 from std_srvs.srv import Empty
 
 from glass_nav.msg import LocalizationStatus
@@ -123,9 +123,35 @@ class LocalizationInterface(RoomTest):
         refused = wait_until(refused_is_heard, 15.0)
         maps.publish(self.map_msg)
         heard = wait_until(lambda: len(poses), 15.0)
+        maps.publish(self.map_msg)
+        same = wait_until(lambda: self.lines.having("is the one that is in use"), 10.0)
+        kept = self.stays_right_on(maps, poses, self.graded_map())
         code, printed = node.end()
-        self.assertTrue(connected and refused and heard, (connected, refused, heard, printed))
+        self.assertTrue(connected and refused and heard and same and kept,
+                        (connected, refused, heard, same, kept, printed))
         self.assertEqual(code, 0, printed)
+
+    def graded_map(self) -> OccupancyGrid:
+        """The room as a mapper with probabilities draws it: walls of 70 to 100, free cells of 0 to 20."""
+        msg = conversions.msg_from_map(self.grid_map, rospy.Time.now(), "map")
+        rng = np.random.default_rng(1)
+        free = self.grid_map.occupancy.ravel() == 0
+        grades = np.where(free, rng.integers(0, 20, free.size), rng.integers(70, 101, free.size))
+        return changed(msg, data=grades.astype(int).tolist())
+
+    def stays_right_on(self, maps: rospy.Publisher, poses: Heard, msg: OccupancyGrid) -> bool:
+        """Another map leaves the robot where it is, not at its configured start."""
+        self.robot.make_steps(10)  # away from that start
+        self.lines.clear()
+        maps.publish(msg)
+        taken = wait_until(lambda: self.lines.having("map of 210 x 150 cells"), 10.0)
+        self.robot.make_steps(3)
+        poses.clear()
+
+        def is_right() -> bool:
+            said = conversions.planar_from_pose(poses.all[0].pose.pose) if len(poses) else np.full(3, np.inf)
+            return bool(np.hypot(*(said - self.robot.map_from_base())[:2]) < 0.4)
+        return taken and wait_until(lambda: len(poses), 10.0) and is_right()
 
     # -- initialpose
 
@@ -202,6 +228,35 @@ class LocalizationInterface(RoomTest):
                 self.robot.spoil = lambda msg: msg
                 self.expect_right_pose()
 
+    def test_beams_without_an_answer_are_left_out_and_the_others_used(self) -> None:
+        for nothing in (math.nan, math.inf, -math.inf, 0.0):
+            with part(f"every second range {nothing}"):
+                self.robot.spoil = lambda msg, nothing=nothing: changed(
+                    msg, ranges=[nothing if index % 2 else value for index, value in enumerate(msg.ranges)])
+                self.robot.make_steps(10)
+                self.expect_right_pose()
+                self.assertGreater(self.status.last.used_share, 0.8)
+
+    def test_odometry_is_not_counted_twice_over_scans_that_are_refused(self) -> None:
+        for fields in ({"range_max": -1.0}, {"range_min": -0.1}):
+            with part(str(fields)):
+                self.robot.spoil = lambda msg, fields=fields: changed(msg, **fields)
+                self.robot.make_steps(20)
+                self.transforms.clear()
+                self.assertTrue(wait_until(lambda: len(self.transforms), 5.0), "tf is silent")
+                self.assertLess(self.error_m(), 0.25)  # without a scan, by odometry alone
+                self.robot.spoil = lambda msg: msg
+                self.expect_right_pose()
+
+    def test_without_odometry_the_missing_transform_is_named(self) -> None:
+        self.robot.moving = False  # tf carries on between its last transform and the next one
+        self.robot.odometry_is_told = False
+        self.expect_line("scan dropped after 0.5 s: no transform odom <- base_link")
+        self.assertTrue(wait_until(lambda: "no transform odom <- base_link" in self.status.last.reason, 10.0),
+                        str(self.status.last))
+        self.robot.odometry_is_told = True
+        self.expect_right_pose()
+
     def test_an_unknown_scan_frame_is_said(self) -> None:
         self.robot.spoil = lambda msg: changed(msg, header__frame_id="nowhere")
         self.expect_line("no transform base_link <- nowhere")
@@ -243,6 +298,16 @@ class LocalizationInterface(RoomTest):
         code, printed = self.start("misspelt", "_min_particle:=100").wait(30.0)
         self.assertEqual(code, 2, printed)
         self.assertIn("unknown parameter ~min_particle; did you mean ~min_particles?", printed)
+
+    def test_a_single_beam_is_too_few(self) -> None:
+        code, printed = self.start("one_beam", "_laser_max_beams:=1").wait(30.0)
+        self.assertEqual(code, 2, printed)
+        self.assertIn("~laser_max_beams must be >= 2, got 1", printed)
+
+    def test_a_bag_is_not_for_the_node(self) -> None:
+        code, printed = Process("amcl", "__name:=with_a_bag", "--run-from-bag", "run.bag").wait(30.0)
+        self.assertEqual(code, 2, printed)
+        self.assertIn("glass_nav replay", printed)
 
     def test_a_parameter_of_the_wrong_type_ends_the_start(self) -> None:
         code, printed = self.start("mistyped", "_tf_broadcast:=1").wait(30.0)
