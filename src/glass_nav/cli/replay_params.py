@@ -13,6 +13,7 @@ from glass_nav import amcl_parameters, params
 from glass_nav.localization.glass_mcl import GlassMclParams
 from glass_nav.localization.start_pose import StartPose
 from glass_nav.params import ParamError
+from glass_nav.sensing.deskew import Deskew
 
 # Of localization_node, beside AMCL's: without a meaning for the replay of a log.
 NODE_ONLY = frozenset(["transform_wait_s", "random_seed", "glass_map_period_s", "scan_topics",
@@ -32,6 +33,7 @@ class ReplayParams:
     """All that a file may set."""
     frames: Frames = field(default_factory=Frames)
     start: StartPose = field(default_factory=StartPose)
+    deskew: Deskew = field(default_factory=Deskew)
     mcl: GlassMclParams = field(default_factory=GlassMclParams)
 
 

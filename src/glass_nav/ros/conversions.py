@@ -195,14 +195,14 @@ def scan_from_msg(msg: LaserScan, mounting: Mounting) -> Scan:
     """
     return scan_from_fields(ns_from_stamp(msg.header.stamp), np.array(msg.ranges, float), msg.angle_min,
                             msg.angle_increment, msg.range_min, msg.range_max, mounting.base_from_laser,
-                            mounting.upside_down, frame_id(msg.header.frame_id))
+                            mounting.upside_down, frame_id(msg.header.frame_id), msg.time_increment)
 
 
 # What the `intensities` of scan_surfaces say of a beam.
 AS_MEASURED, CUT, NOT_JUDGED = 0.0, 1.0, -1.0
 
 
-def surface_scan_msg(msg: LaserScan, surface: SurfaceScan) -> LaserScan:
+def surface_scan_msg(msg: LaserScan, scan: Scan, surface: SurfaceScan) -> LaserScan:
     """The message of `scan_surfaces`: the scan with its beams cut at the first surface of the map.
 
     Fields, order and ranges are the driver's own, but for the ranges of beams that were cut and for the
@@ -210,10 +210,11 @@ def surface_scan_msg(msg: LaserScan, surface: SurfaceScan) -> LaserScan:
 
     Args:
         msg: as the driver sent it, upside down or not: its beams keep their order.
+        scan: the same for the filter.
         surface: beam by beam in that order.
     """
     ranges = np.array(msg.ranges, float)
-    ranges[surface.cut] = surface.ranges_m[surface.cut]
+    ranges[surface.cut] = scan.as_measured(surface.ranges_m)[surface.cut]
     flags = np.where(surface.cut, CUT, AS_MEASURED) if surface.trusted else np.full(len(ranges), NOT_JUDGED)
     return LaserScan(header=Header(stamp=msg.header.stamp, frame_id=frame_id(msg.header.frame_id)),
                      angle_min=msg.angle_min, angle_max=msg.angle_max, angle_increment=msg.angle_increment,
@@ -314,10 +315,10 @@ def area_from_msg(msg: PolygonStamped, map_frame: str) -> np.ndarray:
     return corners
 
 
-def beam_cases_msg(scan_header: Header, cases: BeamCases) -> BeamCasesMsg:
+def beam_cases_msg(scan_header: Header, scan: Scan, cases: BeamCases) -> BeamCasesMsg:
     msg = BeamCasesMsg(header=Header(stamp=scan_header.stamp, frame_id=frame_id(scan_header.frame_id)))
     msg.cases = cases.case.astype(np.uint8).tobytes()
-    msg.expected, msg.residual = cases.expected_m.tolist(), cases.residual_m.tolist()
+    msg.expected, msg.residual = scan.as_measured(cases.expected_m).tolist(), cases.residual_m.tolist()
     msg.weight = cases.weight.tolist()
     return msg
 

@@ -41,7 +41,7 @@ from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from glass_nav.localization.glass_mcl import Estimate, GlassMcl
 from glass_nav.ros import conversions, endings, params, reconfigure, starts
-from glass_nav.ros.diagnostics import Diagnostics
+from glass_nav.ros.diagnostics import Diagnostics, Situation
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Errand, Mailbox
 from glass_nav.ros.map_source import MapSource
@@ -50,7 +50,7 @@ from glass_nav.ros.pose_memory import PoseMemory
 from glass_nav.ros.reconfigure import ReconfigureServer
 from glass_nav.ros.scan_input import STALE_SCANS, ScanInput
 from glass_nav.ros.starts import Starts
-from glass_nav.sensing.scan import ScanError
+from glass_nav.sensing.scan import Scan, ScanError
 from glass_nav.world.grid_map import GridMap
 
 TIME_JUMP_S = 0.5       # a clock that goes back by less is noise between machines
@@ -68,7 +68,9 @@ class LocalizationNode:
         self._rng = p.node.rng
         self._mcl: Optional[GlassMcl] = None
         self._map: Optional[GridMap] = None
+        self._map_origin = ""  # where it came from, in words
         self._estimate: Optional[Estimate] = None
+        self._scan: Optional[Scan] = None  # that the estimate was made of
         self._pose_is_news = True
         self._log = LogThrottle()
         self._inbox = Mailbox(scans=100, commands=100)
@@ -78,7 +80,7 @@ class LocalizationNode:
         self._next_report_s = 0.0  # by the monotonic clock
 
         self._tf = tf2_ros.Buffer()
-        self._scans = ScanInput(p.node, self._tf, self._log)
+        self._scans = ScanInput(p.node, p.deskew, self._tf, self._log)
         self._maps = MapSource(p.node, self._log, self._use_map)
         self._starts = Starts(p, self._tf)
         self._memory = PoseMemory(p.pose_file, self._log)
@@ -176,6 +178,7 @@ class LocalizationNode:
         else:
             self._mcl.set_map(grid_map)
             self._map = grid_map
+        self._map_origin = origin
         self._outputs.glass_is_news()
         height, width = grid_map.occupancy.shape
         rospy.loginfo(f"map of {width} x {height} cells of {grid_map.resolution_m:g} m from {origin}")
@@ -231,8 +234,9 @@ class LocalizationNode:
         if self._mcl is not None:
             self._mcl.reconfigure(p.mcl)
         self._p = p
-        for part in (self._scans, self._outputs, self._diagnostics):
-            part.reconfigure(p.node)
+        self._scans.reconfigure(p.node, p.deskew)
+        self._outputs.reconfigure(p.node)
+        self._diagnostics.reconfigure(p.node)
 
     # -- scans
 
@@ -244,7 +248,7 @@ class LocalizationNode:
         except ScanError as err:
             self._pass_over(msg, str(err))
             return
-        began = time.process_time()
+        began_cpu_s, began_s = time.process_time(), time.monotonic()
         if self._starts.apply(self._mcl, self._map, placed.scan.stamp_ns, placed.odom_from_base, self._now_s):
             self._pose_is_news = True
             if self._p.node.force_update_after_initialpose:
@@ -254,13 +258,13 @@ class LocalizationNode:
         except ScanError as err:
             self._pass_over(msg, str(err))
             return
-        self._diagnostics.add_update(time.process_time() - began)
+        self._diagnostics.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
         if not conversions.is_finite(estimate):
             self._scans.counts.refused += 1
             self._log.error("the filter's pose is not finite: nothing is published")
             return
         self._scans.counts.used += 1
-        self._estimate, self._last_estimate_s = estimate, self._now_s
+        self._estimate, self._scan, self._last_estimate_s = estimate, placed.scan, self._now_s
         self._outputs.send(msg, placed, estimate, self._now_s, self._pose_is_news)
         self._pose_is_news = False
         self._memory.take(estimate, self._map.digest, self._p.node.save_pose_rate, self._now_s)
@@ -303,7 +307,9 @@ class LocalizationNode:
         trouble = self._missing()
         if trouble is not None:
             self._outputs.send_trouble(self._estimate, trouble)
-        self._diagnostics.publish(self._estimate, trouble)
+        self._diagnostics.publish(Situation(
+            self._estimate, self._scan, trouble, self._map, self._map_origin if self._map else self._maps.trouble or
+            "no map yet", self._scans.period_s, self._scans.lidars))
 
     def _missing(self) -> Optional[str]:
         """Why no scan is being used; None while all is well."""

@@ -72,7 +72,7 @@ class Outputs:
         """
         self._was_localized = self._was_localized or estimate.state == LOCALIZED
         self.send_transform(estimate.stamp_ns, estimate.map_from_odom)
-        self._surfaces.publish(conversions.surface_scan_msg(msg, estimate.surface_scan))
+        self._surfaces.publish(conversions.surface_scan_msg(msg, placed.scan, estimate.surface_scan))
         self._status.publish(conversions.status_msg(estimate.stamp_ns, self._frame, estimate.state, estimate.reason,
                                                     estimate.used_share, estimate.reliability))
         if estimate.updated or pose_is_news:
@@ -81,7 +81,7 @@ class Outputs:
                 self._particles.publish(conversions.pose_array(estimate.stamp_ns, self._frame, estimate.particles))
         self._glass_is_news = self._glass_is_news or estimate.updated
         if self._beam_cases.get_num_connections():
-            self._beam_cases.publish(conversions.beam_cases_msg(msg.header, estimate.cases))
+            self._beam_cases.publish(conversions.beam_cases_msg(msg.header, placed.scan, estimate.cases))
         self._show_beams(placed, estimate, now_s)
 
     def send_transform(self, stamp_ns: int, map_from_odom: np.ndarray) -> None:

@@ -19,6 +19,7 @@ from glass_nav.localization.glass_mcl import GlassMclParams
 from glass_nav.localization.saved_pose import PoseFile
 from glass_nav.localization.start_pose import StartPose
 from glass_nav.params import ParamError
+from glass_nav.sensing.deskew import Deskew
 
 __all__ = ["LocalizationNodeParams", "LocalizationParams", "ParamError", "localization_params"]
 
@@ -78,6 +79,7 @@ class LocalizationParams:
     node: LocalizationNodeParams = field(default_factory=LocalizationNodeParams)
     start: StartPose = field(default_factory=StartPose)
     pose_file: PoseFile = field(default_factory=PoseFile)
+    deskew: Deskew = field(default_factory=Deskew)
     mcl: GlassMclParams = field(default_factory=GlassMclParams)
 
 
@@ -90,7 +92,7 @@ CHANGEABLE = ("tf_broadcast", "publish_tf_before_localized", "transform_toleranc
 def changeable(p: LocalizationParams) -> Dict[str, Any]:
     """Name -> value of the parameters that may change while the node runs."""
     own = params.as_mapping(p.node)
-    return {**params.as_mapping(p.mcl), **{name: own[name] for name in CHANGEABLE}}
+    return {**params.as_mapping(p.mcl), **params.as_mapping(p.deskew), **{name: own[name] for name in CHANGEABLE}}
 
 
 def changed(p: LocalizationParams, values: Mapping[str, Any], owner: str) -> LocalizationParams:
