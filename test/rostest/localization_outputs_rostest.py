@@ -32,7 +32,7 @@ from glass_nav.ros import beam_displays, conversions, wall_display
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.world.grid_map import GridMap
 
-PANE_COLUMN = 140
+PANE_COLUMN = 160
 NODE = "/glass_localization"
 HEAD_ON_RAD = 0.15                    # up to this angle to its normal the pane answers
 MOUNTING = np.array([0.2, 0.0, 0.3])  # of the robot's lidar
@@ -43,7 +43,7 @@ def room_with_a_pane() -> GridMap:
     """The room, and a pane that parts its eastern third, 1.3 m and more from the robot."""
     empty = room()
     occupancy = empty.occupancy.copy()
-    occupancy[:, PANE_COLUMN] = 100
+    occupancy[20:170, PANE_COLUMN] = 100
     return GridMap(occupancy, empty.resolution_m, empty.map_from_grid)
 
 
@@ -208,7 +208,7 @@ class LocalizationOutputs(unittest.TestCase):
         self.assertLess(np.abs(conversions.planar_from_pose(msg.info.origin) - self.grid_map.map_from_grid).max(), 1e-9)
         glass = np.array(msg.data).reshape(self.grid_map.occupancy.shape)
         self.assertTrue(np.all(glass[~self.grid_map.occupied] == -1))
-        pane, walls = glass[10:-10, PANE_COLUMN], np.concatenate([glass[:5].ravel(), glass[:, :5].ravel()])
+        pane, walls = glass[30:-30, PANE_COLUMN], np.concatenate([glass[20:25].ravel(), glass[:, 20:25].ravel()])
         self.assertGreater(np.count_nonzero(pane >= 0), 10)
         self.assertLess(np.median(walls[walls >= 0]), 0.5 * np.median(pane[pane >= 0]))
 

@@ -30,11 +30,14 @@ RANGE_MAX_M = 20.0
 
 
 def room() -> GridMap:
-    """10 x 7 m of free space, a cabinet in one corner so that it looks the same from nowhere else."""
-    occupancy = np.zeros((150, 210), dtype=np.int8)
-    occupancy[:5], occupancy[-5:], occupancy[:, :5], occupancy[:, -5:] = 100, 100, 100, 100
-    occupancy[100:, 150:] = 100
-    return GridMap(occupancy, 0.05, np.array([-1.0, -2.0, 0.4]))
+    """10 x 7 m of free space, a cabinet in one corner so that it looks the same from nowhere else; 1 m of nothing known
+    around it."""
+    occupancy = np.full((190, 250), -1, dtype=np.int8)
+    occupancy[20:170, 20:230] = 100
+    occupancy[25:165, 25:225] = 0
+    occupancy[120:125, 170:225], occupancy[120:165, 170:175] = 100, 100
+    occupancy[125:165, 175:225] = -1  # in the cabinet
+    return GridMap(occupancy, 0.05, se2.compose(np.array([-1.0, -2.0, 0.4]), np.array([-1.0, -1.0, 0.0])))
 
 
 @dataclass
@@ -73,7 +76,7 @@ class Robot:
             lidars: one when not given.
         """
         self._caster = RayCaster(grid_map) if caster is None else caster
-        self._centre = se2.compose(grid_map.map_from_grid, np.array([4.5, 3.2, 0.0]))
+        self._centre = se2.compose(grid_map.map_from_grid, np.array([5.5, 4.2, 0.0]))
         self._turned_rad = 0.0
         self._steps = 0
         self.lidars: List[Lidar] = list(lidars) or [Lidar()]

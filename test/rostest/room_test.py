@@ -70,6 +70,12 @@ class RoomTest(unittest.TestCase):
                         f"error {self.error_m() if len(self.transforms) else math.nan:.2f} m; "
                         f"{self.lines.having('')[-5:]}")
 
+    def expect_understood(self) -> None:
+        """A scan from now on is explained by the map."""
+        self.status.clear()
+        self.assertTrue(wait_until(lambda: len(self.status) and self.status.last.used_share > 0.8, 5.0),
+                        f"no scan is understood: {self.status.last}")
+
     def expect_line(self, *words: str) -> None:
         self.assertTrue(wait_until(lambda: self.lines.having(*words), 15.0),
                         f"no log line with {words}; there are {self.lines.having('')[-10:]}")
