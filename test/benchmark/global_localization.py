@@ -28,7 +28,8 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # a process a core: th
 import numpy as np
 
 import tracks
-from glass_nav.localization.glass_mcl import GlassMcl, GlassMclParams
+from glass_nav.localization.glass_mcl import GlassMcl
+from glass_nav.localization.glass_mcl_params import GlassMclParams
 from glass_nav.localization.pose_quality import LOCALIZED
 
 MOST_M = 60.0          # of a search
@@ -81,8 +82,7 @@ def kidnap(track: tracks.Track, seed: int) -> Dict[str, Any]:
         if estimate.state == LOCALIZED and right:
             back_m = float(way_m)
             break
-    return {"localized_before": before[-1] == LOCALIZED, "share_before": float(np.mean([s == LOCALIZED for s in before])),
-            "left_m": left_m, "back_m": back_m,
+    return {"localized_before": before[-1] == LOCALIZED, "left_m": left_m, "back_m": back_m,
             "left": left_m is not None and left_m <= LEFT_M, "back": back_m is not None}
 
 
@@ -137,7 +137,8 @@ def row(task: str, name: str, runs: List[Dict[str, Any]]) -> str:
                 f"{count(runs, 'leads')} | {median(runs, 'driven_m')} | {median(runs, 'cpu_s')} |")
     if task == "kidnap":
         return (f"| {name} | {count(runs, 'localized_before')}/{len(runs)} | {count(runs, 'left')} | "
-                f"{median(runs, 'left_m')} | {count(runs, 'back')} | {median(runs, 'back_m')} | {median(runs, 'cpu_s')} |")
+                f"{median(runs, 'left_m')} | {count(runs, 'back')} | {median(runs, 'back_m')} | "
+                f"{median(runs, 'cpu_s')} |")
     return f"| {name} | {count(runs, 'wrong')}/{len(runs)} | {median(runs, 'driven_m')} | {median(runs, 'cpu_s')} |"
 
 

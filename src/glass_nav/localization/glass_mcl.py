@@ -7,27 +7,22 @@ the beams that are understood. GlassMcl.update() reads as the document does.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Optional, Tuple
+from dataclasses import dataclass
+from typing import Dict, Optional, Set, Tuple
 
 import numpy as np
 
-from glass_nav.geometry import angles, se2
+from glass_nav.geometry import angles, polygons, se2
 from glass_nav.localization import (beam_cases, beam_weights, glass_map, global_search, motion, pose_estimate,
                                     pose_quality, preliminary_samples, proposal, reference_ranges, resampling,
                                     scan_alignment, surface_scan)
-from glass_nav.localization.beam_cases import BeamCases, CaseVote
-from glass_nav.localization.beam_weights import BeamMixture
-from glass_nav.localization.glass_map import GlassEvidence, GlassMap
-from glass_nav.localization.global_search import Candidates, GlobalSearch, SearchParams
+from glass_nav.localization.beam_cases import BeamCases
+from glass_nav.localization.glass_map import GlassMap
+from glass_nav.localization.glass_mcl_params import GlassMclParams
+from glass_nav.localization.global_search import GlobalSearch
 from glass_nav.localization.lost_watch import LostWatch
-from glass_nav.localization.motion import OdometryNoise
-from glass_nav.localization.preliminary_samples import PreliminarySamples
-from glass_nav.localization.pose_quality import QualityLimits
-from glass_nav.localization.proposal import Proposal
 from glass_nav.localization.range_residuals import RangeResiduals
 from glass_nav.localization.reference_ranges import LEAST_COS, ReferenceRanges
-from glass_nav.localization.resampling import ParticleCount
 from glass_nav.localization.scan_alignment import Alignment
 from glass_nav.localization.scan_anchor import ScanAnchor
 from glass_nav.localization.surface_scan import SurfaceScan
@@ -44,55 +39,6 @@ _NATS_OF_A_FULL_FIT = 20.0  # of log weight between a scan that fits nowhere and
 _FOUND = np.array([0.1, 0.1, 0.05])  # deviations [m, m, rad] of a place that was found among all others
 _SHOWN = 500           # candidates drawn for particlecloud
 _REACH = 3.5           # deviations of a given pose that are searched, where it is given vaguely
-
-
-@dataclass(frozen=True)
-class Schedule:
-    """When a scan moves the particles; the names and meanings are AMCL's."""
-    update_min_d: float = 0.1       # way since the last update [m]
-    update_min_a: float = 0.1       # turn since the last update [rad]
-    resample_interval: int = 1      # updates between resamplings
-    selective_resampling: bool = False  # only when fewer than half of the particles count
-    raycast_threads: int = 1
-
-    def __post_init__(self) -> None:
-        for name in ("update_min_d", "update_min_a"):
-            if not getattr(self, name) >= 0.0:
-                raise ValueError(f"~{name} must be >= 0, got {getattr(self, name)}")
-        for name in ("resample_interval", "raycast_threads"):
-            if not getattr(self, name) >= 1:
-                raise ValueError(f"~{name} must be >= 1, got {getattr(self, name)}")
-
-
-@dataclass(frozen=True)
-class LaserLimits:
-    """Ranges that are looked at; the names and meanings are AMCL's."""
-    laser_min_range: float = -1.0   # [m] nearer ranges are no answers; < 0: as the scan says
-    laser_max_range: float = -1.0   # [m] farther ones neither; < 0: as the scan says
-
-    def __post_init__(self) -> None:
-        for name in ("laser_min_range", "laser_max_range"):
-            if not np.isfinite(getattr(self, name)):
-                raise ValueError(f"~{name} must be finite, got {getattr(self, name)}")
-        if 0.0 <= self.laser_max_range <= max(self.laser_min_range, 0.0):
-            raise ValueError("~laser_max_range must be above 0 and ~laser_min_range, or < 0 for the scan's own, "
-                             f"got {self.laser_max_range}")
-
-
-@dataclass(frozen=True)
-class GlassMclParams:
-    """All parameters of the filter, a struct per model."""
-    schedule: Schedule = field(default_factory=Schedule)
-    limits: LaserLimits = field(default_factory=LaserLimits)
-    count: ParticleCount = field(default_factory=ParticleCount)
-    odometry: OdometryNoise = field(default_factory=OdometryNoise)
-    proposal: Proposal = field(default_factory=Proposal)
-    samples: PreliminarySamples = field(default_factory=PreliminarySamples)
-    vote: CaseVote = field(default_factory=CaseVote)
-    glass: GlassEvidence = field(default_factory=GlassEvidence)
-    mixture: BeamMixture = field(default_factory=BeamMixture)
-    quality: QualityLimits = field(default_factory=QualityLimits)
-    search: SearchParams = field(default_factory=SearchParams)
 
 
 @dataclass(frozen=True)
@@ -131,10 +77,10 @@ class GlassMcl:
         self._odom_from_base: Optional[np.ndarray] = None  # at that update
         self._best: pose_estimate.PoseEstimate           # once started
         self._map_from_odom = np.zeros(3)                 # since the last update of the particles
-        self._stamp_ns: Optional[int] = None
+        self._stamps_ns: Dict[str, int] = {}              # of the last scan of each lidar
         self._quality = pose_quality.PoseQuality(params.quality)
         self._search: Optional[GlobalSearch] = None       # while the pose is not known
-        self._update_due = True
+        self._up_to_date: Set[str] = set()                # lidars that had an update since the robot moved
         self._updates = 0
 
     def set_map(self, grid_map: GridMap) -> None:
@@ -148,7 +94,18 @@ class GlassMcl:
         self._watch = self._new_watch()
         self._residuals = RangeResiduals(0.5, self._params.mixture.laser_sigma_hit)
         self._glass_map = GlassMap(grid_map, self._params.glass)
-        self._update_due = True
+        self._up_to_date = set()
+
+    def reconfigure(self, params: GlassMclParams) -> None:
+        """Other parameters from the next scan on; the particles, the glass map and what the filter learnt stay."""
+        if params.schedule.raycast_threads != self._params.schedule.raycast_threads:
+            self._caster = RayCaster(self._grid_map, threads=params.schedule.raycast_threads)
+        self._glass_map.weigh_by(params.glass)
+        self._quality.limit_by(params.quality)
+        self._watch.decide_by(params.search)
+        if self._search is not None:
+            self._search.decide_by(params.search)
+        self._params = params
 
     @property
     def glass_map(self) -> GlassMap:
@@ -187,14 +144,16 @@ class GlassMcl:
         """Start over anywhere in the free cells of the map (service global_localization), or of a part of it.
 
         Args:
-            area: (N, 2) corners of a polygon in map [m]; None: the whole map.
+            area: (N, 2) corners [m, in map] of a polygon; the robot is in it. None: anywhere.
 
         Raises:
-            ValueError: fewer than 3 corners, not finite, or there is no free cell; nothing is changed then.
+            ValueError: the area is no polygon, or there is no free cell; nothing is changed then.
         """
-        within = None if area is None else self._grid_map.within(area)
-        search = self._new_search(within)
-        rows, columns = np.nonzero(self._grid_map.free if within is None else self._grid_map.free & within)
+        free = self._grid_map.free if area is None else self._grid_map.free & self._within(area)
+        if not free.any():
+            raise ValueError(f"the {'map' if area is None else 'area'} has no free cell to put particles on")
+        search = self._new_search(None if area is None else free)
+        rows, columns = np.nonzero(free)
         count = self._params.count.max_particles
         chosen = self._rng.integers(len(rows), size=count)
         inside = self._rng.uniform(-0.5, 0.5, (2, count))
@@ -204,8 +163,8 @@ class GlassMcl:
         self._search = search
 
     def request_update(self) -> None:
-        """The next scan is used even if the robot did not move (service request_nomotion_update)."""
-        self._update_due = True
+        """The next scan of each lidar is used even if the robot did not move (service request_nomotion_update)."""
+        self._up_to_date = set()
 
     def update(self, scan: Scan, odom_from_base: np.ndarray) -> Estimate:
         """One scan and the odometry at its stamp -> pose.
@@ -220,7 +179,7 @@ class GlassMcl:
         """
         scan = scan.limited(self._params.limits.laser_min_range, self._params.limits.laser_max_range)
         odom_from_base = self._checked(scan, odom_from_base)
-        if not self._is_due(odom_from_base):
+        if not self._is_due(scan.lidar, odom_from_base):
             map_from_base = se2.compose(self._map_from_odom, odom_from_base)
             cases, references = self._vote(scan, map_from_base, self._best.covariance)
             return self._estimate(scan, odom_from_base, cases, references)
@@ -230,7 +189,7 @@ class GlassMcl:
             cases = self._track(scan, odom_from_base)
         self._map_from_odom = se2.compose(self._best.map_from_base, se2.inverse(odom_from_base))
         self._odom_from_base = odom_from_base
-        self._update_due = False
+        self._up_to_date.add(scan.lidar)
         map_from_base = se2.compose(self._map_from_odom, odom_from_base)  # the vote was held at the aligned pose
         return self._estimate(scan, odom_from_base, cases, self._references(scan, map_from_base[None]), updated=True)
 
@@ -258,7 +217,8 @@ class GlassMcl:
         if candidates.found:
             return self._settle(scan, odom_from_base, candidates.poses[0], candidates.fit)
         if len(candidates.poses):
-            drawn = resampling.low_variance(candidates.weights, min(_SHOWN, self._params.count.max_particles), self._rng)
+            shown = min(_SHOWN, self._params.count.max_particles)
+            drawn = resampling.low_variance(candidates.weights, shown, self._rng)
             self._particles = candidates.poses[drawn]
             self._weights = np.full(len(drawn), 1.0 / len(drawn))
             here = global_search.same_place(candidates.poses, candidates.poses[0])
@@ -270,9 +230,9 @@ class GlassMcl:
         """The robot is found at a pose where scans fit that well: go on from there, beginning with this scan."""
         particles = map_from_base + self._rng.standard_normal((self._params.count.max_particles, 3)) * _FOUND
         particles[:, 2] = angles.wrap(particles[:, 2])
-        stamp_ns = self._stamp_ns
+        stamps_ns = self._stamps_ns
         self._start_with(particles)
-        self._stamp_ns = stamp_ns
+        self._stamps_ns = stamps_ns
         self._watch = self._new_watch(fit)
         return self._place(scan, particles, odom_from_base)
 
@@ -289,10 +249,21 @@ class GlassMcl:
             self._matcher = ScanMatcher(self._grid_map, self._field)
         return self._matcher
 
+    def _within(self, area: np.ndarray) -> np.ndarray:
+        """(H, W) bool: cells with their centres in a polygon (N, 2)."""
+        area = np.asarray(area, float)
+        if area.ndim != 2 or area.shape[1] != 2 or len(area) < 3 or not np.all(np.isfinite(area)):
+            raise ValueError(f"an area needs at least 3 corners of finite x, y, got {area.tolist()}")
+        return polygons.inside(area, self._centres().reshape(-1, 2)).reshape(self._grid_map.occupancy.shape)
+
+    def _centres(self) -> np.ndarray:
+        """(H, W, 2) centres [m] of all cells, in map."""
+        height, width = self._grid_map.occupancy.shape
+        return self._grid_map.centres(*np.mgrid[:height, :width])
+
     def _near(self, point: np.ndarray, covariance: np.ndarray) -> np.ndarray:
         """(H, W) bool: cells within reach of a point (2,) that is known with that covariance (2, 2)."""
-        height, width = self._grid_map.occupancy.shape
-        off = self._grid_map.centres(*np.mgrid[:height, :width]) - point
+        off = self._centres() - point
         least = np.eye(2) * self._grid_map.resolution_m**2
         return np.einsum("hwi,ij,hwj->hw", off, np.linalg.inv(covariance + least), off) <= _REACH**2
 
@@ -347,17 +318,20 @@ class GlassMcl:
         if odom_from_base.shape != (3,) or not np.all(np.isfinite(odom_from_base)):
             raise ScanError(f"scan at {scan.stamp_ns * 1e-9:.3f} s: odometry must be finite x, y, yaw, "
                             f"got {odom_from_base}")
-        if self._stamp_ns is not None and scan.stamp_ns < self._stamp_ns:
+        last_ns = self._stamps_ns.get(scan.lidar, scan.stamp_ns)
+        if scan.stamp_ns < last_ns:
             raise ScanError(f"scan at {scan.stamp_ns * 1e-9:.3f} s: time runs backwards, the last scan was "
-                            f"at {self._stamp_ns * 1e-9:.3f} s")
-        self._stamp_ns = scan.stamp_ns
+                            f"at {last_ns * 1e-9:.3f} s")
+        self._stamps_ns[scan.lidar] = scan.stamp_ns
         return odom_from_base
 
-    def _is_due(self, odom_from_base: np.ndarray) -> bool:
-        if self._update_due or self._odom_from_base is None:
-            return True
-        way, turn = motion.travelled(se2.compose(se2.inverse(self._odom_from_base), odom_from_base))
-        return way >= self._params.schedule.update_min_d or turn >= self._params.schedule.update_min_a
+    def _is_due(self, lidar: str, odom_from_base: np.ndarray) -> bool:
+        """As in AMCL: after enough way or turn, each lidar has one update."""
+        if self._odom_from_base is not None:
+            way, turn = motion.travelled(se2.compose(se2.inverse(self._odom_from_base), odom_from_base))
+            if way >= self._params.schedule.update_min_d or turn >= self._params.schedule.update_min_a:
+                self._up_to_date = set()
+        return lidar not in self._up_to_date
 
     def _predict(self, odom_from_base: np.ndarray) -> np.ndarray:
         if self._odom_from_base is None:  # the first scan: nothing to move from
@@ -441,9 +415,9 @@ class GlassMcl:
         self._weights = np.full(len(particles), 1.0 / len(particles))
         self._best = pose_estimate.of(particles, self._weights)
         self._odom_from_base = None
-        self._stamp_ns = None
+        self._stamps_ns = {}
         self._search = None
         self._anchor = ScanAnchor(self._field)
         self._watch = self._new_watch()
         self._quality = pose_quality.PoseQuality(self._params.quality)
-        self._update_due = True
+        self._up_to_date = set()

@@ -95,6 +95,10 @@ class GlobalSearch:
         self._looked = False
         self._way_m = 0.0              # since the last look everywhere
 
+    def decide_by(self, params: SearchParams) -> None:
+        """Other limits from the next scan on."""
+        self._params = params
+
     def update(self, scan: Scan, odom_from_base: np.ndarray) -> Candidates:
         """One scan more; a scan with too few answers moves the candidates only.
 

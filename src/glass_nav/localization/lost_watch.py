@@ -81,6 +81,12 @@ class LostWatch:
         self._odom_from_base: Optional[np.ndarray] = None
         self._verdict = Verdict(float("nan"), self._usual, -np.inf, False, None, None)
 
+    def decide_by(self, params: SearchParams) -> None:
+        """Other limits from the next scan on."""
+        self._params = params
+        if self._search is not None:
+            self._search.decide_by(params)
+
     def observe(self, scan: Scan, odom_from_base: np.ndarray, map_from_base: np.ndarray) -> Verdict:
         """One scan more and the pose that is believed after it; with too few answers the verdict stays."""
         way_m = self._way(odom_from_base)

@@ -64,6 +64,10 @@ class PoseQuality:
         self._verdict: Optional[Verdict] = None
         self._used_share = float("nan")
 
+    def limit_by(self, limits: QualityLimits) -> None:
+        """Other limits from now on; what was seen stays."""
+        self._limits = limits
+
     def observe(self, used_share: float) -> None:
         """Take in one update; NaN when no beam answered, which says nothing."""
         if np.isfinite(used_share):
@@ -81,7 +85,8 @@ class PoseQuality:
     def judge(self, best: PoseEstimate) -> Judgement:
         """Of the best cluster of particles."""
         if self._candidates is not None:
-            return Judgement(GLOBAL_SEARCH, _progress(self._candidates), _share(best))
+            known = best.share if len(self._candidates.poses) else 0.0
+            return Judgement(GLOBAL_SEARCH, _progress(self._candidates), min(known, 1.0))
         limits = self._limits
         position_sigma_m = float(np.sqrt(np.linalg.eigvalsh(best.covariance[:2, :2])[-1]))
         heading_sigma_rad = float(np.sqrt(best.covariance[2, 2]))
@@ -129,13 +134,9 @@ def _elsewhere(verdict: Optional[Verdict]) -> Optional[str]:
     return None
 
 
-def _share(best: PoseEstimate) -> float:
-    return float(np.clip(best.share, 0.0, 1.0))
-
-
 def _reliability(used_share: float, verdict: Optional[Verdict], best: PoseEstimate) -> float:
     """Chance that the pose is right, by logistic regression over drives of the benchmark."""
     drop = 0.0 if verdict is None or np.isnan(verdict.fit) else max(0.0, verdict.usual - verdict.fit)
     behind = -4.0 if verdict is None else float(np.clip(verdict.behind, -4.0, 8.0))
-    logit = 6.0 - 8.0 * drop - 2.0 * (1.0 - used_share) - 0.7 * (behind + 4.0)
+    logit = 6.0 - 20.0 * drop - 2.0 * (1.0 - used_share) - 0.7 * (behind + 4.0)
     return float(best.share / (1.0 + np.exp(-logit)))

@@ -62,6 +62,7 @@ class SimulatorNodeParams:
     seed: int = 0
     changed: float = 0.0              # share of the movable furniture that moved since the map was drawn
     scan_rate_hz: float = 10.0
+    turn_time_s: float = 0.0          # from the first beam of a scan to the last one
     speed_factor: float = 1.0         # simulated seconds in a second; 0: as fast as the localization follows
     laser_x_m: float = 0.12           # where the laser sits on the robot
     laser_y_m: float = 0.0
@@ -272,7 +273,7 @@ def _drive(p: SimulatorNodeParams) -> _Drive:
     building = building_file.load(shipped_buildings.find(p.building))
     simulation = Simulation(building, model, RobotParams(p.robot), seed=p.seed, scan_rate_hz=p.scan_rate_hz,
                             base_from_laser=np.array([p.laser_x_m, p.laser_y_m, p.laser_yaw_rad]),
-                            changed_share=p.changed)
+                            changed_share=p.changed, turn_time_s=p.turn_time_s)
     if not p.path:
         return _Drive(simulation, None)
     return _Drive(simulation, simulation.follower(p.path, FollowerParams(speed_m_s=p.path_speed_m_s)))
