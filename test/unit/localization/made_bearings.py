@@ -12,7 +12,7 @@ from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.world import landmark_map
 from glass_nav.world.landmark_map import LandmarkMap
 
-# Four tags between 4 and 8 m in front of four viewers, after Figure 6 of the seed document (its text has no coordinates).
+# Four tags in front of four viewers, after Figure 6 of the seed document, the text of which gives no coordinates.
 FIELD = landmark_map.seen_from_all_sides("ABCD", np.array([[-5.0, 4.5], [-3.0, 8.0], [3.0, 7.0], [5.0, 4.0]]), 15.0)
 VIEWERS = np.array([[-1.0, 3.0, 0.3], [1.0, 3.0, -2.0], [1.0, 2.0, 1.6], [-1.0, 2.0, 3.0]])  # P1 to P4
 
