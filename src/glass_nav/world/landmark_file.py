@@ -24,6 +24,7 @@ from glass_nav.world.landmark_map import RANGE_M, VIEW_RAD, LandmarkMap
 
 KEYS = ("id", "position", "facing_deg", "view_deg", "range")
 DEFAULTS = ("view_deg", "range")
+LEAST_DISTANCE_M = 0.01  # of two landmarks
 SECTIONS = ("sigma", *DEFAULTS, "landmarks")
 
 
@@ -82,6 +83,7 @@ def from_items(items: Sequence[Any], view_deg: float = float(np.degrees(VIEW_RAD
         view = 360.0 if math.isnan(facing_deg) else _number(f"{who} view_deg", item.get("view_deg", view_deg))
         rows.append([*_position(who, item), facing_deg, view, _range(f"{who} range", item.get("range", range_m))])
     table = np.array(rows, float).reshape(-1, 5)
+    _check_places(ids, table[:, :2])
     return LandmarkMap(tuple(ids), table[:, :2].copy(), np.radians(table[:, 2]), np.radians(table[:, 3]),
                        table[:, 4].copy(), sigma_m)
 
@@ -121,6 +123,15 @@ def _check_keys(who: str, item: Mapping[Any, Any], known: Sequence[str]) -> None
             near = difflib.get_close_matches(str(key), known, n=1)
             hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
             raise ValueError(f"{who}unknown key {key!r}; {hint}")
+
+
+def _check_places(ids: Sequence[str], positions_m: np.ndarray) -> None:
+    """Two tags back to back are apart by their cases; nearer is a line copied and not changed."""
+    for number, name in enumerate(ids):
+        near = np.hypot(*(positions_m[number + 1:] - positions_m[number]).T) < LEAST_DISTANCE_M
+        if near.any():
+            raise ValueError(f"landmarks {name!r} and {ids[number + 1 + int(np.argmax(near))]!r} are in the same place, "
+                             f"{positions_m[number].tolist()}")
 
 
 def _id(who: str, item: Dict[str, Any]) -> str:

@@ -17,7 +17,6 @@ from glass_nav.geometry import angles
 
 VIEW_RAD = np.pi / 2.0  # of a tag whose direction is known
 RANGE_M = 15.0
-LEAST_DISTANCE_M = 0.01  # of two landmarks
 
 
 class UnknownLandmark(ValueError):
@@ -40,9 +39,9 @@ class LandmarkMap:
         if shapes != [(count, 2), (count,), (count,), (count,)]:
             raise ValueError(f"expected {count} landmarks with positions (N, 2), facing (N,), view (N,) and range "
                              f"(N,), got {', '.join(map(str, shapes))}")
-        for name in self.ids:
-            if self.ids.count(name) > 1:
-                raise ValueError(f"landmark id {name!r} is given twice")
+        if len(set(self.ids)) < count:
+            twice = next(name for name in self.ids if self.ids.count(name) > 1)
+            raise ValueError(f"landmark id {twice!r} is given twice")
         if not np.isfinite(self.positions_m).all():
             number = int(np.argmin(np.isfinite(self.positions_m).all(axis=1)))
             raise ValueError(f"landmark {self.ids[number]!r}: position must be finite, got "
@@ -57,11 +56,6 @@ class LandmarkMap:
                 raise ValueError(f"landmark {self.ids[number]!r}: {what} must be {allowed}, got {given:g}")
         if not 0.0 <= self.sigma_m < np.inf:
             raise ValueError(f"sigma of the landmarks must be >= 0 m, got {self.sigma_m}")
-        for number, name in enumerate(self.ids):
-            near = np.hypot(*(self.positions_m[number + 1:] - self.positions_m[number]).T) < LEAST_DISTANCE_M
-            if near.any():
-                raise ValueError(f"landmarks {name!r} and {self.ids[number + 1 + int(np.argmax(near))]!r} are in the "
-                                 f"same place, {self.positions_m[number].tolist()}")
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -123,3 +117,6 @@ def seen_from_all_sides(ids: Sequence[str], positions_m: np.ndarray, range_m: fl
     count = len(ids)
     return LandmarkMap(tuple(ids), np.asarray(positions_m, float).reshape(-1, 2), np.full(count, np.nan),
                        np.full(count, 2.0 * np.pi), np.full(count, float(range_m)), sigma_m)
+
+
+NONE = seen_from_all_sides((), np.zeros((0, 2)))
