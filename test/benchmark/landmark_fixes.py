@@ -54,7 +54,8 @@ def read_in_steps(landmarks: LandmarkMap, pose: np.ndarray, step_deg: float) -> 
 
 
 def fixes_per_second(rng: np.random.Generator, draws: int) -> float:
-    read = [read_in_steps(FIELD, np.append(VIEWERS[draw % 4], rng.uniform(-np.pi, np.pi)), 1.0) for draw in range(draws)]
+    read = [read_in_steps(FIELD, np.append(VIEWERS[draw % 4], rng.uniform(-np.pi, np.pi)), 1.0)
+            for draw in range(draws)]
     started = time.process_time()
     for each in read:
         try:
@@ -89,7 +90,8 @@ def figure_7(rng: np.random.Generator, draws: int) -> float:
     rows = {name: np.array(of_triples)[:, number] for number, name in enumerate(("A,B,C", "A,B,D", "A,C,D", "B,C,D"))}
     rows.update({"average": np.array(of_average), "least squares": np.array(of_fit)})
     for name, errors in rows.items():
-        print(f"  {name:14s} {errors.min():.3f} to {errors.max():.3f} m, median {np.median(errors):.3f} m ({len(errors)})")
+        print(f"  {name:14s} {errors.min():.3f} to {errors.max():.3f} m, median {np.median(errors):.3f} m "
+              f"({len(errors)})")
     return better / draws
 
 
@@ -99,7 +101,8 @@ def one_wrong(rng: np.random.Generator, landmarks: LandmarkMap, draws: int) -> D
     low, high = ([3.0, 2.0], [7.0, 6.0]) if landmarks is not FIELD else ([-2.0, -2.0], [2.0, 3.0])
     for _ in range(draws):
         pose = np.append(rng.uniform(low, high), rng.uniform(-np.pi, np.pi))
-        read = bearings.standing(landmarks.ids, directions(landmarks, pose) + rng.normal(0.0, 0.005, len(landmarks)), 0.005)
+        noise = rng.normal(0.0, 0.005, len(landmarks))
+        read = bearings.standing(landmarks.ids, directions(landmarks, pose) + noise, 0.005)
         read.angles_rad[rng.integers(len(landmarks))] += rng.choice([-1.0, 1.0]) * rng.uniform(0.3, np.pi)
         try:
             fix = triangulation.triangulate(read, landmarks)
@@ -125,7 +128,8 @@ def main() -> int:
     print(f"  the average is better than the worst triple in {share:.1%}")
     for landmarks, what in ((FIELD, "4, with directions"), (FIVE, "5"), (ROOM, "6")):
         outcome = one_wrong(rng, landmarks, arguments.draws)
-        print(f"one wrong of {what}: " + ", ".join(f"{name} {count / arguments.draws:.1%}" for name, count in outcome.items()))
+        shares = ", ".join(f"{name} {count / arguments.draws:.1%}" for name, count in outcome.items())
+        print(f"one wrong of {what}: {shares}")
     return int(per_second < 1000.0 or off_cm >= 0.1 or share < 0.95)
 
 

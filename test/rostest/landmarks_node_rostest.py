@@ -71,7 +71,8 @@ class Landmarks(unittest.TestCase):
         taken = []
         for name in ("A2", "A3", "A4", "A5"):
             way = se2.transform_points(se2.inverse(pose), LANDMARKS.positions_m[LANDMARKS.numbers([name])[0]])
-            taken.append(LandmarkBearing(now_ns, name, float(np.arctan2(way[1], way[0])) + offsets.get(name, 0.0), 0.005))
+            angle = float(np.arctan2(way[1], way[0])) + offsets.get(name, 0.0)
+            taken.append(LandmarkBearing(now_ns, name, angle, 0.005))
         return bearing_messages.msg_from_bearings(now_ns, taken, "emitter")
 
     def test_1_before_the_first_turn_there_is_nothing_to_send(self) -> None:
@@ -122,7 +123,8 @@ class Landmarks(unittest.TestCase):
         self.assertTrue(wait_until(lambda: self.status.last.state_name in ("LOST", "UNCERTAIN"), 20.0),
                         f"{self.status.last}")
         if self.status.last.state_name == "LOST":
-            self.assertTrue(wait_until(lambda: self.status.last.state_name == "LOCALIZED", TURN_S), f"{self.status.last}")
+            self.assertTrue(wait_until(lambda: self.status.last.state_name == "LOCALIZED", TURN_S),
+                            f"{self.status.last}")
         else:  # not sure of being lost: whoever watches the robot asks
             self.publisher.publish(self.see())
             self.assertTrue(wait_until(lambda: self.send().success, 10.0))
@@ -132,7 +134,8 @@ class Landmarks(unittest.TestCase):
     def test_5_what_gives_no_position_is_said(self) -> None:
         self.assertTrue(wait_until(lambda: self.publisher.get_num_connections() >= 1, 10.0))
         self.publisher.publish(self.see(A3=0.3, A4=-0.25))
-        self.assertTrue(wait_until(lambda: self.lines.having("no position from bearings", "contradict each other"), 10.0))
+        self.assertTrue(wait_until(lambda: self.lines.having("no position from bearings", "contradict each other"),
+                                   10.0))
         strange = self.see()
         strange.ids = ["A2", "A3", "A4", "Z9"]
         self.publisher.publish(strange)
@@ -171,9 +174,10 @@ class Landmarks(unittest.TestCase):
         self.assertNear(self.fixes.last, self.true_pose(end_ns), 0.5)
 
     def test_7_files_and_parameters_that_cannot_be_used_end_the_node(self) -> None:
-        for arguments, text in ((["_landmark_file:=/none.yaml"], "/none.yaml: cannot be read: No such file or directory"),
-                                ([], "~landmark_file must name a file of landmarks, got ''"),
-                                (["_landmark_fil:=x"], "unknown parameter ~landmark_fil; did you mean ~landmark_file?")):
+        for arguments, text in (
+                (["_landmark_file:=/none.yaml"], "/none.yaml: cannot be read: No such file or directory"),
+                ([], "~landmark_file must name a file of landmarks, got ''"),
+                (["_landmark_fil:=x"], "unknown parameter ~landmark_fil; did you mean ~landmark_file?")):
             code, printed = Process("landmarks_node", "__name:=other", *arguments).wait(30.0)
             rospy.set_param("/other", {})
             self.assertEqual(code, 2, printed)

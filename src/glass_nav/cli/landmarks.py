@@ -21,8 +21,8 @@ from glass_nav.world.grid_map import GridMap
 from glass_nav.world.landmark_map import RANGE_M, VIEW_RAD, LandmarkMap
 
 HELP = "plan where landmarks for bearings shall hang"
-DESCRIPTION = """plan: how well a robot that sees the landmarks of a file will know its position, all over a map, and where
-more of them help most. Prints a line for each state, writes the picture landmarks.png and the file landmarks.yaml with
+DESCRIPTION = """plan: how well a robot that sees the landmarks of a file will know its position, all over a map, and
+where more of them help most. Prints a line for each state, writes the picture landmarks.png and the file landmarks.yaml with
 the suggested ones added."""
 
 GOOD_M = 0.3        # the seed document's bar for a position
@@ -37,15 +37,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     plan = tasks.add_parser("plan", help=HELP, description=DESCRIPTION)
     plan.add_argument("map", type=Path, metavar="MAP", help="map_server .yaml or MRPT .gridmap[.gz]")
     plan.add_argument("landmarks", type=Path, metavar="LANDMARKS",
-                      help="landmarks.yaml: sigma, and landmarks, a list of {id, position: [x, y], facing_deg, view_deg, "
-                           "range}; an empty list plans from nothing")
-    plan.add_argument("--out", type=Path, default=Path("."), metavar="DIR", help=f"for {PICTURE} and {FILE} (default .)")
+                      help="landmarks.yaml: sigma, and landmarks, a list of {id, position: [x, y], facing_deg, "
+                           "view_deg, range}; an empty list plans from nothing")
+    plan.add_argument("--out", type=Path, default=Path("."), metavar="DIR",
+                      help=f"for {PICTURE} and {FILE} (default .)")
     plan.add_argument("--add", type=int, default=1, metavar="N", help="tags to suggest (default 1)")
     plan.add_argument("--step-deg", type=float, default=1.0, metavar="DEG",
                       help="steps in which bearings are read, degrees (default 1)")
     plan.add_argument("--glass-map", type=Path, metavar="MAP",
-                      help="glass_map.yaml of glass_nav replay: walls that proved glassy hide no tag; without it all do")
-    plan.add_argument("--spacing", type=float, default=0.5, metavar="M", help="of the places looked at, m (default 0.5)")
+                      help="glass_map.yaml of glass_nav replay: walls that proved glassy hide no tag; without it all "
+                           "do")
+    plan.add_argument("--spacing", type=float, default=0.5, metavar="M",
+                      help="of the places looked at, m (default 0.5)")
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
@@ -105,8 +108,8 @@ def _check_inside(arguments: argparse.Namespace, grid_map: GridMap, landmarks: L
     if not inside.all():
         number = int(np.argmin(inside))
         x, y = landmarks.positions_m[number]
-        raise ValueError(f"{arguments.landmarks}: landmark {landmarks.ids[number]!r} at x {x:g} m, y {y:g} m lies outside "
-                         f"the map {arguments.map}")
+        raise ValueError(f"{arguments.landmarks}: landmark {landmarks.ids[number]!r} at x {x:g} m, y {y:g} m lies "
+                         f"outside the map {arguments.map}")
 
 
 def _see_through(grid_map: GridMap, path: Optional[Path]) -> GridMap:
@@ -117,7 +120,8 @@ def _see_through(grid_map: GridMap, path: Optional[Path]) -> GridMap:
     if glass.occupancy.shape != grid_map.occupancy.shape:
         raise ValueError(f"{path}: a glass map must have the cells of the map, {grid_map.occupancy.shape}, got "
                          f"{glass.occupancy.shape}")
-    return replace(grid_map, occupancy=np.where(glass.occupancy >= GLASS_PERCENT, 0, grid_map.occupancy).astype(np.int8))
+    occupancy = np.where(glass.occupancy >= GLASS_PERCENT, 0, grid_map.occupancy)
+    return replace(grid_map, occupancy=occupancy.astype(np.int8))
 
 
 def _line(sigma_m: np.ndarray, seen: np.ndarray) -> str:

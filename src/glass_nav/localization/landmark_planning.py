@@ -51,7 +51,8 @@ def points(grid_map: GridMap, spacing_m: float) -> np.ndarray:
     chosen[every // 2::every, every // 2::every] = True
     rows, columns = np.nonzero(free & chosen)
     if not len(rows):
-        raise ValueError(f"the map has no free place {CLEARANCE_M:g} m away from walls, looked for every {spacing_m:g} m")
+        raise ValueError(f"the map has no free place {CLEARANCE_M:g} m away from walls, looked for every "
+                         f"{spacing_m:g} m")
     return grid_map.centres(rows, columns)
 
 

@@ -6,9 +6,9 @@ moves, and the tag's bearing is read as the middle of the fine move in which it 
 with four tags, and a robot that drives takes each bearing from somewhere else. The emitter turns to and fro over its
 span, never through the gap behind the robot.
 
-A tag answers if the light comes from within its view, if nothing opaque is in the way (walls, furniture, people), and if
-enough light arrives. A slit spreads in height only, so light falls with the distance, and a pane that lets the share T
-through leaves T times the range: tags are seen through glass, from not quite as far. The radio goes through everything.
+A tag answers if the light comes from within its view, if nothing opaque is in the way (walls, furniture, people), and
+if enough light arrives. A slit spreads in height only, so light falls with the distance, and a pane that lets the share
+T through leaves T times the range: tags are seen through glass, from not quite as far. The radio goes through everything.
 Not modelled: light mirrored by a pane onto a tag, answers of two tags that garble each other, the width of the beam
 (7 mm at 15 m).
 """
@@ -90,7 +90,7 @@ class LandmarkScanner:
         self._turns: List[Turn] = []
 
     def step(self, now_ns: int, map_from_sensor: np.ndarray) -> None:
-        """Time has come to now; the sensor is there (3,). Steps should be short against a move and a turn of the robot."""
+        """Time has come to now; the sensor is there (3,). Steps should be short against a move."""
         while now_ns >= self._began_ns + self._move_ns:
             end_ns = self._began_ns + self._move_ns
             self._look(end_ns, 1.0, map_from_sensor)

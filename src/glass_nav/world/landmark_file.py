@@ -130,8 +130,8 @@ def _check_places(ids: Sequence[str], positions_m: np.ndarray) -> None:
     for number, name in enumerate(ids):
         near = np.hypot(*(positions_m[number + 1:] - positions_m[number]).T) < LEAST_DISTANCE_M
         if near.any():
-            raise ValueError(f"landmarks {name!r} and {ids[number + 1 + int(np.argmax(near))]!r} are in the same place, "
-                             f"{positions_m[number].tolist()}")
+            raise ValueError(f"landmarks {name!r} and {ids[number + 1 + int(np.argmax(near))]!r} are in the same "
+                             f"place, {positions_m[number].tolist()}")
 
 
 def _id(who: str, item: Dict[str, Any]) -> str:

@@ -26,7 +26,8 @@ def around_origin(ranges_m, first_deg, second_deg):
 
 @pytest.mark.parametrize("ranges_m, first_deg, second_deg, table_cm, within_cm", [
     pytest.param((8.563, 7.937, 7.573), 46.0, 54.0, TABLE_1, 0.1, id="table 1"),
-    pytest.param((8.6214, 8.7215, 10.2165), 35.0, 29.0, TABLE_2, 0.11, id="table 2, ranges fitted: not in the document")])
+    pytest.param((8.6214, 8.7215, 10.2165), 35.0, 29.0, TABLE_2, 0.11,
+                 id="table 2, ranges fitted: not in the document")])
 def test_the_tables_of_the_document_are_met_in_every_cell(ranges_m, first_deg, second_deg, table_cm, within_cm):
     found = bearing_errors.limits_of_error(around_origin(ranges_m, first_deg, second_deg), np.zeros(2), np.radians(1.0))
     assert np.abs(100.0 * found - table_cm).max() < within_cm

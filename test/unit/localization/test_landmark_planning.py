@@ -64,7 +64,8 @@ def test_the_suggested_place_is_the_best_of_all_tried_one_by_one():
     """Second implementation: expected_sigma() of the whole map with each candidate added."""
     grid = room(wall_at=60)
     walls, points = RayCaster(grid), landmark_planning.points(grid, 1.0)
-    tags = LandmarkMap(("a", "b"), np.array([[1.15, 3.0], [1.15, 8.5]]), np.zeros(2), np.full(2, np.pi), np.full(2, 15.0))
+    tags = LandmarkMap(("a", "b"), np.array([[1.15, 3.0], [1.15, 8.5]]), np.zeros(2), np.full(2, np.pi),
+                       np.full(2, 15.0))
     places = landmark_planning.candidates(grid, 2.0)
 
     def cost(landmarks):
@@ -77,7 +78,8 @@ def test_the_suggested_place_is_the_best_of_all_tried_one_by_one():
                                        places.view_rad[[number]], places.range_m[[number]]))
 
     costs = [cost(with_one(number)) for number in range(len(places))]
-    (best,) = landmark_planning.suggest(walls, tags, landmark_planning.visible(walls, tags, points), points, places, SIGMA, 1)
+    before = landmark_planning.visible(walls, tags, points)
+    (best,) = landmark_planning.suggest(walls, tags, before, points, places, SIGMA, 1)
     number = int(np.argmin(costs))
     assert cost(with_one(number)) < cost(tags)
     np.testing.assert_allclose(best.position_m, places.positions_m[number])
@@ -104,5 +106,5 @@ def test_where_no_tag_can_hang_none_is_suggested():
     points = landmark_planning.points(free, 1.0)
     places = landmark_planning.candidates(free, 1.0)
     assert len(places) == 0
-    assert landmark_planning.suggest(RayCaster(free), landmark_map.NONE, np.zeros((len(points), 0), bool), points, places,
-                                     SIGMA, 3) == []
+    none = np.zeros((len(points), 0), bool)
+    assert landmark_planning.suggest(RayCaster(free), landmark_map.NONE, none, points, places, SIGMA, 3) == []

@@ -60,8 +60,8 @@ def test_a_robot_that_drives_while_the_sensor_turns_is_where_its_odometry_and_th
 def test_the_heading_is_right_across_the_half_turn():
     for yaw in (np.pi - 1e-3, -np.pi + 1e-3):
         pose = np.array([0.0, 0.0, yaw])
-        for fix in (triangulation.triangulate(seen(FIELD, pose), FIELD), triangulation.average(seen(FIELD, pose), FIELD)):
-            assert abs(angles.wrap(fix.map_from_base[2] - yaw)) < 1e-9
+        for method in (triangulation.triangulate, triangulation.average):
+            assert abs(angles.wrap(method(seen(FIELD, pose), FIELD).map_from_base[2] - yaw)) < 1e-9
 
 
 def test_least_squares_is_at_the_minimum_of_the_squared_residuals():
@@ -146,7 +146,7 @@ def test_near_the_circle_more_landmarks_help_if_they_are_elsewhere():
 
 def test_in_line_with_all_landmarks_a_fix_is_refused():
     line = landmark_map.seen_from_all_sides("ABC", np.array([[0.0, 0.0], [2.0, 0.0], [5.0, 0.0]]))
-    with pytest.raises(TriangulationError, match="^the robot may be anywhere along the line through A, B and C: it is "):
+    with pytest.raises(TriangulationError, match="^the robot may be anywhere along the line through A, B and C: it "):
         triangulation.triangulate(seen(line, np.array([3.0, 0.0, 1.0]), 0.005), line)
     beside = np.array([1.0, 3.0, -2.0])
     assert off_m(triangulation.triangulate(seen(line, beside, 0.005), line).map_from_base, beside) < 1e-9
@@ -156,15 +156,16 @@ def test_a_far_robot_is_refused_for_its_uncertainty():
     near = landmark_map.seen_from_all_sides("ABCD", FIELD.positions_m)
     far = seen(near, np.array([3.0, -40.0, 0.0]), np.radians(0.3))
     for method in (triangulation.triangulate, triangulation.average):
-        with pytest.raises(TriangulationError, match=r"too unsure: sigma \d+\.\d\d m, allowed 0.5 m; the landmarks A, B, C "
-                                                     "and D are far away"):
+        with pytest.raises(TriangulationError, match=r"too unsure: sigma \d+\.\d\d m, allowed 0.5 m; the landmarks A, B, "
+                                                     "C and D are far away"):
             method(far, near, TriangulationLimits(min_off_circle_sigmas=1e-6))
 
 
 def test_three_directions_that_no_place_sees_are_refused():
     wrong = seen(FIELD, VIEWERS[0], 0.005, ids="ABC")
     wrong.angles_rad[1] += np.pi
-    with pytest.raises(TriangulationError, match="^no place sees A, B and C in these directions: one of them is wrong$"):
+    with pytest.raises(TriangulationError, match="^no place sees A, B and C in these directions: one of them is "
+                                                 "wrong$"):
         triangulation.triangulate(wrong, FIELD)
 
 
@@ -174,8 +175,8 @@ def test_a_place_from_which_a_landmark_cannot_be_seen_is_refused():
     place = np.array([0.001, 4.0, 1.0])
     with pytest.raises(TriangulationError) as caught:
         triangulation.triangulate(seen(facing, place, 0.003, ids="ABC"), facing)
-    assert str(caught.value) == ("the bearings of A, B and C lead to x 0.00 m, y 4.00 m, from where B cannot be seen: it "
-                                 "would be 5.0 m away and 143 degrees off its direction")
+    assert str(caught.value) == ("the bearings of A, B and C lead to x 0.00 m, y 4.00 m, from where B cannot be seen: "
+                                 "it would be 5.0 m away and 143 degrees off its direction")
     fix = triangulation.triangulate(seen(facing, place, 0.003), facing)  # of four, it is the wrong one
     assert fix.excluded_ids == ("B",)
 
@@ -207,8 +208,8 @@ def test_of_four_bearings_a_wrong_one_is_found_or_refused():
     a robot near the circle of the three right ones.
     """
     rng = np.random.default_rng(11)
-    facing = LandmarkMap(FIELD.ids, FIELD.positions_m, np.radians([-45.0, -90.0, -90.0, -135.0]), np.full(4, np.pi / 2.0),
-                         np.full(4, 15.0))
+    facing = LandmarkMap(FIELD.ids, FIELD.positions_m, np.radians([-45.0, -90.0, -90.0, -135.0]),
+                         np.full(4, np.pi / 2.0), np.full(4, 15.0))
     outcome = {"found": 0, "refused": 0, "astray": 0}
     for _ in range(300):
         pose = np.array([rng.uniform(-2.0, 2.0), rng.uniform(-2.0, 3.0), rng.uniform(-np.pi, np.pi)])
@@ -235,8 +236,8 @@ def test_what_cannot_be_told_is_refused_with_the_suspects():
     read.angles_rad[2] += np.radians(8.0)
     with pytest.raises(TriangulationError) as caught:
         triangulation.triangulate(read, FIELD)
-    assert str(caught.value) == ("the bearings of A, B, C and D contradict each other, and it cannot be told which one is "
-                                 "wrong: A, B, C or D")
+    assert str(caught.value) == ("the bearings of A, B, C and D contradict each other, and it cannot be told which one "
+                                 "is wrong: A, B, C or D")
 
 
 def test_two_wrong_bearings_of_five_are_refused():

@@ -28,8 +28,8 @@ def test_the_file_of_parameters_names_them_all_with_their_defaults():
     ({"landmark_file": ""}, "~landmark_file must name a file of landmarks, got ''"),
     ({"method": "magic"}, "~method must be one of least_squares, document, got 'magic'"),
     ({"window_s": -1.0}, "~window_s must be >= 0 and finite, got -1.0"),
-    ({"rescue_states": "LOST SAD"}, "~rescue_states must be words of UNKNOWN, GLOBAL_SEARCH, LOCALIZED, UNCERTAIN, LOST, "
-                                    "got 'SAD'"),
+    ({"rescue_states": "LOST SAD"}, "~rescue_states must be words of UNKNOWN, GLOBAL_SEARCH, LOCALIZED, UNCERTAIN, "
+                                    "LOST, got 'SAD'"),
     ({"odom_frame_id": "/"}, "~odom_frame_id must name a frame, got ''"),
     ({"max_misfit_chance": 0.0}, "~max_misfit_chance must be > 0 and < 1, got 0.0"),
     ({"bearing_drift_per_m": -0.1}, "~bearing_drift_per_m must be >= 0, got -0.1")])

@@ -68,8 +68,8 @@ def test_a_bearing_that_means_nothing_is_refused(fields, text):
 
 @pytest.mark.parametrize("fields, text", [
     ({"ids": ("A", "A")}, "bearings must be of different landmarks, got A more than once"),
-    ({"angles_rad": np.zeros(3)}, "expected 2 ids with angles (N,), sigma (N,), sensor poses (N, 3) and origin sigma (N,), "
-                                  "got (3,), (2,), (2, 3), (2,)"),
+    ({"angles_rad": np.zeros(3)}, "expected 2 ids with angles (N,), sigma (N,), sensor poses (N, 3) and origin "
+                                  "sigma (N,), got (3,), (2,), (2, 3), (2,)"),
     ({"angles_rad": np.array([0.0, np.inf])}, "bearings and the poses they were taken from must be finite"),
     ({"sigma_rad": np.array([0.1, 0.0])}, "sigma of bearings must be > 0 rad, got [0.1, 0.0]"),
     ({"origin_sigma_m": np.array([0.1, -1.0])}, "origin sigma of bearings must be >= 0 m, got [0.1, -1.0]")])

@@ -7,8 +7,7 @@ import pytest
 
 from glass_nav.geometry import angles, se2
 from glass_nav.simulation import landmark_scanner
-from glass_nav.simulation.building import Building, Mirror, Pane, Person, Wall, box
-from glass_nav.simulation.building import Thing
+from glass_nav.simulation.building import Building, Mirror, Pane, Person, Thing, Wall, box
 from glass_nav.simulation.landmark_scanner import LandmarkScanner, ScannerModel
 from glass_nav.simulation.lidar import LidarModel
 from glass_nav.simulation.simulation import START_NS, Simulation
@@ -160,8 +159,8 @@ def test_light_through_two_panes_is_the_product():
 
 
 @pytest.mark.parametrize("fields, text", [
-    ({"reading_rad": np.radians(0.1)}, "a landmark scanner needs 0 < motor step <= reading step <= coarse move <= span <= "
-                                       "360 degrees, got 0.18, 0.1, 10, 300"),
+    ({"reading_rad": np.radians(0.1)}, "a landmark scanner needs 0 < motor step <= reading step <= coarse move <= span "
+                                       "<= 360 degrees, got 0.18, 0.1, 10, 300"),
     ({"move_s": 0.0}, "a move of a landmark scanner must take > 0 s, got 0.0")])
 def test_a_scanner_that_cannot_be_is_refused(fields, text):
     with pytest.raises(ValueError) as caught:

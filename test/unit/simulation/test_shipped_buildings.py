@@ -82,7 +82,8 @@ def test_every_path_can_be_driven_also_when_all_furniture_has_moved(name, kind):
 
 @pytest.mark.parametrize("name", shipped_buildings.shipped())
 def test_the_landmark_file_beside_a_building_is_that_of_its_tags(name):
-    building, path = building_file.load(shipped_buildings.find(name)), REPO / "maps" / name / building_map.LANDMARKS_NAME
+    building = building_file.load(shipped_buildings.find(name))
+    path = REPO / "maps" / name / building_map.LANDMARKS_NAME
     assert path.is_file() == bool(len(building.tags))
     if path.is_file():
         landmarks = landmark_file.load(path)

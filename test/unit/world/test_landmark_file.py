@@ -46,7 +46,8 @@ def test_a_file_may_have_no_landmarks_yet(tmp_path):
 
 
 def test_what_is_saved_is_read_again(tmp_path):
-    landmarks = LandmarkMap(("A", "007", "17", "it's: {odd}", "true"), np.array([[0.1, 1 / 3], [2, 3], [4, 5], [6, 7], [8, 9]]),
+    landmarks = LandmarkMap(("A", "007", "17", "it's: {odd}", "true"),
+                            np.array([[0.1, 1 / 3], [2, 3], [4, 5], [6, 7], [8, 9]]),
                             np.array([np.nan, 0.5, -3.0, 1.0, 2.0]), np.array([2 * np.pi, 1.0, 1.5, 2.0, 3.0]),
                             np.array([np.inf, 15.0, 8.0, 15.0, 15.0]), 0.003)
     landmark_file.save(landmarks, tmp_path / "a.yaml", "made by a test")

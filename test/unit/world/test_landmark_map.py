@@ -53,8 +53,8 @@ def test_two_maps_make_one():
 
 
 @pytest.mark.parametrize("fields, text", [
-    ({"range_m": np.array([1.0])}, "expected 2 landmarks with positions (N, 2), facing (N,), view (N,) and range (N,), got "
-                                   "(2, 2), (2,), (2,), (1,)"),
+    ({"range_m": np.array([1.0])}, "expected 2 landmarks with positions (N, 2), facing (N,), view (N,) and range (N,), "
+                                   "got (2, 2), (2,), (2,), (1,)"),
     ({"positions_m": np.array([[0.0, 0.0], [np.inf, 0.0]])}, "landmark 'B': position must be finite, got [inf, 0.0]"),
     ({"facing_rad": np.array([np.inf, 0.0])}, "landmark 'A': facing must be finite, got inf"),
     ({"sigma_m": -0.1}, "sigma of the landmarks must be >= 0 m, got -0.1")])
