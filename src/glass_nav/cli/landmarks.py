@@ -22,8 +22,8 @@ from glass_nav.world.landmark_map import RANGE_M, VIEW_RAD, LandmarkMap
 
 HELP = "plan where landmarks for bearings shall hang"
 DESCRIPTION = """plan: how well a robot that sees the landmarks of a file will know its position, all over a map, and
-where more of them help most. Prints a line for each state, writes the picture landmarks.png and the file landmarks.yaml with
-the suggested ones added."""
+where more of them help most. Prints a line for each state, writes the picture landmarks.png and the file
+landmarks.yaml with the suggested ones added."""
 
 GOOD_M = 0.3        # the seed document's bar for a position
 GLASS_PERCENT = 50  # of a cell of a glass map that lets the light through

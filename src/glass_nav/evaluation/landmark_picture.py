@@ -56,6 +56,7 @@ def draw(path: Path, grid: MapImage, points_m: np.ndarray, spacing_m: float, pan
 def _draw_panel(axes: Any, grid: MapImage, points_m: np.ndarray, spacing_m: float, panel: Panel, low: np.ndarray,
                 high: np.ndarray) -> Any:
     from matplotlib.collections import PolyCollection
+    from matplotlib.patheffects import withStroke
 
     draw_map(axes, grid, low, high)
     corners = points_m[:, None] + 0.5 * spacing_m * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
@@ -72,7 +73,7 @@ def _draw_panel(axes: Any, grid: MapImage, points_m: np.ndarray, spacing_m: floa
                 axes.annotate("", (x + ARROW_M * np.cos(facing), y + ARROW_M * np.sin(facing)), (x, y), zorder=4,
                               arrowprops={"arrowstyle": "-|>", "color": colour, "linewidth": 1.6})
             axes.annotate(name, (x, y), textcoords="offset points", xytext=(5, 5), fontsize=9, color=colour,
-                          fontweight="bold", zorder=5)
+                          fontweight="bold", zorder=5, path_effects=[withStroke(linewidth=2.5, foreground="white")])
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")

@@ -4,6 +4,7 @@ Points are places of the map where a robot may stand; a landmark is seen from on
 wall stands between. Each point costs its expected standard deviation, as far as CAP_M; a point without three landmarks
 costs CAP_M and as much again for each that is missing, so that the first tag of three is worth something too. The
 best place for another tag is where the mean cost falls most; the next one is looked for with that tag in place.
+Taken for granted: a sensor that looks all round, and that a tag can hang on everything that is occupied on the map.
 M points, N landmarks, K candidates.
 """
 

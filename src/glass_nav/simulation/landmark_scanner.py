@@ -8,7 +8,8 @@ span, never through the gap behind the robot.
 
 A tag answers if the light comes from within its view, if nothing opaque is in the way (walls, furniture, people), and
 if enough light arrives. A slit spreads in height only, so light falls with the distance, and a pane that lets the share
-T through leaves T times the range: tags are seen through glass, from not quite as far. The radio goes through everything.
+T through leaves T times the range: tags are seen through glass, from not quite as far. The radio goes through
+everything.
 Not modelled: light mirrored by a pane onto a tag, answers of two tags that garble each other, the width of the beam
 (7 mm at 15 m).
 """

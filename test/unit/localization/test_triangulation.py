@@ -156,8 +156,8 @@ def test_a_far_robot_is_refused_for_its_uncertainty():
     near = landmark_map.seen_from_all_sides("ABCD", FIELD.positions_m)
     far = seen(near, np.array([3.0, -40.0, 0.0]), np.radians(0.3))
     for method in (triangulation.triangulate, triangulation.average):
-        with pytest.raises(TriangulationError, match=r"too unsure: sigma \d+\.\d\d m, allowed 0.5 m; the landmarks A, B, "
-                                                     "C and D are far away"):
+        with pytest.raises(TriangulationError, match=r"too unsure: sigma \d+\.\d\d m, allowed 0.5 m; the landmarks A, "
+                                                     "B, C and D are far away"):
             method(far, near, TriangulationLimits(min_off_circle_sigmas=1e-6))
 
 
