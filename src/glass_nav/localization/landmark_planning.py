@@ -76,7 +76,7 @@ def candidates(grid_map: GridMap, spacing_m: float) -> LandmarkMap:
     near_free = grid_map.occupied & ndimage.binary_dilation(grid_map.free, np.ones((3, 3), bool))
     every = max(int(round(spacing_m / grid_map.resolution_m)), 1)
     rows, columns = np.nonzero(near_free)
-    _, chosen = np.unique(np.stack([rows // every, columns // every], axis=1), axis=0, return_index=True)
+    _, chosen = np.unique((rows // every) * near_free.shape[1] + columns // every, return_index=True)
     rows, columns = rows[chosen], columns[chosen]
     offsets = np.arange(-NORMAL_CELLS, NORMAL_CELLS + 1)
     free = np.pad(grid_map.free, NORMAL_CELLS).astype(float)

@@ -13,17 +13,17 @@ seen from (their range, their direction); if several do, the fix is refused. Fro
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import List, Optional, Tuple
 
 import numpy as np
 from scipy import stats
 
-from glass_nav.geometry import angles
+from glass_nav.geometry import angles, se2
 from glass_nav.localization import bearing_model, inscribed_circles
 from glass_nav.localization.bearing_model import Sightings
-from glass_nav.sensing.bearings import LandmarkBearings
+from glass_nav.sensing.bearings import LandmarkBearings, OdometryDrift
 from glass_nav.world.landmark_map import LandmarkMap
 
 _FLIPPED_RAD = 0.5 * np.pi  # misfit of a triple: 0 or pi
@@ -147,6 +147,17 @@ def average(bearings: LandmarkBearings, landmarks: LandmarkMap,
     if objection is not None:
         raise TriangulationError(objection)
     return _fix(bearings, np.isin(np.arange(len(bearings)), members), fit)
+
+
+def carried_along(fix: Fix, stamp_ns: int, base_from_later: np.ndarray, drift: OdometryDrift = OdometryDrift()) -> Fix:
+    """The fix at a later stamp, by what odometry (3,) says of the way since; less sure by its drift."""
+    pose = se2.compose(fix.map_from_base, base_from_later)
+    dx, dy = pose[:2] - fix.map_from_base[:2]
+    by_fix = np.array([[1.0, 0.0, -dy], [0.0, 1.0, dx], [0.0, 0.0, 1.0]])  # an error of the heading swings the way
+    way_m, turn_rad = float(np.hypot(dx, dy)), abs(float(angles.wrap(base_from_later[2])))
+    heading = drift.bearing_drift_rad_per_m * way_m + drift.bearing_drift_per_rad * turn_rad
+    more = np.diag(np.square([drift.bearing_drift_per_m * way_m] * 2 + [heading]))
+    return replace(fix, stamp_ns=stamp_ns, map_from_base=pose, covariance=by_fix @ fix.covariance @ by_fix.T + more)
 
 
 # -- triples

@@ -6,12 +6,12 @@ Bearings come as the sensor turns, up to a minute for a turn. The newest bearing
 kept; each message, once odometry is there for all of its stamps, gives a fix at the stamp of its last bearing, older
 ones carried along by odometry. A turn that gives no fix says why, in the log and to whoever asks.
 
-Subscribes: landmark_bearings (LandmarkBearings), glass_localization/status (LocalizationStatus; remap
-    `localization_status`), tf odom <- base <- sensor.
-Publishes: ~pose (PoseWithCovarianceStamped in map, of base at the last bearing), initialpose
-    (PoseWithCovarianceStamped): on request, and once for each fix while the localization is in one of ~rescue_states
-    (at most every ~rescue_period_s, so that it can settle in between); ~markers (MarkerArray, latched: landmarks, and
-    lines to those of the last fix).
+Subscribes: landmark_bearings (LandmarkBearings), localization_status (LocalizationStatus; launch/landmarks.launch
+    remaps it to glass_localization/status), tf odom <- base <- sensor.
+Publishes: ~pose (PoseWithCovarianceStamped in map, of base at the last bearing);
+    initialpose (PoseWithCovarianceStamped, the fix carried along to the newest odometry): on request, and once for each
+    fix while the localization is in one of ~rescue_states, at most every ~rescue_period_s, so that it can settle;
+    ~markers (MarkerArray, latched): the landmarks, and lines to those of the last fix.
 Services: ~send_initialpose (std_srvs/Trigger): the last fix to initialpose; refused, with the reason, if there is none
     younger than ~max_age_s.
 Parameters: LandmarksNodeParams, TriangulationLimits, OdometryDrift, read once; explained in config/landmarks.yaml.
@@ -33,6 +33,7 @@ from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 from visualization_msgs.msg import MarkerArray
 
 from glass_nav import params
+from glass_nav.geometry import se2
 from glass_nav.localization import triangulation
 from glass_nav.localization.triangulation import Fix, TriangulationLimits
 from glass_nav.msg import LandmarkBearings as LandmarkBearingsMsg
@@ -113,6 +114,7 @@ class LandmarksNode:
         self._waiting: "List[tuple[float, LandmarkBearingsMsg]]" = []  # arrival [s], for their odometry
         self._newest: Dict[str, Tuple[LandmarkBearing, np.ndarray]] = {}  # with odom_from_base at its stamp
         self._fix: Optional[Fix] = None
+        self._odom_at_fix = np.zeros(3)
         self._why_none = "no bearings came yet"
         self._state = ""
         self._sent_ns = self._rescued_ns = 0  # stamps of fixes
@@ -191,7 +193,7 @@ class LandmarksNode:
         self._newest = {name: each for name, each in self._newest.items()
                         if newest_ns - each[0].stamp_ns <= self._p.window_s * 1e9}
         in_order = sorted(self._newest.values(), key=lambda each: each[0].stamp_ns)
-        self._fix_from(bearings.collected([bearing for bearing, _ in in_order],
+        self._fix_from(in_order[-1][1], bearings.collected([bearing for bearing, _ in in_order],
                                           np.array([odometry for _, odometry in in_order]),
                                           mounting.base_from_laser, self._drift))
 
@@ -199,14 +201,14 @@ class LandmarksNode:
         return conversions.planar_from_transform(self._tf.lookup_transform(
             self._p.odom_frame_id, self._p.base_frame_id, conversions.stamp_from_ns(stamp_ns)).transform)
 
-    def _fix_from(self, taken: LandmarkBearings) -> None:
+    def _fix_from(self, odom_from_base: np.ndarray, taken: LandmarkBearings) -> None:
         solve = triangulation.average if self._p.method == "document" else triangulation.triangulate
         try:
             fix = solve(taken, self._landmarks, self._limits)
         except triangulation.TriangulationError as err:
             self._refuse(str(err))
             return
-        self._fix = fix
+        self._fix, self._odom_at_fix = fix, odom_from_base
         if fix.excluded_ids:
             self._log.warn(f"bearings that contradict the others are left out: {', '.join(fix.excluded_ids)}")
         frame = self._p.global_frame_id
@@ -246,10 +248,20 @@ class LandmarksNode:
                 or (fix.stamp_ns - self._rescued_ns) * 1e-9 < self._p.rescue_period_s):
             return
         self._rescued_ns = fix.stamp_ns
-        self._send(fix, f"the localization is {self._state}")
+        try:
+            self._send(fix, f"the localization is {self._state}")
+        except ValueError as err:
+            self._log.warn(f"initialpose not sent: {err}")
 
     def _send(self, fix: Fix, why: str) -> None:
+        """As of the newest odometry: whoever receives it need not remember the odometry of a whole turn."""
+        try:
+            newest = self._tf.lookup_transform(self._p.odom_frame_id, self._p.base_frame_id, rospy.Time(0))
+        except tf2_ros.TransformException as err:  # tf was cleared since the fix
+            raise ValueError(f"no odometry to carry the position along: {err}") from err
         self._sent_ns = fix.stamp_ns
+        step = se2.compose(se2.inverse(self._odom_at_fix), conversions.planar_from_transform(newest.transform))
+        fix = triangulation.carried_along(fix, conversions.ns_from_stamp(newest.header.stamp), step, self._drift)
         floor = np.diag(np.square([self._p.min_position_sigma_m] * 2 + [self._p.min_heading_sigma_rad]))
         self._initial_poses.publish(conversions.pose_with_covariance(
             fix.stamp_ns, fix.map_from_base, fix.covariance + floor, self._p.global_frame_id))

@@ -266,3 +266,20 @@ def test_limits_that_mean_nothing_are_refused(name, value, text):
     with pytest.raises(ValueError) as caught:
         TriangulationLimits(**{name: value})
     assert str(caught.value) == text
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_fix_that_is_carried_along_is_as_unsure_as_drawn_poses_moved_by_drawn_odometry(seed):
+    rng = np.random.default_rng(seed)
+    fix = triangulation.triangulate(seen(FIELD, VIEWERS[seed], np.radians(0.3)), FIELD)
+    step, drift = np.array([2.0, 0.5, 1.0]), OdometryDrift(0.05, 0.01, 0.03)
+    later = triangulation.carried_along(fix, 77, step, drift)
+    np.testing.assert_allclose(later.map_from_base, se2.compose(fix.map_from_base, step))
+    assert (later.stamp_ns, later.used_ids) == (77, fix.used_ids)
+    way_m = float(np.hypot(*step[:2]))
+    noise = rng.normal(0.0, 1.0, (4000, 3)) * [0.05 * way_m, 0.05 * way_m, 0.01 * way_m + 0.03 * step[2]]
+    poses = rng.multivariate_normal(fix.map_from_base, fix.covariance, 4000)
+    moved = se2.compose(poses, step + noise)
+    off = moved - later.map_from_base
+    off[:, 2] = angles.wrap(off[:, 2])
+    np.testing.assert_allclose(np.sqrt((off ** 2).mean(axis=0)), np.sqrt(np.diag(later.covariance)), rtol=0.06)
