@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from glass_nav.geometry import angles, se2
-from glass_nav.simulation import landmark_scanner
+from glass_nav.localization import triangulation
+from glass_nav.sensing import bearings
+from glass_nav.simulation import building_file, landmark_scanner, shipped_buildings
 from glass_nav.simulation.building import Building, Mirror, Pane, Person, Thing, Wall, box
 from glass_nav.simulation.landmark_scanner import LandmarkScanner, ScannerModel
 from glass_nav.simulation.lidar import LidarModel
 from glass_nav.simulation.simulation import START_NS, Simulation
-from glass_nav.world import landmark_map
+from glass_nav.world import landmark_file, landmark_map
 from glass_nav.world.landmark_map import LandmarkMap
 
 STEP_NS = 20_000_000
@@ -63,7 +65,7 @@ def test_bearings_are_read_in_steps_around_the_true_ones(reading_deg, seed):
 
 def test_the_told_sigma_is_that_of_what_is_read():
     model, off = ScannerModel(), []
-    for seed in range(60):
+    for seed in range(40):
         rng = np.random.default_rng(seed)
         pose = np.append(rng.uniform(-1.0, 1.0, 2), rng.uniform(-0.3, 0.3))
         (turn,) = turns(hall(), still(pose), model)
@@ -166,3 +168,19 @@ def test_a_scanner_that_cannot_be_is_refused(fields, text):
     with pytest.raises(ValueError) as caught:
         ScannerModel(**fields)
     assert str(caught.value) == text
+
+
+@pytest.mark.parametrize("hidden", ["A2", "A4", "A5"])  # without A3 the rest is far ahead: sigma 0.6 m, refused
+def test_three_tags_of_the_glass_office_tell_a_robot_at_the_start_where_it_is(hidden):
+    building = building_file.load(shipped_buildings.find("glass_office"))
+    simulation = Simulation(building, LidarModel(beams=3), scanner=ScannerModel())
+    while not (turns_made := simulation.take_turns()):
+        simulation.move(1.0, np.zeros(3))
+    taken = [bearing for bearing in turns_made[0].bearings if bearing.landmark_id != hidden]
+    assert len(taken) == 3
+    landmarks = landmark_file.load(shipped_buildings.find("glass_office").parent / "landmarks.yaml")
+    fix = triangulation.triangulate(bearings.collected(taken, np.zeros((3, 3)), np.zeros(3)), landmarks)
+    off = fix.map_from_base - simulation.map_from_base
+    off[2] = angles.wrap(off[2])
+    assert np.hypot(*off[:2]) < 0.3 and abs(off[2]) < 0.03
+    assert off @ np.linalg.solve(fix.covariance, off) < 16.3  # chi-square of 3 degrees of freedom at 0.999
