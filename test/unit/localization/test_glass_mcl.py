@@ -335,7 +335,7 @@ def test_in_an_area_only_what_lies_in_it_is_a_candidate():
     mcl.scatter(np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0]]))
     true = np.array([2.0, 2.5, 0.3])
     told = mcl.update(room.scan(true), np.zeros(3))
-    assert np.all(told.particles[:, :2] < 3.7)  # aligned, which may lead out by decimetres
+    assert np.all(told.particles[:, :2] < 3.7)  # an alignment may lead out by decimetres
     assert off(told.map_from_base, true)[0] < 0.1
 
 
