@@ -345,8 +345,8 @@ class LocalizationInterface(RoomTest):
 
     def test_terminated_it_saves_the_pose(self) -> None:
         printed = self.check_end("terminated", signal.SIGTERM, "amcl", "_receive_map_topic:=true")
-        self.assertIn("/terminated: unknown parameter ~receive_map_topic; did you mean ~use_map_topic?; not used, as by "
-                      "amcl", printed)
+        self.assertIn("/terminated: unknown parameter ~receive_map_topic; did you mean ~use_map_topic?; not used, as "
+                      "by amcl", printed)
 
 
 if __name__ == "__main__":

@@ -111,6 +111,7 @@ class LocalizationNode:
             for command in mail["commands"]:
                 command()
             self._maps.request()
+            mail["scans"] += self._inbox.take_now("scans")  # a new map takes a while
             unusable = "there is no map yet" if self._mcl is None else None
             for msg in mail["scans"]:
                 if self._scans.receive(msg, self._now_s, unusable):
