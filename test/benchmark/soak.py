@@ -325,7 +325,8 @@ def report(soak: Soak, wall_s: float) -> None:
     print(f"newer scans that lay before the node when it took one: at most {passed.max()}, of {len(passed)} in "
           f"{np.count_nonzero(passed)} any")
     print(f"age of the stamp of tf when the next scan comes, at the speed of the clock: median "
-          f"{np.median(age_s):.3f} s, p99 {np.quantile(age_s, 0.99):.3f} s, most {age_s.max():.3f} s ({len(age_s)} scans; load of the machine "
+          f"{np.median(age_s):.3f} s, p99 {np.quantile(age_s, 0.99):.3f} s, most {age_s.max():.3f} s "
+          f"({len(age_s)} scans; load of the machine "
           f"{os.getloadavg()[1]:.1f} on {os.cpu_count()} processors)")
     print("position off at the end of each minute: " + ", ".join(f"{each:.3f}" for each in watch.pose_off_m) + " m")
     for note in sorted(set(soak.notes)):

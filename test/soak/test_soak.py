@@ -1,4 +1,4 @@
-"""The short form of the soak: three simulated minutes of faults, every bar but the age of tf, which is the machine's."""
+"""The short form of the soak: three simulated minutes of faults, all bars but the age of tf, which is the machine's."""
 
 from __future__ import annotations
 
