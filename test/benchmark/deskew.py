@@ -28,7 +28,8 @@ sys.path.append(str(Path(__file__).resolve().parent))
 import drives
 from glass_nav.geometry import angles
 from glass_nav.geometry.trajectory import Trajectory
-from glass_nav.localization.glass_mcl import GlassMcl, GlassMclParams
+from glass_nav.localization.glass_mcl import GlassMcl
+from glass_nav.localization.glass_mcl_params import GlassMclParams
 from glass_nav.sensing import deskew
 from glass_nav.simulation import building_file, building_map, lidar
 from glass_nav.simulation.path_follower import FollowerParams

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from glass_nav import amcl_parameters, params
-from glass_nav.localization.glass_mcl import GlassMclParams
+from glass_nav.localization.glass_mcl_params import GlassMclParams
 from glass_nav.params import ParamError
 
 

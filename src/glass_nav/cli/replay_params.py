@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, List, Tuple
 
 from glass_nav import amcl_parameters, params
-from glass_nav.localization.glass_mcl import GlassMclParams
+from glass_nav.localization.glass_mcl_params import GlassMclParams
 from glass_nav.localization.start_pose import StartPose
 from glass_nav.params import ParamError
 from glass_nav.sensing.deskew import Deskew

@@ -15,7 +15,7 @@ from typing import Any, Dict, List, Mapping, Tuple
 import numpy as np
 
 from glass_nav import amcl_parameters, params
-from glass_nav.localization.glass_mcl import GlassMclParams
+from glass_nav.localization.glass_mcl_params import GlassMclParams
 from glass_nav.localization.saved_pose import PoseFile
 from glass_nav.localization.start_pose import StartPose
 from glass_nav.params import ParamError

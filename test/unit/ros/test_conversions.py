@@ -142,7 +142,7 @@ def estimate(particles: int = 3) -> Estimate:
     poses = np.random.default_rng(0).uniform(-3, 3, (particles, 3))
     surface = SurfaceScan(np.array([1.1, np.inf, 2.0]), np.array([False, False, True]), True)
     return Estimate(1_000_000_001, np.array([1.0, 2.0, 0.5]), covariance, np.zeros(3), cases, surface, poses,
-                    "LOCALIZED", "for the test", 0.9, True)
+                    "LOCALIZED", "for the test", 0.9, True, 0.8)
 
 
 def test_the_pose_message_holds_the_covariance_at_x_y_and_yaw():
