@@ -28,6 +28,7 @@ from glass_nav.sensing.scan_matcher import ScanMatcher
 _BEAMS = 60
 _LEAST_BEAMS = 10          # fewer tell nothing about where they were taken
 _PLACES = 4000             # of an exhaustive search, before they are aligned
+_SLIDE_M = 0.6             # that an alignment may lead away from where the scan was found
 _MOST = 1500               # candidates that are followed
 _EVIDENCE_SCALE_M = 0.2    # a beam that ends this far from a wall speaks for the place by one half
 _NATS_OF_A_FULL_FIT = 20.0  # between places where all beams end on walls and where none does, in one view
@@ -164,8 +165,10 @@ class GlobalSearch:
     def _look_everywhere(self, points: np.ndarray) -> np.ndarray:
         """(K, 3) places where this scan fits, the best first, each only once."""
         self._looked, self._way_m = True, 0.0
-        places = scan_alignment.align(self._field, points, self._matcher.search(points, _PLACES).poses)
-        poses = places.poses[np.argsort(-places.fit, kind="stable")]
+        starts = self._matcher.search(points, _PLACES).poses
+        places = scan_alignment.align(self._field, points, starts)
+        near = np.hypot(*(places.poses[:, :2] - starts[:, :2]).T) < _SLIDE_M  # farther away it is another place
+        poses = places.poses[near][np.argsort(-places.fit[near], kind="stable")]
         return poses[_first_of_each_cell(poses)]
 
     def _append(self, poses: np.ndarray, evidence: np.ndarray) -> None:

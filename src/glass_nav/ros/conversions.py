@@ -132,10 +132,16 @@ def guess_from_msg(msg: PoseWithCovarianceStamped, map_frame: str) -> PoseGuess:
 
 def pose_msg(estimate: Estimate, map_frame: str) -> PoseWithCovarianceStamped:
     """The message of `amcl_pose`: the covariance is filled at x, y and yaw and 0 elsewhere, as AMCL's."""
-    msg = PoseWithCovarianceStamped(header=header(estimate.stamp_ns, map_frame))
-    msg.pose.pose = pose_from_planar(estimate.map_from_base)
+    return pose_with_covariance(estimate.stamp_ns, estimate.map_from_base, estimate.covariance, map_frame)
+
+
+def pose_with_covariance(stamp_ns: int, map_from_base: np.ndarray, covariance: np.ndarray,
+                         map_frame: str) -> PoseWithCovarianceStamped:
+    """A pose (3,) with its covariance (3, 3) of x, y, yaw; 0 elsewhere."""
+    msg = PoseWithCovarianceStamped(header=header(stamp_ns, map_frame))
+    msg.pose.pose = pose_from_planar(map_from_base)
     spatial = np.zeros((6, 6))
-    spatial[_X_Y_YAW] = estimate.covariance
+    spatial[_X_Y_YAW] = covariance
     msg.pose.covariance = spatial.ravel().tolist()
     return msg
 

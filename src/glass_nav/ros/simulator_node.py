@@ -5,6 +5,8 @@ Wiring only; the robot is simulation.Simulation. One loop moves it; callbacks st
 Subscribes: cmd_vel (Twist; goes before the path), tf map -> odom (only to know whether and
     how far the localization has come).
 Publishes: /clock, scan (LaserScan), odom (Odometry), tf odom -> base_link and base_link -> laser (static),
+    landmark_bearings (LandmarkBearings, at the end of each turn of the scanner, if the building has tags), tf base_link
+    -> emitter (static),
     ground_truth (PoseStamped in map) and true_beams (TrueBeams) with the stamps of scan, ~blocked (Bool, latched: an
     obstacle stops the robot), initialpose (if ~give_initial_pose), map and map_metadata (latched, if ~serve_map).
 Services: static_map (GetMap, if ~serve_map).
@@ -31,13 +33,14 @@ from std_msgs.msg import Bool
 from tf2_msgs.msg import TFMessage
 
 from glass_nav import params
-from glass_nav.msg import TrueBeams
-from glass_nav.ros import conversions, endings, frame_messages
+from glass_nav.msg import LandmarkBearings, TrueBeams
+from glass_nav.ros import bearing_messages, conversions, endings, frame_messages
 from glass_nav.ros.frame_messages import FrameNames
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Mailbox
 from glass_nav.ros.served_map import ServedMap
 from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings
+from glass_nav.simulation.landmark_scanner import ScannerModel
 from glass_nav.simulation.path_follower import FollowerParams, PathFollower
 from glass_nav.simulation.robot import RobotParams
 from glass_nav.simulation.simulation import CONTROL_S, Frame, Simulation
@@ -67,6 +70,11 @@ class SimulatorNodeParams:
     laser_x_m: float = 0.12           # where the laser sits on the robot
     laser_y_m: float = 0.0
     laser_yaw_rad: float = 0.0
+    landmark_reading_deg: float = 1.0  # steps in which bearings to tags are read
+    landmark_move_s: float = 0.8      # of the scanner: four tags take about 60 s a turn
+    emitter_x_m: float = 0.0          # where the landmark scanner sits on the robot
+    emitter_y_m: float = 0.0
+    emitter_yaw_rad: float = 0.0
     give_initial_pose: bool = False
     serve_map: bool = False
     map_resolution_m: float = 0.05
@@ -74,6 +82,7 @@ class SimulatorNodeParams:
     odom_frame_id: str = "odom"
     base_frame_id: str = "base_link"
     laser_frame_id: str = "laser"
+    emitter_frame_id: str = "emitter"
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.speed_factor < math.inf:
@@ -82,10 +91,11 @@ class SimulatorNodeParams:
             raise ValueError(f"~beams must be >= 0, got {self.beams}")
         if not 0.01 <= self.map_resolution_m <= 1.0:
             raise ValueError(f"~map_resolution_m must be 0.01 to 1 m, got {self.map_resolution_m}")
-        names = self.global_frame_id, self.odom_frame_id, self.base_frame_id, self.laser_frame_id
-        if len(set(names)) < 4 or not all(names):
-            raise ValueError("~global_frame_id, ~odom_frame_id, ~base_frame_id and ~laser_frame_id must differ and "
-                             f"name a frame, got {', '.join(map(repr, names))}")
+        names = (self.global_frame_id, self.odom_frame_id, self.base_frame_id, self.laser_frame_id,
+                 self.emitter_frame_id)
+        if len(set(names)) < len(names) or not all(names):
+            raise ValueError("~global_frame_id, ~odom_frame_id, ~base_frame_id, ~laser_frame_id and ~emitter_frame_id "
+                             f"must differ and name a frame, got {', '.join(map(repr, names))}")
 
 
 @dataclass(frozen=True)
@@ -124,6 +134,7 @@ class SimulatorNode:
         self._odometry = rospy.Publisher("odom", Odometry, queue_size=100, tcp_nodelay=True)
         self._truth = rospy.Publisher("ground_truth", PoseStamped, queue_size=100)
         self._true_beams = rospy.Publisher("true_beams", TrueBeams, queue_size=100)
+        self._bearings = rospy.Publisher("landmark_bearings", LandmarkBearings, queue_size=10)
         self._blocked_flag = rospy.Publisher("~blocked", Bool, queue_size=10, latch=True)
         self._transforms = rospy.Publisher("/tf", TFMessage, queue_size=100, tcp_nodelay=True)
         self._static_transforms = tf2_ros.StaticTransformBroadcaster()
@@ -138,8 +149,10 @@ class SimulatorNode:
     def run(self, ending: threading.Event) -> None:
         """The only thread that moves the robot; returns when ROS shuts down or ending is set."""
         simulation = self._simulation
-        self._static_transforms.sendTransform(conversions.transform_stamped(
-            simulation.stamp_ns, self._names.base, self._names.laser, simulation.base_from_laser))
+        self._static_transforms.sendTransform([
+            conversions.transform_stamped(simulation.stamp_ns, self._names.base, child, base_from_child)
+            for child, base_from_child in ((self._names.laser, simulation.base_from_laser),
+                                           (self._p.emitter_frame_id, simulation.base_from_emitter))])
         self._blocked_flag.publish(Bool(False))
         self._publish_reading()
         self._paced_s = time.monotonic()
@@ -220,6 +233,9 @@ class SimulatorNode:
         self._transforms.publish(TFMessage([conversions.transform_stamped(
             reading.stamp_ns, self._names.odom, self._names.base, reading.odom_from_base)]))
         self._odometry.publish(frame_messages.odometry_msg(reading, self._names))
+        for turn in self._simulation.take_turns():
+            self._bearings.publish(bearing_messages.msg_from_bearings(turn.stamp_ns, turn.bearings,
+                                                                      self._p.emitter_frame_id))
         if self._simulation.blocked != self._blocked:
             self._blocked = self._simulation.blocked
             self._blocked_flag.publish(Bool(self._blocked))
@@ -271,9 +287,12 @@ def _drive(p: SimulatorNodeParams) -> _Drive:
     if p.echo:
         model = replace(model, echo=p.echo)
     building = building_file.load(shipped_buildings.find(p.building))
+    scanner = ScannerModel(reading_rad=math.radians(p.landmark_reading_deg), move_s=p.landmark_move_s)
     simulation = Simulation(building, model, RobotParams(p.robot), seed=p.seed, scan_rate_hz=p.scan_rate_hz,
                             base_from_laser=np.array([p.laser_x_m, p.laser_y_m, p.laser_yaw_rad]),
-                            changed_share=p.changed, turn_time_s=p.turn_time_s)
+                            changed_share=p.changed, turn_time_s=p.turn_time_s,
+                            scanner=scanner if len(building.tags) else None,
+                            base_from_emitter=np.array([p.emitter_x_m, p.emitter_y_m, p.emitter_yaw_rad]))
     if not p.path:
         return _Drive(simulation, None)
     return _Drive(simulation, simulation.follower(p.path, FollowerParams(speed_m_s=p.path_speed_m_s)))

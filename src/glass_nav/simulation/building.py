@@ -13,6 +13,9 @@ from typing import Dict, List, Sequence, Tuple
 
 import numpy as np
 
+from glass_nav.world import landmark_map
+from glass_nav.world.landmark_map import LandmarkMap
+
 MATERIALS = {"plaster": 0.7, "wood": 0.5, "metal": 0.4, "cloth": 0.3, "plant": 0.4, "black": 0.06}
 LARGEST_GAP_M = 0.1     # panes nearer than this to each other are one glazing, drawn as one surface
 OPAQUE, PANE, MIRROR = 0, 1, 2
@@ -145,6 +148,7 @@ class Building:
     start: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) map_from_base
     seen_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))  # (N, 2) in rooms seen too
     name: str = "building"
+    tags: LandmarkMap = landmark_map.NONE  # that answer to the beam of a landmark scanner
 
     @cached_property
     def surfaces(self) -> Surfaces:

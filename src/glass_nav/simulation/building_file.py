@@ -5,14 +5,17 @@ from __future__ import annotations
 import difflib
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Sequence, TypeVar, Union
 
 import numpy as np
 
-from glass_nav.geometry import se2
+from glass_nav.geometry import angles, se2
 from glass_nav.simulation.building import (MATERIALS, Building, Door, Mirror, Pane, Person, Thing, Wall, box,
                                            check_line)
+from glass_nav.world import landmark_file
+from glass_nav.world.landmark_map import LandmarkMap
 
 FILE_NAME = "building.yaml"
 NOUNS = {"walls": "wall", "panes": "pane", "mirrors": "mirror", "doors": "door", "mullions": "mullion",
@@ -26,7 +29,7 @@ KEYS = {"walls": ("line", "thickness", "reflectance"),
         "unmapped": ("box", "yaw_deg", "outline", "reflectance"),
         "gone": ("box", "yaw_deg", "outline", "reflectance"),
         "people": ("waypoints", "speed", "radius")}
-SECTIONS = ("placed", *KEYS, "seen", "paths", "start")
+SECTIONS = ("placed", *KEYS, "tags", "seen", "paths", "start")
 UNITS = {"thickness": "thickness_m", "gap": "gap_m", "speed": "speed_m_s", "radius": "radius_m"}  # keys of numbers
 MULLION_M = 0.06
 
@@ -118,7 +121,20 @@ def _building(document: Item, name: str) -> Building:
     if "seen" in document:
         seen = se2.transform_points(placed, _points("seen", document, "seen"))
     return Building(tuple(walls), tuple(panes), tuple(mirrors), tuple(doors), tuple(things), tuple(people), paths,
-                    start, seen, name)
+                    start, seen, name, _tags(document, placed))
+
+
+def _tags(document: Item, placed: np.ndarray) -> LandmarkMap:
+    """Landmarks, written as in a landmark file."""
+    items = document.get("tags") or []
+    if not isinstance(items, list):
+        raise BuildingError(f"tags must be a list, got {items!r}")
+    try:
+        tags = landmark_file.from_items(items)
+    except ValueError as err:
+        raise BuildingError(f"tags: {err}") from err
+    return replace(tags, positions_m=se2.transform_points(placed, tags.positions_m),
+                   facing_rad=angles.wrap(tags.facing_rad + placed[2]))
 
 
 def _made(noun: str, number: int, item: Item, make: Callable[[str, Item], T]) -> T:

@@ -17,9 +17,10 @@ from scipy import ndimage
 
 from glass_nav.simulation import building_file
 from glass_nav.simulation.building import OPAQUE, Building
-from glass_nav.world import map_file
+from glass_nav.world import landmark_file, map_file
 from glass_nav.world.grid_map import UNKNOWN, GridMap
 
+LANDMARKS_NAME = "landmarks.yaml"
 MARGIN_M = 1.0     # of unknown cells around the building
 RESOLUTION_M = 0.05
 STEPS_PER_CELL = 10
@@ -54,8 +55,11 @@ def draw(building: Building, resolution_m: float = RESOLUTION_M) -> GridMap:
 
 
 def redraw(folder: "Union[str, os.PathLike[str]]") -> None:
-    """Write map.yaml and map.png beside the building.yaml of a folder."""
-    map_file.save(draw(building_file.load(folder)), Path(folder) / "map.yaml", ".png")
+    """Write map.yaml, map.png and, of a building with tags, landmarks.yaml beside the building.yaml of a folder."""
+    building = building_file.load(folder)
+    map_file.save(draw(building), Path(folder) / "map.yaml", ".png")
+    if len(building.tags):
+        landmark_file.save(building.tags, Path(folder) / LANDMARKS_NAME, f"the tags of {building.name}, drawn")
 
 
 def is_drawn(building: Building, points_m: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ bytes, and the noise of one part does not depend on what another one draws. Time
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Iterator, List, Optional, Tuple, Union
 
 import numpy as np
@@ -17,6 +17,7 @@ from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.sensing.scan import Scan, scan_from_fields
 from glass_nav.simulation import lidar, path_follower, turning
 from glass_nav.simulation.building import Building
+from glass_nav.simulation.landmark_scanner import LandmarkScanner, ScannerModel, Turn
 from glass_nav.simulation.lidar import LidarModel, TrueScan
 from glass_nav.simulation.odometry import Odometry, OdometryParams
 from glass_nav.simulation.path_follower import FollowerParams, PathFollower
@@ -26,6 +27,7 @@ START_NS = 1_600_000_000 * 10**9  # of every run: a stamp that looks like one an
 CONTROL_S = 0.02                  # the base gets a command, and the wheels are read, at least so often
 STUCK_S = 5.0                     # a follower that makes no way for so long gives up; a turn on the spot takes 3 s
 LASER = (0.12, 0.0, 0.0)          # in front of the middle
+EMITTER = (0.0, 0.0, 0.0)         # of the landmark scanner
 
 
 class SimulationError(ValueError):
@@ -67,7 +69,8 @@ class Simulation:
                  odometry: OdometryParams = OdometryParams(),
                  base_from_laser: "Union[Tuple[float, float, float], np.ndarray]" = LASER, seed: int = 0,
                  scan_rate_hz: float = 10.0, changed_share: float = 0.0, start: Optional[np.ndarray] = None,
-                 turn_time_s: float = 0.0) -> None:
+                 turn_time_s: float = 0.0, scanner: Optional[ScannerModel] = None,
+                 base_from_emitter: "Union[Tuple[float, float, float], np.ndarray]" = EMITTER) -> None:
         """
         Args:
             base_from_laser: (3,) where the laser sits.
@@ -75,6 +78,8 @@ class Simulation:
             changed_share: of the movable things that somebody moved since the map was drawn.
             start: (3,) map_from_base; the building's own when not given, and drive() begins at its path's start.
             turn_time_s: the lidar takes from its first beam to its last one; 0: all at one moment.
+            scanner: looks for the building's tags, if there is one.
+            base_from_emitter: (3,) where that sits.
 
         Raises:
             ValueError: a value out of its range, or no room for the robot at the start.
@@ -88,6 +93,8 @@ class Simulation:
                              f"{1.0 / scan_rate_hz:g} s, got {turn_time_s}")
         if np.shape(base_from_laser) != (3,) or not np.all(np.isfinite(base_from_laser)):
             raise ValueError(f"the laser's pose on the robot must be finite x, y, yaw, got {base_from_laser}")
+        if np.shape(base_from_emitter) != (3,) or not np.all(np.isfinite(base_from_emitter)):
+            raise ValueError(f"the emitter's pose on the robot must be finite x, y, yaw, got {base_from_emitter}")
         furniture, wheels, light = np.random.SeedSequence(seed).spawn(3)
         self.building = building.changed(changed_share, np.random.default_rng(furniture))
         self.lidar_model, self.scan_period_s = lidar_model, 1.0 / scan_rate_hz
@@ -104,6 +111,8 @@ class Simulation:
         self._start_given = start is not None
         self._readings: List[OdometrySample] = [self.reading]
         self._track: List[_Moment] = [self._moment]  # of the last turn of the lidar
+        self.base_from_emitter = np.array(base_from_emitter, float)
+        self._scanner = None if scanner is None else LandmarkScanner(scanner, self.building)
 
     @property
     def stamp_ns(self) -> int:
@@ -140,6 +149,14 @@ class Simulation:
             raise ValueError(f"a step must take >= 1e-6 s, got {dt_s}")
         for end_ns in self._control_times(round(dt_s * 1e9)):
             self._control(end_ns, command)
+
+    def take_turns(self) -> List[Turn]:
+        """Sweeps of the landmark scanner that ended since the last call."""
+        if self._scanner is None:
+            return []
+        return [Turn(START_NS + turn.stamp_ns, tuple(replace(bearing, stamp_ns=START_NS + bearing.stamp_ns)
+                                                     for bearing in turn.bearings))
+                for turn in self._scanner.take_turns()]
 
     def look(self) -> Frame:
         """One turn of the lidar, which ends now. Before there was time for one it is of one moment."""
@@ -218,6 +235,8 @@ class Simulation:
         part_s = (end_ns - self._time_ns) * 1e-9
         self._wheels.step(self._robot.step(command, part_s), part_s)
         self._time_ns = end_ns
+        if self._scanner is not None:
+            self._scanner.step(end_ns, se2.compose(self.map_from_base, self.base_from_emitter))
         self._blocked = self._blocked or self._robot.blocked
         self._readings.append(self.reading)
         self._track.append(self._moment)

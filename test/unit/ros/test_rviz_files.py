@@ -9,7 +9,7 @@ from typing import Any, Iterator
 
 import yaml
 
-from glass_nav.ros import beam_displays, localization_node, wall_display
+from glass_nav.ros import beam_displays, landmarks_node, localization_node, wall_display
 
 REPO = Path(__file__).parents[3]
 CONFIG = yaml.safe_load((REPO / "rviz" / "glass_nav.rviz").read_text(encoding="utf-8"))
@@ -61,6 +61,7 @@ def test_the_topics_of_the_node_are_those_it_tells_of():
         match = re.fullmatch(r"/glass_localization/(\w+)", topic)
         if match:
             assert f"~{match[1]}" in told, topic
+    assert "/landmarks/markers" in topics() and "~markers" in landmarks_node.__doc__
 
 
 def test_every_topic_below_a_node_can_be_remapped_to_another_name():
@@ -70,7 +71,8 @@ def test_every_topic_below_a_node_can_be_remapped_to_another_name():
     assert {topic for topic in remaps if topic.count("/") == 2} == below
     for origin in below:
         _, node, topic = origin.split("/")
-        argument = {"glass_localization": "name", "topology_node": "topology_name"}[node]
+        argument = {"glass_localization": "name", "topology_node": "topology_name", "landmarks": "landmarks_name"}[node]
         assert remaps[origin] == f"/$(arg {argument})/{topic}"
     defaults = {arg.get("name"): arg.get("default") for arg in launch.iter("arg")}
     assert (defaults["name"], defaults["topology_name"]) == ("glass_localization", "topology_node")
+    assert defaults["landmarks_name"] == "landmarks"

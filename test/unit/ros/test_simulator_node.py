@@ -27,10 +27,12 @@ def test_the_file_of_parameters_names_them_all_with_their_defaults():
     ({"speed_factor": "fast"}, "~speed_factor must be float, got 'fast'"),
     ({"beams": -1}, "~beams must be >= 0, got -1"),
     ({"map_resolution_m": 0.0}, "~map_resolution_m must be 0.01 to 1 m, got 0.0"),
-    ({"odom_frame_id": "map"}, "~global_frame_id, ~odom_frame_id, ~base_frame_id and ~laser_frame_id must differ and "
-                               "name a frame, got 'map', 'map', 'base_link', 'laser'"),
-    ({"laser_frame_id": ""}, "~global_frame_id, ~odom_frame_id, ~base_frame_id and ~laser_frame_id must differ and "
-                             "name a frame, got 'map', 'odom', 'base_link', ''"),
+    ({"odom_frame_id": "map"}, "~global_frame_id, ~odom_frame_id, ~base_frame_id, ~laser_frame_id and "
+                               "~emitter_frame_id must differ and name a frame, got 'map', 'map', 'base_link', "
+                               "'laser', 'emitter'"),
+    ({"laser_frame_id": ""}, "~global_frame_id, ~odom_frame_id, ~base_frame_id, ~laser_frame_id and "
+                             "~emitter_frame_id must differ and name a frame, got 'map', 'odom', 'base_link', '', "
+                             "'emitter'"),
     ({"speed": 1.0}, "unknown parameter ~speed")])
 def test_parameters_that_cannot_be_used_are_refused(given, text):
     with pytest.raises(ParamError) as caught:
@@ -47,6 +49,9 @@ def test_parameters_that_cannot_be_used_are_refused(given, text):
     ({"seed": -1}, "seed must be a whole number >= 0, got -1"),
     ({"changed": 2.0}, "changed share must be 0 to 1, got 2.0"),
     ({"scan_rate_hz": 0.0}, "scan rate must be 0.1 to 1000 Hz, got 0.0"),
+    ({"landmark_reading_deg": 0.1}, "a landmark scanner needs 0 < motor step <= reading step <= "),
+    ({"landmark_move_s": 0.0}, "a move of a landmark scanner must take > 0 s, got 0.0"),
+    ({"emitter_x_m": float("nan")}, "the emitter's pose on the robot must be finite x, y, yaw, got "),
     ({"path": "nowhere"}, "glass_office: no path 'nowhere', it has "),
     ({"path": "first", "path_speed_m_s": 0.0}, "speed_m_s of the path follower must be > 0 m/s and finite, got 0.0")])
 def test_what_cannot_be_simulated_is_a_line(given, text):

@@ -112,6 +112,18 @@ def test_without_a_start_the_robot_stands_at_the_first_path_and_looks_along_it(l
     assert load(WALLS + "paths:\n  up: [[1, 1], [1, 2], [3, 2]]\n").start == pytest.approx([1, 1, np.pi / 2])
 
 
+def test_tags_hang_in_the_building_wherever_it_is_placed(load):
+    building = load("placed: [10, 20, 90]\n" + WALLS + PATHS + """tags:
+  - {id: A, position: [1, 2], facing_deg: 135}
+  - {id: 8, position: [3, 0], range: 5}
+""")
+    assert building.tags.ids == ("A", "8")
+    np.testing.assert_allclose(building.tags.positions_m, [[8, 21], [10, 23]], atol=1e-12)
+    np.testing.assert_allclose(np.degrees(building.tags.facing_rad), [-135, np.nan])
+    assert building.tags.range_m.tolist() == [15.0, 5.0]
+    assert len(load(WALLS + PATHS).tags) == 0
+
+
 def test_a_start_alone_will_do(load):
     building = load(WALLS + "start: [1, 1, 0]\nfurniture:\n")
     assert building.paths == {} and building.things == ()
@@ -181,6 +193,8 @@ POINTS = "two points one after the other are the same"
     (WALLS + "paths:\n  short: [[0, 0]]\n", "path short has 1 point, a path needs at least 2"),
     (WALLS + "paths:\n  still: [[1, 0], [1, 0]]\n", f"path still has no length at [1.0, 0.0]: {POINTS}"),
     (WALLS + "paths:\n  odd: [[0, 0], [1, true]]\n", "path odd has the point [1, True], a point is [x, y] in m"),
+    (WALLS + PATHS + "tags: 3\n", "tags must be a list, got 3"),
+    (WALLS + PATHS + "tags: [{id: A}]\n", "tags: landmark 1 (A) position must be [x, y] in m, got None"),
     (WALLS + "start: [1, 2]\n", "start must be [x, y, yaw_deg] in m, m, degrees, got [1, 2]"),
     (WALLS + "start: [1, 2, east]\n", "start must be a finite number, got 'east'"),
     (WALLS + PATHS + "placed: 3\n", "placed must be [x, y, yaw_deg] in m, m, degrees, got 3"),

@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glass_nav.simulation import building_file, shipped_buildings
+from glass_nav.simulation import building_file, building_map, shipped_buildings
 from glass_nav.simulation.building_file import BuildingError
 from glass_nav.simulation.path_follower import PathFollower
 from glass_nav.simulation.robot import Obstacles, Robot, RobotParams
+from glass_nav.world import landmark_file
 
 REPO = Path(__file__).resolve().parents[3]
 
@@ -77,3 +78,23 @@ def test_every_path_can_be_driven_also_when_all_furniture_has_moved(name, kind):
             if follower.done:
                 break
         assert follower.done, f"{path}: at {robot.map_from_base} after {follower.progress_m:.1f} m"
+
+
+@pytest.mark.parametrize("name", shipped_buildings.shipped())
+def test_the_landmark_file_beside_a_building_is_that_of_its_tags(name):
+    building = building_file.load(shipped_buildings.find(name))
+    path = REPO / "maps" / name / building_map.LANDMARKS_NAME
+    assert path.is_file() == bool(len(building.tags))
+    if path.is_file():
+        landmarks = landmark_file.load(path)
+        assert landmarks.ids == building.tags.ids
+        for field in ("positions_m", "facing_rad", "view_rad", "range_m"):
+            np.testing.assert_allclose(getattr(landmarks, field), getattr(building.tags, field), atol=1e-8)
+
+
+def test_redrawing_a_building_writes_its_landmarks_too(tmp_path):
+    (tmp_path / "building.yaml").write_text("walls: [{line: [[0, 0], [4, 0], [4, 3], [0, 3], [0, 0]]}]\n"
+                                            "start: [1, 1, 0]\ntags: [{id: A, position: [0.2, 1]}]\n")
+    building_map.redraw(tmp_path)
+    assert landmark_file.load(tmp_path / "landmarks.yaml").ids == ("A",)
+    assert (tmp_path / "map.yaml").is_file()
