@@ -256,7 +256,7 @@ class LocalizationNode:
                 self._mcl.request_update()
         try:
             estimate = self._mcl.update(placed.scan, placed.odom_from_base)
-        except ScanError as err:
+        except ValueError as err:  # ScanError, and what the filter cannot work out: a robot drives on by odometry
             self._pass_over(msg, str(err))
             return
         self._diagnostics.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
