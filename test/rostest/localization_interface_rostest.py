@@ -132,6 +132,22 @@ class LocalizationInterface(RoomTest):
                         (connected, refused, heard, same, kept, printed))
         self.assertEqual(code, 0, printed)
 
+    def test_the_first_map_may_be_the_only_one(self) -> None:
+        maps = rospy.Publisher("first_map", OccupancyGrid, queue_size=2)
+        node = self.start("first_only", "_use_map_topic:=true", "_first_map_only:=true", "map:=/first_map")
+        connected = wait_until(maps.get_num_connections, 30.0)
+
+        def taken_is_heard() -> bool:  # again and again: the node's rosout may connect after its first line
+            maps.publish(self.map_msg)
+            return bool(self.lines.having("map of 250 x 190 cells", "topic /first_map"))
+
+        taken = wait_until(taken_is_heard, 15.0)
+        maps.publish(self.graded_map())
+        self.robot.make_steps(10)
+        code, printed = node.end()
+        self.assertTrue(connected and taken, (connected, taken, printed))
+        self.assertEqual((code, printed.count("map of 250 x 190 cells")), (0, 1), printed)
+
     def graded_map(self) -> OccupancyGrid:
         """The room as a mapper with probabilities draws it: walls of 70 to 100, free cells of 0 to 20."""
         msg = conversions.msg_from_map(self.grid_map, rospy.Time.now(), "map")

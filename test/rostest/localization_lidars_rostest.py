@@ -14,15 +14,15 @@ import rospy
 import rostest
 from room_robot import Lidar, changed
 from room_test import RoomTest
-from rostest_support import Heard, part
+from rostest_support import Heard, part, wait_until
 from sensor_msgs.msg import LaserScan
 
 from glass_nav.ros import conversions
 
-# One beam each is upright and looks to the left, hangs upside down and looks to the right, sits on a turning mount.
-FRONT = Lidar("front/scan", "front_laser", (0.2, 0.1, 0.8), beams=(-1.0, 1.0))
-REAR = Lidar("rear/scan", "rear_laser", (-0.3, 0.0, 2.9), beams=(-1.2, 1.2))
-TOWER = Lidar("front/scan", "tower_laser", (0.0, 0.0, -0.5), beams=(-1.5, 0.5))
+# One takes its beams one after the other, one hangs upside down and looks back, one sits on a mount that turns.
+FRONT = Lidar("front/scan", "front_laser", (0.2, 0.1, 0.8), beams=(-1.0, 1.0), turn_s=0.08)
+REAR = Lidar("rear/scan", "rear_laser", (-0.3, 0.0, 2.9), beams=(-1.2, 1.2), upside_down=True)
+TOWER = Lidar("front/scan", "tower_laser", (0.0, 0.0, -0.5), beams=(-1.5, 0.5), swings=True)
 
 
 class LocalizationLidars(RoomTest):
@@ -33,10 +33,6 @@ class LocalizationLidars(RoomTest):
     def setUpClass(cls) -> None:
         super().setUpClass()
         cls.surfaces = Heard("scan_surfaces", LaserScan)
-
-    def setUp(self) -> None:
-        REAR.upside_down, TOWER.swings = True, True
-        super().setUp()
 
     def frames_used(self, steps: int) -> Set[str]:
         """Of the lidars whose scans were used in so many turns."""
@@ -56,8 +52,8 @@ class LocalizationLidars(RoomTest):
             with part(lidar.frame):
                 for other in self.lidars:
                     other.silent = other is not lidar
-                self.robot.make_steps(3)
-                self.assertEqual(self.frames_used(15), {lidar.frame})
+                self.assertTrue(wait_until(lambda frame=lidar.frame: self.frames_used(5) == {frame}, 15.0),
+                                f"not {lidar.frame} alone is used")
                 self.expect_right_pose()
                 self.expect_understood()
 
@@ -73,12 +69,19 @@ class LocalizationLidars(RoomTest):
         self.assertEqual(self.frames_used(8), {"front_laser", "rear_laser", "tower_laser"})
         self.expect_right_pose()
 
-    def test_frames_without_end_are_refused(self) -> None:
+    def test_a_time_that_no_lidar_takes_is_said(self) -> None:
+        self.robot.spoil = lambda msg: changed(msg, time_increment=0.5)
+        self.expect_line("scans are taken as of one moment: time_increment 0.5 s")
+        self.expect_right_pose()
+
+    def test_frames_without_end_leave_room_for_a_real_one(self) -> None:
         counter = iter(range(1000))
         self.robot.spoil = lambda msg: changed(msg, header__frame_id=f"made_up_{next(counter)}")
-        self.expect_line("scan refused: its frame 'made_up_", "the most are 16")
+        self.expect_line("scan dropped", "no transform base_link <- made_up_")
+        self.robot.make_steps(10)
         self.robot.spoil = lambda msg: msg
         self.expect_right_pose()
+        self.assertEqual(self.frames_used(10), {"front_laser", "rear_laser", "tower_laser"})
 
 
 if __name__ == "__main__":

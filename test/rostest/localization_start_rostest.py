@@ -117,8 +117,9 @@ class LocalizationStart(unittest.TestCase):
         self.assertEqual(first_ns, localized_ns + 100_000_000)  # ~transform_tolerance
         self.assertTrue(all(0.0 <= msg.reliability <= 1.0 for msg in self.status.all if np.isfinite(msg.used_share)))
         self.check_area()
+        self.lines.clear()
         rospy.ServiceProxy("global_localization", Empty)()
-        self.wait_for("a wide cloud", lambda: np.ptp([pose.position.x for pose in self.particles.last.poses]) > 5.0)
+        self.wait_for_line("may be anywhere in the map")
         self.end()
 
     def check_area(self) -> None:
@@ -139,7 +140,7 @@ class LocalizationStart(unittest.TestCase):
         self.wait_for_line("an area of 4 corners")
         self.wait_for("particles", lambda: len(self.particles))
         cloud = np.array([(pose.position.x, pose.position.y) for pose in self.particles.all[0].poses])
-        self.assertLess(np.abs(cloud - [x, y]).max(), 1.0 + 0.1)  # the first scan has already weighed them
+        self.assertLess(np.abs(cloud - [x, y]).max(), 1.0 + 0.9)  # the first scan has already moved and weighed them
         self.robot.moving = True
 
     # -- pose file

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Callable, List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -27,6 +27,7 @@ MAP_FROM_ODOM = np.array([1.0, 2.0, 0.5])
 BEAMS = np.linspace(-2.0, 2.0, 181)
 RATE_HZ = 10.0
 RANGE_MAX_M = 20.0
+TURN_RAD_S = 0.25  # round the circle
 
 
 def room() -> GridMap:
@@ -49,6 +50,7 @@ class Lidar:
     upside_down: bool = False
     swings: bool = False  # the mounting turns to and fro
     beams: Tuple[float, float] = (BEAMS[0], BEAMS[-1])
+    turn_s: float = 0.0   # from its first beam to its last one
     silent: bool = False
 
     def base_from_laser(self, time_s: float) -> np.ndarray:
@@ -80,6 +82,7 @@ class Robot:
         self._turned_rad = 0.0
         self._steps = 0
         self.lidars: List[Lidar] = list(lidars) or [Lidar()]
+        self._as_built = [replace(lidar) for lidar in self.lidars]
         self.moving = True
         self.odometry_is_told = True
         self.map_from_odom = MAP_FROM_ODOM
@@ -99,12 +102,14 @@ class Robot:
         self.moving = self.odometry_is_told = True
         self.map_from_odom = MAP_FROM_ODOM
         self.spoil = lambda msg: msg
-        for lidar in self.lidars:
-            lidar.silent = lidar.upside_down = lidar.swings = False
+        for lidar, built in zip(self.lidars, self._as_built):
+            vars(lidar).update(vars(built))
 
     def map_from_base(self) -> np.ndarray:
         """Where the robot truly is."""
-        turned = self._turned_rad
+        return self._on_the_circle(self._turned_rad)
+
+    def _on_the_circle(self, turned: float) -> np.ndarray:
         return se2.compose(self._centre, np.array([1.2 * math.cos(turned), 1.2 * math.sin(turned),
                                                    turned + math.pi / 2]))
 
@@ -126,7 +131,7 @@ class Robot:
 
     def _step(self, stamp: rospy.Time) -> None:
         if self.moving:
-            self._turned_rad += 0.25 / RATE_HZ
+            self._turned_rad += TURN_RAD_S / RATE_HZ
         stamp_ns = conversions.ns_from_stamp(stamp)
         transforms = [lidar.transform(stamp_ns) for lidar in self.lidars]
         if self.odometry_is_told:
@@ -139,12 +144,20 @@ class Robot:
 
     def _scan(self, lidar: Lidar, stamp_ns: int) -> LaserScan:
         bearings = BEAMS[(BEAMS >= lidar.beams[0]) & (BEAMS <= lidar.beams[1])]
-        map_from_laser = se2.compose(self.map_from_base(), lidar.base_from_laser(stamp_ns * 1e-9))
+        base_from_laser = lidar.base_from_laser(stamp_ns * 1e-9)
         seen = -bearings if lidar.upside_down else bearings
-        ranges = self._caster.cast(map_from_laser[None], seen, RANGE_MAX_M)[0]
+        step_s = lidar.turn_s / (len(bearings) - 1)
+        if lidar.turn_s:
+            turned = self._turned_rad + self.moving * TURN_RAD_S * step_s * np.arange(len(bearings))
+            beams = [se2.compose(se2.compose(self._on_the_circle(each), base_from_laser), np.array([0.0, 0.0, bearing]))
+                     for each, bearing in zip(turned, seen)]
+            ranges = self._caster.cast(np.array(beams), np.zeros(1), RANGE_MAX_M)[:, 0]
+        else:
+            map_from_laser = se2.compose(self.map_from_base(), base_from_laser)
+            ranges = self._caster.cast(map_from_laser[None], seen, RANGE_MAX_M)[0]
         return LaserScan(header=conversions.header(stamp_ns, "/" + lidar.frame), angle_min=bearings[0],
-                         angle_max=bearings[-1], angle_increment=BEAMS[1] - BEAMS[0], range_min=0.05,
-                         range_max=RANGE_MAX_M, ranges=ranges.tolist())
+                         angle_max=bearings[-1], angle_increment=BEAMS[1] - BEAMS[0], time_increment=step_s,
+                         range_min=0.05, range_max=RANGE_MAX_M, ranges=ranges.tolist())
 
 
 def pose_message(planar: np.ndarray, variance: float = 0.01) -> PoseWithCovarianceStamped:

@@ -71,6 +71,7 @@ class GlassMcl:
         """
         self._params = params
         self._rng = rng
+        self._search: Optional[GlobalSearch] = None       # while the pose is not known
         self.set_map(grid_map)
         self._particles = np.zeros((0, 3))
         self._weights = np.zeros(0)
@@ -79,12 +80,11 @@ class GlassMcl:
         self._map_from_odom = np.zeros(3)                 # since the last update of the particles
         self._stamps_ns: Dict[str, int] = {}              # of the last scan of each lidar
         self._quality = pose_quality.PoseQuality(params.quality)
-        self._search: Optional[GlobalSearch] = None       # while the pose is not known
         self._up_to_date: Set[str] = set()                # lidars that had an update since the robot moved
         self._updates = 0
 
     def set_map(self, grid_map: GridMap) -> None:
-        """Another map; the particles stay where they are."""
+        """Another map; the particles stay where they are. A search goes on in all of it."""
         self._grid_map = grid_map
         self._caster = RayCaster(grid_map, threads=self._params.schedule.raycast_threads)
         self._field = DistanceField(grid_map)
@@ -92,6 +92,8 @@ class GlassMcl:
         self._anchor = ScanAnchor(self._field)
         self._matcher: Optional[ScanMatcher] = None
         self._watch = self._new_watch()
+        if self._search is not None:
+            self._search = self._new_search() if grid_map.free.any() else None
         self._residuals = RangeResiduals(0.5, self._params.mixture.laser_sigma_hit)
         self._glass_map = GlassMap(grid_map, self._params.glass)
         self._up_to_date = set()
@@ -138,7 +140,8 @@ class GlassMcl:
         particles[:, 2] = angles.wrap(particles[:, 2])
         self._start_with(particles)
         if np.any(np.sqrt(np.diag(covariance)) > _WIDEST_PLACE):
-            self._search = self._new_search(self._near(pose[:2], covariance[:2, :2]))
+            near = self._near(pose[:2], covariance[:2, :2])
+            self._search = self._new_search(near) if np.any(self._grid_map.free & near) else None
 
     def scatter(self, area: Optional[np.ndarray] = None) -> None:
         """Start over anywhere in the free cells of the map (service global_localization), or of a part of it.
@@ -242,7 +245,8 @@ class GlassMcl:
         return GlobalSearch(matcher, self._field, self._params.search)
 
     def _new_watch(self, usual_fit: Optional[float] = None) -> LostWatch:
-        return LostWatch(self._field, self._everywhere, self._params.search, usual_fit)
+        matcher = self._everywhere if self._grid_map.free.any() else None
+        return LostWatch(self._field, matcher, self._params.search, usual_fit)
 
     def _everywhere(self) -> ScanMatcher:
         if self._matcher is None:

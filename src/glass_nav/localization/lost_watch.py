@@ -61,12 +61,12 @@ class Verdict:
 class LostWatch:
     """Remembers how well scans fit at the pose, and looks elsewhere when they no longer do."""
 
-    def __init__(self, field: DistanceField, matcher: Callable[[], ScanMatcher], params: SearchParams,
+    def __init__(self, field: DistanceField, matcher: Optional[Callable[[], ScanMatcher]], params: SearchParams,
                  usual_fit: Optional[float] = None) -> None:
         """
         Args:
             field: of the map.
-            matcher: makes the one that looks everywhere; called when it is needed first.
+            matcher: makes the one that looks everywhere; called when it is needed first. None: nowhere is room.
             params: whether and when another place is believed.
             usual_fit: of scans at the pose; None: not known yet.
         """
@@ -97,7 +97,7 @@ class LostWatch:
         fit = float(scan_alignment.fit(self._field, points, map_from_base[None], _SCALE_M)[0])
         self._fit = fit if np.isnan(self._fit) else self._fit + (fit - self._fit) * -np.expm1(-way_m / _FORGET_M)
         doubted = self._usual - self._fit > max(_DOUBT[0], _DOUBT[1] * self._spread)
-        if self._search is None and doubted and self._params.recover_when_lost:
+        if self._search is None and doubted and self._params.recover_when_lost and self._matcher is not None:
             self._search = GlobalSearch(self._matcher(), self._field, self._params)
             self._search_way_m = self._calm_m = 0.0
             self._search.add(map_from_base, _HEAD_START)

@@ -111,6 +111,7 @@ class LocalizationNode:
             for command in mail["commands"]:
                 command()
             self._maps.request()
+            mail["scans"] += self._inbox.take_now("scans")  # a new map takes a while
             unusable = "there is no map yet" if self._mcl is None else None
             for msg in mail["scans"]:
                 if self._scans.receive(msg, self._now_s, unusable):
@@ -255,7 +256,7 @@ class LocalizationNode:
                 self._mcl.request_update()
         try:
             estimate = self._mcl.update(placed.scan, placed.odom_from_base)
-        except ScanError as err:
+        except ValueError as err:  # ScanError, and what the filter cannot work out: a robot drives on by odometry
             self._pass_over(msg, str(err))
             return
         self._diagnostics.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)

@@ -7,7 +7,7 @@ wins; stamps of one lidar only ascend.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Callable, Dict, List, Optional
+from typing import Callable, Dict, List, Optional, Set
 
 import numpy as np
 import rospy
@@ -48,6 +48,7 @@ class ScanInput:
         self._stale: Dict[str, int] = {}  # older scans in a row
         self._last_ns: Dict[str, int] = {}
         self._period_s: Dict[str, float] = {}  # from scan to scan, a running mean
+        self._placed: Set[str] = set()         # lidars that had a scan with its transforms
         self._subscribers: List[rospy.Subscriber] = []
         self.counts = ScanCounts()
         self.trouble = "no scan used yet"  # why the last scan that was not used was not
@@ -61,8 +62,8 @@ class ScanInput:
 
     @property
     def lidars(self) -> List[str]:
-        """Frames of the lidars heard so far."""
-        return list(self._lidars)
+        """Frames of the lidars whose scans could be used so far."""
+        return sorted(self._placed)
 
     def reconfigure(self, p: LocalizationNodeParams, straighten: Deskew) -> None:
         """Other parameters from now on."""
@@ -90,7 +91,7 @@ class ScanInput:
             self.refuse("it has no stamp")
         elif not lidar:
             self.refuse("it has no frame_id")
-        elif lidar not in self._lidars and len(self._lidars) >= MOST_LIDARS:
+        elif not self._has_room_for(lidar):
             self.refuse(f"its frame {lidar!r} would be that of the lidar number {MOST_LIDARS + 1}, the most are "
                         f"{MOST_LIDARS}")
         elif self._waiting(lidar).add(msg, stamp_ns, now_s):
@@ -102,10 +103,19 @@ class ScanInput:
             return self._stale[lidar] >= STALE_SCANS
         return False
 
+    def _has_room_for(self, lidar: str) -> bool:
+        """Those that never had a scan with its transforms make room."""
+        if lidar not in self._lidars and len(self._lidars) >= MOST_LIDARS:
+            for name in set(self._lidars) - self._placed:
+                self._lidars.pop(name).restart()
+                for figures in (self._stale, self._last_ns, self._period_s):
+                    figures.pop(name, None)
+        return lidar in self._lidars or len(self._lidars) < MOST_LIDARS
+
     @property
     def period_s(self) -> Optional[float]:
         """From one scan to the next, of whatever lidar; None: not known yet."""
-        rate_hz = sum(1.0 / period_s for period_s in self._period_s.values())
+        rate_hz = sum(1.0 / period_s for lidar, period_s in self._period_s.items() if lidar in self._placed)
         return 1.0 / rate_hz if rate_hz > 0.0 else None
 
     def _learn_period(self, lidar: str, stamp_ns: int) -> None:
@@ -117,11 +127,12 @@ class ScanInput:
     def take_ready(self, now_s: float) -> List[LaserScan]:
         """The newest scan of each lidar that has its transforms, by ascending stamps."""
         ready: List[LaserScan] = []
-        for waiting in self._lidars.values():
+        for lidar, waiting in self._lidars.items():
             msg, given_up = waiting.take_ready(self._has_transforms, now_s)
             if given_up:
                 self._say_no_transform(given_up[-1])
             if msg is not None:
+                self._placed.add(lidar)
                 ready.append(msg)
         return sorted(ready, key=lambda msg: conversions.ns_from_stamp(msg.header.stamp))
 
@@ -189,7 +200,7 @@ class ScanInput:
         """Forget what waits and which stamps were used: time has jumped."""
         for waiting in self._lidars.values():
             waiting.restart()
-        self._lidars, self._stale, self._last_ns, self._period_s = {}, {}, {}, {}
+        self._lidars, self._stale, self._last_ns, self._period_s, self._placed = {}, {}, {}, {}, set()
         self.last_arrival_s = now_s
 
     def _waiting(self, lidar: str) -> "WaitingScans[LaserScan]":

@@ -743,6 +743,28 @@ def test_on_a_map_without_free_cells_nothing_can_be_scattered(drive, cell):
     assert drive.errors(drive.through(mcl, 3, 8))[:, 0].max() < 0.05  # it still knows where it was
 
 
+@pytest.mark.parametrize("cell", [100, -1])
+@pytest.mark.parametrize("start", ["placed", "placed vaguely", "searched for"])
+def test_a_robot_on_a_map_without_room_goes_on_by_odometry(drive, cell, start):
+    mcl = started()
+    if start == "searched for":
+        mcl.scatter()
+    mcl.set_map(GridMap(np.full((200, 200), cell, np.int8), 0.05, np.array([-2.0, -2.0, 0.0])))
+    if start == "placed vaguely":
+        mcl.set_pose(drive.true[0], np.diag([4.0, 4.0, 1.0]))
+    estimates = drive.through(mcl, last=20)
+    assert all(np.all(np.isfinite(estimate.map_from_base)) for estimate in estimates)
+    assert not any(estimate.state == "LOCALIZED" for estimate in estimates[5:])
+
+
+def test_a_search_goes_on_in_another_map():
+    drive = Drive(GLASS_ROOM, seed=2, centre=(3.0, 1.6), glass_share=0.3)
+    mcl = started(L_ROOM, drive.true[0])
+    mcl.scatter()
+    mcl.set_map(MAPS[GLASS_ROOM])
+    assert drive.errors(drive.through(mcl))[-5:, 0].max() < 0.1
+
+
 def test_on_a_map_without_walls_odometry_alone_leads():
     drive = Drive(way_share=0.0)
     empty = GridMap(np.zeros((100, 140), np.int8), 0.05, np.zeros(3))

@@ -108,6 +108,15 @@ def test_no_more_scans_wait_than_there_is_room_for():
     assert scans.take_ready(lambda scan: True, 0.0)[0] == 999
 
 
+def test_one_lane_can_be_emptied_alone():
+    box = Mailbox(scans=10, commands=10)
+    for scan in (1, 2):
+        box.put("scans", scan)
+    box.put("commands", "stop")
+    assert box.take_now("scans") == [1, 2] and box.take_now("scans") == []
+    assert box.take(0.0) == {"scans": [], "commands": ["stop"]}
+
+
 def test_two_lidars_are_counted_together():
     counts = ScanCounts()
     front, rear = (WaitingScans(2, 1.0, counts) for _ in range(2))
