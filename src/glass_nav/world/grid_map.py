@@ -6,6 +6,7 @@ H rows, W columns. The grid may be turned in the map (a map_server origin with y
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,6 +61,17 @@ class GridMap:
         """(...) bool: the cell exists."""
         return ((rows >= 0) & (rows < self.occupancy.shape[0])
                 & (columns >= 0) & (columns < self.occupancy.shape[1]))
+
+    def fingerprint(self) -> str:
+        """SHA-256 of cells and place, in hex: equal for the map in a file and for the same one out of a message.
+
+        The resolution counts to a micrometre (messages carry it as float32), the origin to a millimetre.
+        """
+        place = (f"{self.occupancy.shape[0]} {self.occupancy.shape[1]} {self.resolution_m:.6f} "
+                 + " ".join(f"{round(float(value), 3) + 0.0:.3f}" for value in self.map_from_grid))
+        digest = hashlib.sha256(place.encode())
+        digest.update(np.ascontiguousarray(self.occupancy).tobytes())
+        return digest.hexdigest()
 
     def is_free(self, points_m: np.ndarray) -> np.ndarray:
         """(...) bool: points (..., 2) [m] of the frame map lie in a free cell."""
