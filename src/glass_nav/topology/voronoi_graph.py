@@ -31,6 +31,7 @@ from glass_nav.geometry import se2
 from glass_nav.world.grid_map import GridMap
 
 SEPARATION_CELLS = 3.5    # cells of one wall lie closer; nearer walls than this cannot be told from one
+CORNER = 0.5              # r falls by more than this share of the way into a corner of 60 degrees or more
 TRACE_CELLS = 3.0         # a line is smoothed over so many cells (1 sigma): the steps of rasterized walls
 POINT_CELLS = 1.0         # distance of the points of a line
 
@@ -44,7 +45,7 @@ class VoronoiParams:
     leaf_share_of_r: float = 0.6         # or less than this times r at its junction
     merge_m: float = 0.3                 # meetpoints closer along their edge are one, and those where a robot at
     equidistance_m: float = 0.15         # either sees the obstacles of the other nearer than r and this
-    smallest_component_m: float = 1.0    # a part of the graph with less way in it is left out
+    smallest_component_m: float = 2.0    # a part of the graph with less way in it is left out
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -259,8 +260,8 @@ class _Chains:
     def prune(self, leaf: float, share_of_r: float) -> None:
         """Take off leaves, least salient first: those with length + r_end - r_junction < max(leaf, share r_junction).
 
-        When a junction has lost one twig, its other twigs are judged from that junction too before it becomes part of
-        a longer chain: else a corridor would end in the corner of its end wall that happened to be pruned last.
+        Where a junction has lost a twig and the other twig there runs into a corner, that one goes too before the
+        junction becomes part of a longer chain: else a corridor would end in that corner of its end wall.
         """
         def little(number: int, end: int, junction: int) -> Tuple[float, bool]:
             salience = self._length[number] + self._r[end] - self._r[junction]
@@ -292,7 +293,8 @@ class _Chains:
             if len(self._at[junction]) == 2:
                 for other in sorted(set(self._at[junction]), key=self._length.__getitem__):
                     end = self._ends[other][0 if self._ends[other][1] == junction else 1]
-                    if len(self._at[end]) == 1 and little(other, end, junction)[1]:
+                    salience, goes = little(other, end, junction)
+                    if len(self._at[end]) == 1 and goes and salience < CORNER * self._length[other]:
                         self._remove(other)
             left = self._at[junction]
             if len(left) == 2 and left[0] != left[1]:
