@@ -14,8 +14,7 @@ once nothing is left without. Rules for the row of depth d with e errors:
 * two edges joined from the row of d - 1 with e - 1, three from that with e - 2;
 * an edge from the row of d - 2 with e - 1, along the way of both traversals, if the meetpoint of d - 1 was none; from
   the row of d - 3 with e - 2 if there were two such;
-* there and back: the robot turned round at what it took for a meetpoint (a dead end that was none), and is where it
-  was;
+* where it came from, if it turned round at such a meetpoint (a dead end that was none);
 * anywhere, if no meetpoint before this one was one: e = d, behind an edge at least as long as what was travelled; with
   an error more a meetpoint may have been missed on it.
 """
@@ -69,6 +68,15 @@ class _Found:
             new = np.isin(dart, other.dart, assume_unique=True, invert=True)
             dart, first = dart[new], first[new]
         return Row(dart, np.concatenate(self.parents)[first], depth[first], errors[first])
+
+
+@dataclass(frozen=True)
+class _Course:
+    """Traversals one after the other along one edge, or along edges that a missed meetpoint joins."""
+    traversal: Traversal  # as one; in length what is between the ends
+    farthest: Traversal   # as far as it went
+    onward: bool          # it ended on the way away from where it began
+    turned_round: bool    # in between
 
 
 class SearchForest:
@@ -167,13 +175,11 @@ class SearchForest:
 
     def _between_meetpoints(self, errors: int) -> bool:
         for back in range(1, min(errors, self.depth) + 1):  # so many of the last meetpoints were none
-            traversed = self._joined(self.depth - back, self.depth)
-            if traversed is None:
-                return False
+            farthest = self._course(self.depth - back, self.depth).farthest
             for spent in range(errors - back + 1):
                 row = self.row(self.depth - back, spent)
                 departure = self._departures(row.dart, self.depth - back)
-                if self._matcher.may_contain(departure, traversed).any():
+                if self._matcher.may_contain(departure, farthest).any():
                     return True
         return errors > self.depth  # none of the meetpoints was one
 
@@ -185,8 +191,8 @@ class SearchForest:
         for spurious in range(min(errors, depth - 1) + 1 if depth else 0):
             for missed in range(errors - spurious + 1):
                 self._add_ways(found, depth, errors, spurious, missed)
-        if depth >= 2 and errors >= 1:
-            self._add_returns(found, depth, errors)
+        for spurious in range(1, min(errors, depth - 1) + 1):
+            self._add_returns(found, depth, errors, spurious)
         if 1 <= depth <= errors:
             self._add_beginnings(found, depth, errors)
         if not found.darts:
@@ -200,9 +206,10 @@ class SearchForest:
     def _add_ways(self, found: _Found, depth: int, errors: int, spurious: int, missed: int) -> None:
         """Ways that take up so many traversals more than one, over so many edges more than one."""
         origin = depth - 1 - spurious, errors - spurious - missed
-        traversal = self._joined(origin[0], depth)
-        if traversal is None:
+        course = self._course(origin[0], depth)
+        if not course.onward or (missed and course.turned_round):
             return
+        traversal = course.traversal
         departure = self._departures(self._rows[origin].dart, origin[0])
         if missed:
             departure, arrival, parent = self._joined_edges(departure, traversal, missed)
@@ -212,18 +219,20 @@ class SearchForest:
         here = self._matcher.at(arrival, self._meetpoints[depth])
         found.add(arrival[here], parent[here], *origin)
 
-    def _joined(self, first: int, last: int) -> "Traversal | None":
-        """The traversals between two depths as one; None if the robot turned round in between.
+    def _course(self, first: int, last: int) -> _Course:
+        """The traversals between two depths; rank 0 at a meetpoint in between is a turn round.
 
         Of the chord only what the triangle leaves of it is known, which is next to nothing: it is not matched.
         """
         parts = self._traversals[first:last]
         if len(parts) == 1:
-            return parts[0]
-        if any(part.rank == 0 for part in parts[1:]):
-            return None
+            return _Course(parts[0], parts[0], True, False)
         sigma = math.sqrt(sum(self._matcher.sigma_length_m(part) ** 2 for part in parts))
-        return Traversal(parts[0].rank, sum(part.length_m for part in parts), UNKNOWN, sigma_length_m=sigma)
+        way = np.array([-1.0 if part.rank == 0 and number else 1.0 for number, part in enumerate(parts)]).cumprod()
+        at = np.cumsum(way * [part.length_m for part in parts])
+        net, farthest = (Traversal(parts[0].rank, max(float(value), 1e-6), UNKNOWN, sigma_length_m=sigma)
+                         for value in (at[-1], at.max()))
+        return _Course(net, farthest, bool(way[-1] > 0.0), bool(way.min() < 0.0))
 
     def _joined_edges(self, departure: np.ndarray, traversal: Traversal,
                       missed: int) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -244,24 +253,21 @@ class SearchForest:
         fits = matcher.ways_along(departure[parent], twin(last), length, np.sqrt(variance), traversal)
         return departure[parent[fits]], twin(last[fits]), parent[fits]
 
-    def _add_returns(self, found: _Found, depth: int, errors: int) -> None:
+    def _add_returns(self, found: _Found, depth: int, errors: int, spurious: int) -> None:
         """The robot turned round on an edge, at what it took for a meetpoint, and is back where that edge began."""
-        out, back = self._traversals[depth - 2:depth]
-        if back.rank != 0:
+        origin = depth - 1 - spurious, errors - spurious
+        course = self._course(origin[0], depth)
+        if course.onward or course.traversal.length_m > self._matcher.z * course.traversal.sigma_length_m:
             return
-        sigma = math.hypot(self._matcher.sigma_length_m(out), self._matcher.sigma_length_m(back))
-        if abs(out.length_m - back.length_m) > self._matcher.z * sigma:
-            return
-        origin = depth - 2, errors - 1
         departure = self._departures(self._rows[origin].dart, origin[0])
-        fits = self._matcher.may_contain(departure, out)
+        fits = self._matcher.may_contain(departure, course.farthest)
         fits[fits] = self._matcher.at(departure[fits], self._meetpoints[depth])
         found.add(departure[fits], np.flatnonzero(fits), *origin)
 
     def _add_beginnings(self, found: _Found, depth: int, errors: int) -> None:
         """No meetpoint before this one was one: the search begins here, behind an edge at least so long."""
-        traversed = self._joined(0, depth)
         arrival = self._matcher.all_at(self._meetpoints[depth])
-        if traversed is not None and errors == depth:
-            arrival = arrival[self._matcher.may_contain(arrival, traversed)]
+        course = self._course(0, depth)
+        if not course.turned_round and errors == depth:
+            arrival = arrival[self._matcher.may_contain(arrival, course.traversal)]
         found.add(arrival, np.full(len(arrival), NO_PARENT), 0, 0)
