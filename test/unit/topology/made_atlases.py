@@ -1,4 +1,4 @@
-"""Atlases made for tests and benchmarks: random rotation systems, Voronoi graphs of random points, floors with symmetry."""
+"""Atlases made for tests and benchmarks: random rotation systems, Voronoi graphs of random points, symmetric floors."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from glass_nav.topology.atlas import (DEAD_END, MEETPOINT, RING_MARKER, Atlas, Darts, Edges, MapReference, Nodes, Ragged,
-                                      Visits, rings_clockwise)
+from glass_nav.topology.atlas import (DEAD_END, MEETPOINT, RING_MARKER, Atlas, Darts, Edges, MapReference, Nodes,
+                                      Ragged, Visits, rings_clockwise)
 
 SIGMA_M = 0.02
 
@@ -52,8 +52,8 @@ def rotation_system(rng: np.random.Generator, values: int = 3) -> Atlas:
     length = rng.integers(2, 2 + values, len(ends)) * 3.0
     chord = length / rng.integers(1, 3, len(ends))
     bearing = rng.uniform(-np.pi, np.pi, 2 * len(ends))
-    return atlas_of(rng.uniform(0.0, 20.0, (count, 2)), rng.integers(1, 1 + values, count) * 1.0, np.array(ends), length,
-                    bearing, chord)
+    return atlas_of(rng.uniform(0.0, 20.0, (count, 2)), rng.integers(1, 1 + values, count) * 1.0, np.array(ends),
+                    length, bearing, chord)
 
 
 def voronoi(nodes: int, seed: int, spacing_m: float = 8.0) -> Atlas:
