@@ -47,7 +47,7 @@ def draw_trajectory(path: Path, grid: MapImage, result: ReplayResult, title: str
     figure = Figure(figsize=(11.0, map_height + 3.4), dpi=110, constrained_layout=True)
     FigureCanvasAgg(figure)
     above, below = figure.subplots(2, 1, gridspec_kw={"height_ratios": [map_height, 2.4]})
-    _draw_map(above, grid, low, high)
+    draw_map(above, grid, low, high)
     _draw_ways(figure, above, result)
     above.set_xlim(low[0], high[0])
     above.set_ylim(low[1], high[1])
@@ -107,7 +107,7 @@ def _draw_beams(axes: Any, grid: MapImage, example: BeamExample, case: np.ndarra
     answered = np.isfinite(example.points_m).all(axis=1)
     shown = np.concatenate([example.points_m[answered], example.laser_m[None]])
     low, high = shown.min(axis=0) - 1.0, shown.max(axis=0) + 1.0
-    _draw_map(axes, grid, low, high)
+    draw_map(axes, grid, low, high)
     ends = example.points_m[answered]
     rays = np.stack([np.broadcast_to(example.laser_m, ends.shape), ends], axis=1)
     colours = np.array(CASE_COLOURS)[case[answered]]
@@ -136,7 +136,8 @@ def _bounds(result: ReplayResult) -> Tuple[np.ndarray, np.ndarray]:
     return centre - size / 2.0, centre + size / 2.0
 
 
-def _draw_map(axes: Any, grid: MapImage, low: np.ndarray, high: np.ndarray) -> None:
+def draw_map(axes: Any, grid: MapImage, low: np.ndarray, high: np.ndarray) -> None:
+    """The part of a map between two corners (2,) [m], behind everything else."""
     from matplotlib.transforms import Affine2D
 
     corners = np.array([[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])])

@@ -7,8 +7,9 @@ lay apart that were made one, and by as much as its obstacles are in doubt.
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Callable, Iterable, List, Tuple
+from typing import Callable, ContextManager, Iterator, List, Tuple
 
 import numpy as np
 
@@ -20,9 +21,9 @@ from glass_nav.topology.edge_views import EdgeViews, ViewParams
 from glass_nav.topology.voronoi_graph import VoronoiGraph, VoronoiParams
 from glass_nav.world.grid_map import GridMap
 
-R_SIGMA_CELLS = 0.5          # measured on rough walls: 0.3
+R_SIGMA_CELLS = 1.0          # measured on rough walls: up to 0.9 less than on smooth ones
 POSITION_SIGMA_CELLS = 1.0   # of a meetpoint
-DEAD_END_SIGMA_SHARE = 0.15  # of r: where a way ends depends on the corners there
+DEAD_END_SIGMA_SHARE = 0.1   # of r: where a way ends depends on the corners there
 LINE_TOLERANCE_M = 0.02      # of the line of an edge in the file
 
 
@@ -33,32 +34,42 @@ class BuildParams:
     view: ViewParams = ViewParams()
 
 
-Watch = Callable[[str, Iterable[np.ndarray]], Iterable[np.ndarray]]
+Watch = Callable[[str, int], ContextManager[Callable[[], None]]]  # what is done in how many steps -> one step is done
+
+
+@contextmanager
+def unwatched(what: str, steps: int) -> Iterator[Callable[[], None]]:
+    """Nobody waits."""
+    yield lambda: None
 
 
 def build(grid_map: GridMap, name: str, map_name: str, params: BuildParams = BuildParams(),
-          watch: Watch = lambda _, lines: lines) -> Atlas:
-    """The atlas of a map.
+          watch: Watch = unwatched) -> Tuple[Atlas, VoronoiGraph]:
+    """The atlas of a map, and the graph that it was measured on.
 
     Args:
         grid_map: any occupancy grid; glass is occupied.
         name: of the atlas.
         map_name: what the map is called there.
         params: of the graph and of the lidar.
-        watch: is given "edges" and their lines, and hands the lines on while they are worked on: for a progress bar.
+        watch: sees how far it is, for a progress bar.
 
     Raises:
         AtlasError: no way in the map is wide and long enough for a robot.
     """
-    graph = voronoi_graph.build(grid_map, params.graph)
+    with watch("graph", voronoi_graph.STEPS) as step:
+        graph = voronoi_graph.build(grid_map, params.graph, step)
     if not graph.lines_m:
-        raise AtlasError(f"no way for a robot of {params.graph.robot_radius_m:g} m radius in this map, or none of "
-                         f"{params.graph.smallest_component_m:g} m")
-    views = EdgeViews(grid_map, params.view)
-    seen: List[np.ndarray] = []
-    for line in watch("edges", graph.lines_m):
-        seen += views.of(line)
-    return _atlas(graph, Ragged.of(seen, 4), grid_map, name, map_name)
+        raise AtlasError(f"no way of {params.graph.smallest_component_m:g} m for a robot of "
+                         f"{params.graph.robot_radius_m:g} m radius in this map")
+    with watch("segment maps", len(graph.lines_m) + 1) as step:
+        views = EdgeViews(grid_map, params.view)
+        step()
+        seen: List[np.ndarray] = []
+        for line in graph.lines_m:
+            seen += views.of(line)
+            step()
+    return _atlas(graph, Ragged.of(seen, 4), grid_map, name, map_name), graph
 
 
 def _atlas(graph: VoronoiGraph, seen: Ragged, grid_map: GridMap, name: str, map_name: str) -> Atlas:

@@ -20,8 +20,9 @@ V vertices of the raw graph, N nodes, E edges; coordinates inside are cells, x a
 from __future__ import annotations
 
 import heapq
+import math
 from dataclasses import dataclass
-from typing import Dict, List, Sequence, Tuple
+from typing import Callable, Dict, List, Sequence, Tuple
 
 import numpy as np
 from scipy import ndimage, sparse
@@ -31,7 +32,9 @@ from glass_nav.geometry import se2
 from glass_nav.world.grid_map import GridMap
 
 SEPARATION_CELLS = 3.5    # cells of one wall lie closer; nearer walls than this cannot be told from one
-CORNER = 0.5              # r falls by more than this share of the way into a corner of 60 degrees or more
+CORNER = 0.5              # r falls by more than this share of the way into a corner of 60 degrees or more,
+CORNER_SLACK_CELLS = 2.0  # unless by so much walls are rough
+STEPS = 5                 # of build()
 TRACE_CELLS = 3.0         # a line is smoothed over so many cells (1 sigma): the steps of rasterized walls
 POINT_CELLS = 1.0         # distance of the points of a line
 
@@ -78,17 +81,31 @@ class VoronoiGraph:
         return _components(len(self.r_m), self.edge_node[:, 0], self.edge_node[:, 1])
 
 
-def build(grid_map: GridMap, params: VoronoiParams = VoronoiParams()) -> VoronoiGraph:
-    """The graph of all free space that the robot can stand in; without any, a graph of no nodes."""
-    clearance = max(params.robot_radius_m / grid_map.resolution_m, SEPARATION_CELLS / 2.0)
-    bounds = _bounds(grid_map, clearance, params.smallest_obstacle_m / grid_map.resolution_m)
+def build(grid_map: GridMap, params: VoronoiParams = VoronoiParams(),
+          step: Callable[[], None] = lambda: None) -> VoronoiGraph:
+    """The graph of all free space that the robot can stand in; without any, a graph of no nodes.
+
+    Args:
+        grid_map: any grid, large or small.
+        params: of the robot and of its lidar.
+        step: called STEPS times on the way.
+    """
+    cell_m = grid_map.resolution_m
+    clearance = max(params.robot_radius_m / cell_m, SEPARATION_CELLS / 2.0)
+    bounds = _bounds(grid_map, clearance, params.smallest_obstacle_m / cell_m)
+    step()
     raw = _raw_graph(bounds, clearance)
+    step()
     twigs = _Chains(raw)
-    twigs.prune(params.leaf_m / grid_map.resolution_m, params.leaf_share_of_r)
+    twigs.prune(params.leaf_m / cell_m, params.leaf_share_of_r)
+    step()
     meetpoints = _Meetpoints(bounds.points, raw, twigs.kept())
-    meetpoints.merge(params.merge_m / grid_map.resolution_m, params.equidistance_m / grid_map.resolution_m)
-    left_out = meetpoints.drop_small(params.smallest_component_m / grid_map.resolution_m)
-    return _in_map(grid_map, bounds, raw, meetpoints, twigs.points + left_out)
+    meetpoints.merge(params.merge_m / cell_m, params.equidistance_m / cell_m)
+    left_out = twigs.points + meetpoints.drop_small(params.smallest_component_m / cell_m)
+    step()
+    graph = _in_map(grid_map, bounds, raw, meetpoints, left_out)
+    step()
+    return graph
 
 
 # -- the cells that bound free space
@@ -242,10 +259,15 @@ def _circumcircles(corners: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
 
 
 class _Chains:
-    """The raw graph as junctions, ends and the chains of plain vertices between them; prune() takes twigs off."""
+    """The raw graph as junctions, ends and the chains of plain vertices between them; prune() takes twigs off.
+
+    A leaf ends where it stops running into a corner: a corridor in the middle of its end, not in the corner of it
+    whose twig was pruned last.
+    """
 
     def __init__(self, raw: _RawGraph) -> None:
         self._r = raw.r.tolist()
+        self._at_xy = raw.points.tolist()
         self._chains = _chains(raw)            # vertices of each chain, both ends included
         self._ends = [[chain[0], chain[-1]] for chain in self._chains]
         self._length = [_way(raw.points[chain]) for chain in self._chains]
@@ -258,44 +280,27 @@ class _Chains:
         self.points = 0                        # parts that pruning left nothing of but a point
 
     def prune(self, leaf: float, share_of_r: float) -> None:
-        """Take off leaves, least salient first: those with length + r_end - r_junction < max(leaf, share r_junction).
-
-        Where a junction has lost a twig and the other twig there runs into a corner, that one goes too before the
-        junction becomes part of a longer chain: else a corridor would end in that corner of its end wall.
-        """
-        def little(number: int, end: int, junction: int) -> Tuple[float, bool]:
-            salience = self._length[number] + self._r[end] - self._r[junction]
-            return salience, salience < max(leaf, share_of_r * self._r[junction])
-
-        def leaf_end(number: int) -> int:
-            """Which of its ends is free: 0, 1; -1 neither or both."""
-            free = [len(self._at[end]) == 1 for end in self._ends[number]]
-            return free.index(True) if free[0] != free[1] else -1
-
+        """Take off leaves, least salient first: those with length + r_end - r_junction < max(leaf, share r_junction)."""
         twigs: List[Tuple[float, int]] = []
 
         def judge(number: int) -> None:
-            side = leaf_end(number)
+            side = self._free_end(number)
             if side >= 0:
-                salience, goes = little(number, self._ends[number][side], self._ends[number][1 - side])
-                if goes:
+                junction_r = self._r[self._ends[number][1 - side]]
+                _, corner, end_r = self._corner(number, side)
+                salience = self._length[number] - corner + end_r - junction_r
+                if salience < max(leaf, share_of_r * junction_r):
                     heapq.heappush(twigs, (salience, number))
 
         for number in range(len(self._chains)):
             judge(number)
         while twigs:
             _, number = heapq.heappop(twigs)
-            side = leaf_end(number) if self._alive[number] else -1
+            side = self._free_end(number) if self._alive[number] else -1
             if side < 0:
                 continue
             junction = self._ends[number][1 - side]
             self._remove(number)
-            if len(self._at[junction]) == 2:
-                for other in sorted(set(self._at[junction]), key=self._length.__getitem__):
-                    end = self._ends[other][0 if self._ends[other][1] == junction else 1]
-                    salience, goes = little(other, end, junction)
-                    if len(self._at[end]) == 1 and goes and salience < CORNER * self._length[other]:
-                        self._remove(other)
             left = self._at[junction]
             if len(left) == 2 and left[0] != left[1]:
                 judge(self._join(left[0], left[1], junction))
@@ -306,7 +311,42 @@ class _Chains:
 
     def kept(self) -> List[np.ndarray]:
         """Vertices (n,) of each chain that is left, both ends included."""
-        return [self._vertices(number) for number, alive in enumerate(self._alive) if alive]
+        kept = []
+        for number, alive in enumerate(self._alive):
+            if not alive:
+                continue
+            vertices = self._vertices(number)
+            first, last = (self._corner(number, side)[0] if len(self._at[self._ends[number][side]]) == 1 else 0
+                           for side in (0, 1))
+            if first + last < len(vertices) - 1:
+                kept.append(vertices[first:len(vertices) - last])
+            else:
+                self.points += 1
+        return kept
+
+    def _free_end(self, number: int) -> int:
+        """Which end of a chain is free: 0, 1; -1 for neither or both."""
+        free = [len(self._at[end]) == 1 for end in self._ends[number]]
+        return free.index(True) if free[0] != free[1] else -1
+
+    def _corner(self, number: int, side: int) -> Tuple[int, float, float]:
+        """How far an end of a chain runs into a corner: in vertices, as a length, and r where it begins to."""
+        parts = self._parts[number]
+        end = self._ends[number][side]
+        before, along = end, 0.0
+        count, best, corner = 0, self._r[end], (0, 0.0, self._r[end])
+        for part, back in (reversed(parts) if side else parts):
+            chain = self._chains[part]
+            for vertex in (chain[-2::-1] if back != bool(side) else chain[1:]).tolist():
+                along += math.hypot(self._at_xy[vertex][0] - self._at_xy[before][0],
+                                    self._at_xy[vertex][1] - self._at_xy[before][1])
+                before, count = vertex, count + 1
+                rise = self._r[vertex] - CORNER * along
+                if rise > best:
+                    best, corner = rise, (count, along, self._r[vertex])
+                elif rise < best - CORNER_SLACK_CELLS:
+                    return corner
+        return corner
 
     def _remove(self, number: int) -> None:
         self._alive[number] = False
