@@ -420,7 +420,7 @@ class _Meetpoints:
     """Nodes and lines between them; merge() makes nodes one that are too close to tell apart."""
 
     def __init__(self, bounds: np.ndarray, raw: _RawGraph, chains: Sequence[np.ndarray]) -> None:
-        self.lines = [_smooth(raw.points[chain]) for chain in chains]
+        self.lines = [raw.points[chain] for chain in chains]
         self.ends = [[int(chain[0]), int(chain[-1])] for chain in chains]
         self.members = {end: [end] for ends in self.ends for end in ends}  # raw vertices of each node
         self.position = {node: raw.points[node] for node in self.members}
@@ -525,7 +525,8 @@ class _Meetpoints:
 
 
 def _smooth(line: np.ndarray) -> np.ndarray:
-    """A line (n, 2) without the steps of the cells: points at equal distances, its ends where they were."""
+    """A line (n, 2) without the steps of the cells: points at equal distances, moved by a cell at most, ends not at all.
+    """
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     count = max(int(np.ceil(along[-1] / POINT_CELLS)), 1)
     at = np.linspace(0.0, along[-1], count + 1)
@@ -533,7 +534,9 @@ def _smooth(line: np.ndarray) -> np.ndarray:
     reach = min(int(4.0 * TRACE_CELLS / POINT_CELLS), count)
     before, after = 2.0 * even[0] - even[reach:0:-1], 2.0 * even[-1] - even[-2:-2 - reach:-1]  # ends stay in place
     padded = np.concatenate([before, even, after])
-    return ndimage.gaussian_filter1d(padded, TRACE_CELLS / POINT_CELLS, axis=0, mode="nearest")[reach:reach + count + 1]
+    smooth = ndimage.gaussian_filter1d(padded, TRACE_CELLS / POINT_CELLS, axis=0, mode="nearest")
+    move = smooth[reach:reach + count + 1] - even
+    return even + move / np.maximum(np.hypot(*move.T), 1.0)[:, None]
 
 
 # -- cells -> metres
