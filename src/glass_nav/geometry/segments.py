@@ -84,6 +84,8 @@ def _away_from_chord(points: np.ndarray) -> np.ndarray:
     """(N,) distance of points from the segment between the first and the last of them."""
     chord = points[-1] - points[0]
     offset = points - points[0]
-    length_squared = chord @ chord
-    share = np.clip(offset @ chord / length_squared, 0.0, 1.0) if length_squared > 0.0 else np.zeros(len(points))
-    return np.hypot(*(offset - share[:, None] * chord).T)
+    length_squared = float(chord @ chord)
+    if length_squared == 0.0:
+        return np.hypot(offset[:, 0], offset[:, 1])
+    share = np.maximum(np.minimum(offset @ chord / length_squared, 1.0), 0.0)  # np.clip is slow on the many short ones
+    return np.hypot(offset[:, 0] - share * chord[0], offset[:, 1] - share * chord[1])

@@ -125,10 +125,13 @@ def _bounds(grid_map: GridMap, clearance: float, smallest: float) -> _Bounds:
     rows, columns = np.nonzero(_around(free) & ~free)
     points = np.column_stack([columns, rows]) - 0.5  # centre of cell 0 is at 0.5, less the border of 1
     doubt = _distance_of_walls(np.pad(grid_map.occupied, 1), rows, columns)
-    post = _posts(points, 2.0 * clearance, smallest)
+    blob, _ = ndimage.label(~free, np.ones((3, 3), bool))
+    of_point = blob[rows, columns]
+    post = _posts(points, of_point, 2.0 * clearance, smallest)
     if post.any():
-        for box in ndimage.find_objects(_labels(free.shape, rows[post], columns[post], points[post], 2.0 * clearance)):
-            free[box] = True
+        filled = np.zeros(blob.max() + 1, bool)
+        filled[of_point[post]] = True
+        free |= filled[blob]
     return _Bounds(points[~post], doubt[~post], points[post], free)
 
 
@@ -161,36 +164,49 @@ def _distance_of_walls(occupied: np.ndarray, rows: np.ndarray, columns: np.ndarr
     return away
 
 
-def _posts(points: np.ndarray, gap: float, smallest: float) -> np.ndarray:
+def _posts(points: np.ndarray, blob: np.ndarray, gap: float, smallest: float) -> np.ndarray:
     """(G,) bool: belongs to a thing smaller than that along both axes, further than the gap from everything else.
 
-    Points that the robot cannot pass between are one thing. The Delaunay triangulation holds the shortest tree that
-    spans all points, so it finds them.
+    Points (G, 2) of one blob of cells are one thing, and so are those that the robot cannot pass between.
     """
-    if len(points) < 4:
-        return np.zeros(len(points), bool)
-    _, thing = _things(points, gap)
+    post = _is_small(points, blob, smallest)
+    small = np.flatnonzero(post)
+    if not len(small):
+        return post
+    if len(small) < len(points):
+        away, _ = cKDTree(points[~post]).query(points[small], distance_upper_bound=gap)
+        attached = np.isfinite(away)
+    else:
+        attached = np.zeros(len(small), bool)
+    thing = _things(points[small], gap)
+    of_large = np.zeros(thing.max() + 1, bool)
+    of_large[thing[attached]] = True
+    post[small] = _is_small(points[small], thing, smallest) & ~of_large[thing]
+    return post
+
+
+def _is_small(points: np.ndarray, thing: np.ndarray, smallest: float) -> np.ndarray:
+    """(G,) bool: all points with this number lie within less than that along both axes, cells and all."""
+    if not len(points):
+        return np.zeros(0, bool)
     order = np.argsort(thing, kind="stable")
     starts = np.flatnonzero(np.diff(thing[order], prepend=-1))
-    low = np.minimum.reduceat(points[order], starts)
-    high = np.maximum.reduceat(points[order], starts)
-    return ((high - low + 1.0) < smallest).all(axis=1)[thing]
+    size = (np.maximum.reduceat(points[order], starts) - np.minimum.reduceat(points[order], starts) + 1.0).max(axis=1)
+    small = np.empty(len(points), bool)
+    small[order] = np.repeat(size < smallest, np.diff(starts, append=len(points)))
+    return small
 
 
-def _things(points: np.ndarray, gap: float) -> Tuple[int, np.ndarray]:
-    sides = _sides(Delaunay(points).simplices)
+def _things(points: np.ndarray, gap: float) -> np.ndarray:
+    """(G,) the number of the group of each point: groups are further apart than the gap.
+
+    The Delaunay triangulation holds the shortest tree that spans all points, so its short sides are enough.
+    """
+    far = 1e3 * (1.0 + np.abs(points).max()) * np.array([[-1, -1], [2, -1], [-1, 2]])  # points in a line have no mesh
+    sides = _sides(Delaunay(np.concatenate([points, far])).simplices)
+    sides = sides[(sides < len(points)).all(axis=1)]
     short = np.hypot(*(points[sides[:, 0]] - points[sides[:, 1]]).T) <= gap
-    return _components(len(points), sides[short, 0], sides[short, 1])
-
-
-def _labels(shape: Tuple[int, int], rows: np.ndarray, columns: np.ndarray, points: np.ndarray,
-            gap: float) -> np.ndarray:
-    """(H, W) int: the number of the thing that each of the cells belongs to, from 1."""
-    pairs = cKDTree(points).query_pairs(gap, output_type="ndarray")
-    _, thing = _components(len(points), pairs[:, 0], pairs[:, 1])
-    label = np.zeros(shape, np.int32)
-    label[rows, columns] = thing + 1
-    return label
+    return _components(len(points), sides[short, 0], sides[short, 1])[1]
 
 
 def _sides(triangles: np.ndarray) -> np.ndarray:
