@@ -186,6 +186,12 @@ class Atlas:
         position = self.nodes.position_m[self.darts.node[dart]]
         return np.concatenate([position, self.darts.bearing_rad[dart][..., None]], axis=-1)
 
+    def refuse_other_map(self, fingerprint: str, what: str) -> None:
+        """Raises AtlasError if a map, by its GridMap.fingerprint(), is not the one that the atlas was made from."""
+        if self.source.sha256 and self.source.sha256 != fingerprint:
+            raise AtlasError(f"was made from another map than {what}: from {self.source.name or 'one without a name'} "
+                             f"with sha256 {self.source.sha256[:12]}..., got {fingerprint[:12]}...")
+
     def components(self) -> Tuple[int, np.ndarray]:
         """How many parts do not touch, and (N,) in which of them each node lies."""
         from scipy.sparse import coo_matrix, csgraph  # slow to import

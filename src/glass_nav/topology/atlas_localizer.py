@@ -92,6 +92,10 @@ class AtlasLocalizer:
         return self._atlas
 
     @property
+    def params(self) -> SearchParams:
+        return self._params
+
+    @property
     def forest(self) -> SearchForest:
         return self._forest
 
@@ -169,7 +173,8 @@ class AtlasLocalizer:
         depth, count = self._forest.depth, len(dart)
         if self._params.document:
             self._claim = None
-            return Estimate(SEARCHING, f"{count} candidates", depth, dart, errors,
+            nodes = len(np.unique(self._atlas.darts.node[dart]))
+            return Estimate(SEARCHING, f"{nodes if depth == 0 else count} candidates", depth, dart, errors,
                             self._choice(vote.seed(self._matcher, dart), dart))
         voted = vote.best(self._matcher, dart)
         if voted.splits or depth == 0:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Dict, Iterator, List, Optional, Tuple
 
 import numpy as np
@@ -28,6 +28,7 @@ _SPURIOUS_DEAD_ENDS = 0.2  # of the meetpoints that are none: something stood in
 class TrialParams:
     """A robot and its errors."""
     noise: Tolerances = field(default_factory=Tolerances)  # standard deviations of what it measures
+    noise_gain: float = 1.0        # times that
     noise_limit: float = math.inf  # standard deviations that an error has at most
     missed: float = 0.0            # chance to drive past a meetpoint
     spurious: float = 0.0          # chance of an edge to show a meetpoint where there is none
@@ -38,8 +39,9 @@ class TrialParams:
         for name in ("missed", "spurious"):
             if not 0.0 <= getattr(self, name) < 1.0:
                 raise ValueError(f"{name} must be in [0, 1), got {getattr(self, name)}")
-        if not self.noise_limit >= 0.0:
-            raise ValueError(f"noise_limit must be >= 0, got {self.noise_limit}")
+        for name in ("noise_gain", "noise_limit"):
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"{name} must be >= 0, got {getattr(self, name)}")
         if self.max_edges < 1:
             raise ValueError(f"max_edges must be >= 1, got {self.max_edges}")
 
@@ -92,9 +94,10 @@ class AtlasRobot:
         self.on_edge = 0.0          # share of the edge behind it, 0 at a node
         self.detection_errors = 0   # so far
 
-    def wake_up(self) -> Meetpoint:
-        """At any dart of the atlas."""
-        self.dart, self.on_edge = int(self._rng.integers(len(self._world.chord_bearing_rad))), 0.0
+    def wake_up(self, dart: Optional[int] = None) -> Meetpoint:
+        """With a dart as the reference edge; without one, at any of the atlas."""
+        self.dart = int(self._rng.integers(len(self._world.chord_bearing_rad))) if dart is None else dart
+        self.on_edge = 0.0
         return self._at_node()
 
     def drive(self, rank: int) -> Tuple[Traversal, Meetpoint]:
@@ -104,7 +107,7 @@ class AtlasRobot:
         if self.on_edge:  # every edge that is none leads on
             along, begun = self.dart, self.on_edge
             if rank == 0:
-                along, begun = int(twin(self.dart)), 1.0 - self.on_edge
+                along, begun = self.dart ^ 1, 1.0 - self.on_edge
             here[2] = -world.chord_bearing_rad[along]
         else:
             along, begun = int(world.atlas.clockwise(np.array(self.dart), np.array(rank))), 0.0
@@ -122,28 +125,30 @@ class AtlasRobot:
             if until < 1.0:
                 self.dart, self.on_edge = along, until
                 return self._measured(rank, length, here), self._nothing_there()
-            arrival = int(twin(along))
+            arrival = along ^ 1
             degree = int(world.atlas.degree[world.atlas.darts.node[arrival]])
             if degree == 1 or not self._rng.random() < self._p.missed:
                 self.dart, self.on_edge = arrival, 0.0
                 return self._measured(rank, length, here), self._at_node()
             self.detection_errors += 1
-            along, begun = int(world.atlas.clockwise(np.array(arrival), self._rng.integers(1, degree))), 0.0
+            along, begun = int(world.atlas.clockwise(np.array(arrival), np.array(self._rng.integers(1, degree)))), 0.0
             here[2] += np.pi + world.gap_rad[arrival] - world.gap_rad[along]
 
     def _noise(self, sigma: float) -> float:
-        return float(np.clip(self._rng.normal(), -self._p.noise_limit, self._p.noise_limit)) * sigma
+        limit = self._p.noise_limit
+        return float(np.clip(self._rng.normal(), -limit, limit)) * self._p.noise_gain * sigma
 
     def _measured(self, rank: int, length_m: float, here: np.ndarray) -> Traversal:
         noise = self._p.noise
         sigma = float(noise.sigma_length_m(np.array(length_m)))
         chord = float(np.hypot(here[0], here[1]))
-        seen = {}
-        if self._p.angles:
-            blur = math.hypot(noise.bearing_sigma_rad, noise.turn_sigma_rad)
-            seen = {"turn_rad": float(angles.wrap(here[2] + self._noise(blur))),
-                    "chord_bearing_rad": math.atan2(here[1], here[0]) + self._noise(blur)}
-        return Traversal(rank, max(length_m + self._noise(sigma), 1e-3), max(chord + self._noise(sigma), 0.0), **seen)
+        length_m, chord = max(length_m + self._noise(sigma), 1e-3), max(chord + self._noise(sigma), 0.0)
+        if not self._p.angles:
+            return Traversal(rank, length_m, chord)
+        blur = math.hypot(noise.bearing_sigma_rad, noise.turn_sigma_rad)
+        return Traversal(rank, length_m, chord,
+                         chord_bearing_rad=math.atan2(here[1], here[0]) + self._noise(blur),
+                         turn_rad=float(angles.wrap(here[2] + self._noise(blur))))
 
     def _at_node(self) -> Meetpoint:
         atlas = self._world.atlas
@@ -182,12 +187,12 @@ class Trial:
 
 
 def run(localizer: AtlasLocalizer, world: Surroundings, p: TrialParams, rng: np.random.Generator,
-        in_atlas: bool = True) -> Trial:
-    """One robot, from waking up to the end of its search."""
+        in_atlas: bool = True, dart: Optional[int] = None) -> Trial:
+    """One robot, from waking up (at a dart, or anywhere) to the end of its search."""
     robot = AtlasRobot(world, p, rng)
     step_ms: List[float] = []
     truth_lost_at: Optional[int] = None
-    for estimate, spent_ms in _search(localizer, robot, p.max_edges):
+    for estimate, spent_ms in _search(localizer, robot, p.max_edges, dart):
         step_ms.append(spent_ms)
         if in_atlas and truth_lost_at is None and not robot.on_edge and robot.dart not in estimate.dart:
             truth_lost_at = estimate.depth
@@ -198,8 +203,9 @@ def run(localizer: AtlasLocalizer, world: Surroundings, p: TrialParams, rng: np.
     return Trial(outcome, estimate.depth, robot.detection_errors, truth_lost_at, step_ms, estimate)
 
 
-def _search(localizer: AtlasLocalizer, robot: AtlasRobot, max_edges: int) -> Iterator[Tuple[Estimate, float]]:
-    meetpoint = robot.wake_up()
+def _search(localizer: AtlasLocalizer, robot: AtlasRobot, max_edges: int,
+            dart: Optional[int]) -> Iterator[Tuple[Estimate, float]]:
+    meetpoint = robot.wake_up(dart)
     started = time.process_time()
     estimate = localizer.start(meetpoint)
     yield estimate, 1e3 * (time.process_time() - started)
@@ -237,8 +243,3 @@ def metrics(done: List[Trial]) -> Dict[str, float]:
     return {**shares, "edges_mean": float(edges.mean()), "edges_p95": float(np.percentile(edges, 95)),
             "step_ms_max": max(max(trial.step_ms) for trial in done), "trials": count,
             "truth_lost_share": sum(trial.truth_lost_at is not None for trial in done) / count}
-
-
-def with_noise_of(tolerances: Tolerances, **changed: float) -> TrialParams:
-    """A robot that measures as well as the tolerances say."""
-    return replace(TrialParams(noise=tolerances), **changed)
