@@ -119,7 +119,7 @@ def _line(atlas: Atlas, graph: VoronoiGraph) -> str:
                       for name, count in ((name, int((atlas.nodes.kind == kind).sum()))
                                           for kind, name in enumerate(KINDS)) if count)
     parts, _ = atlas.components()
-    left_out = f" ({graph.left_out} smaller ones left out)" if graph.left_out else ""
+    left_out = f" ({graph.left_out} too small)" if graph.left_out else ""
     return (f"{len(atlas.nodes)} nodes ({kinds}), {len(atlas.edges)} edges, {atlas.edges.length_m.sum():.0f} m of "
             f"ways in {parts} part{'s' if parts != 1 else ''} of the floor{left_out}, "
             f"{len(atlas.darts.segments_m.values)} segments")

@@ -564,13 +564,13 @@ def _in_map(grid_map: GridMap, bounds: _Bounds, raw: _RawGraph, meetpoints: _Mee
     def metres(points: np.ndarray) -> np.ndarray:
         return se2.transform_points(grid_map.map_from_grid, points * resolution_m)
 
-    nodes = sorted(meetpoints.members, key=lambda node: tuple(meetpoints.position[node]))
+    nodes = sorted(meetpoints.members, key=lambda node: _order(meetpoints.position[node]))
     number = {node: index for index, node in enumerate(nodes)}
     members = [meetpoints.members[node] for node in nodes]
     cells = [np.unique(raw.generator[its]) for its in members]
-    edges = sorted(meetpoints.edges, key=lambda edge: (sorted(number[end] for end in meetpoints.ends[edge]),
-                                                       tuple(meetpoints.lines[edge][1])))
-    lines = [_smooth(meetpoints.lines[edge]) for edge in edges]
+    edges = sorted((_edge([number[end] for end in meetpoints.ends[edge]], meetpoints.lines[edge])
+                    for edge in meetpoints.edges), key=lambda edge: (edge[0], _order(edge[1][len(edge[1]) // 3])))
+    lines = [_smooth(line) for _, line in edges]
     obstacles = cKDTree(np.concatenate([bounds.points, bounds.posts])) if edges else None
     position = np.array([meetpoints.position[node] for node in nodes]).reshape(-1, 2)
     r_m = np.array([raw.r[its].mean() for its in members]) * resolution_m
@@ -581,7 +581,20 @@ def _in_map(grid_map: GridMap, bounds: _Bounds, raw: _RawGraph, meetpoints: _Mee
                            for its in members]) * resolution_m,
         doubt_m=np.minimum(np.array([bounds.doubt[its].max() for its in cells]) * resolution_m, r_m),
         obstacles_m=[metres(bounds.points[its]) for its in cells],
-        edge_node=np.array([[number[end] for end in meetpoints.ends[edge]] for edge in edges], int).reshape(-1, 2),
+        edge_node=np.array([ends for ends, _ in edges], int).reshape(-1, 2),
         lines_m=[metres(line) for line in lines],
         line_clearance_m=[obstacles.query(line)[0] * resolution_m for line in lines] if obstacles is not None else [],
         left_out=left_out)
+
+
+def _edge(ends: List[int], line: np.ndarray) -> Tuple[List[int], np.ndarray]:
+    """An edge from its lower node to its higher one, a loop to the side that comes first in order."""
+    third = len(line) // 3
+    if ends[0] > ends[1] or ends[0] == ends[1] and _order(line[third]) > _order(line[-1 - third]):
+        return ends[::-1], line[::-1]
+    return ends, line
+
+
+def _order(point: np.ndarray) -> Tuple[float, float]:
+    """By x, then y, to a hundredth of a cell: other versions of the mesh round otherwise."""
+    return round(float(point[0]), 2), round(float(point[1]), 2)
