@@ -20,7 +20,7 @@ import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Callable, Dict, Iterator
+from typing import Callable, Iterator
 
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
@@ -82,7 +82,7 @@ def main() -> int:
         grid_map = office(arguments.cells, np.random.default_rng(arguments.seed))
     else:
         grid_map = map_file.load(arguments.map)
-    before_mb, spent_s = peak_mb(), {}  # type: float, Dict[str, float]
+    before_mb, spent_s = peak_mb(), {}
 
     @contextmanager
     def watch(what: str, steps: int) -> Iterator[Callable[[], None]]:

@@ -27,7 +27,7 @@ def clearance_cells(grid_map):
 
 @pytest.mark.parametrize("smallest_obstacle_m", [0.0, VoronoiParams().smallest_obstacle_m])
 def test_the_graph_has_one_part_for_each_part_of_the_free_space(real_map, smallest_obstacle_m):
-    """Second implementation: labels of the cells that are further than the robot's radius from all that are not free."""
+    """Second implementation: labels of the cells further than the robot's radius from all that are not free."""
     graph = voronoi_graph.build(real_map, VoronoiParams(smallest_obstacle_m=smallest_obstacle_m))
     away = ndimage.distance_transform_edt(np.pad(real_map.free, 1))[1:-1, 1:-1]
     wide, narrow = (ndimage.label(away > clearance_cells(real_map) + more, np.ones((3, 3), bool))[0]
@@ -47,4 +47,5 @@ def test_the_graph_has_one_part_for_each_part_of_the_free_space(real_map, smalle
     shared = [label for labels in in_wide.values() for label in labels]
     assert len(set(shared)) == len(shared), "the graph is broken"
     area_m2 = np.bincount(wide.ravel()) * real_map.resolution_m ** 2
-    assert set((np.flatnonzero(area_m2[1:] >= LARGE_M2) + 1).tolist()) <= set(shared), "a part of the floor has no graph"
+    large = set((np.flatnonzero(area_m2[1:] >= LARGE_M2) + 1).tolist())
+    assert large <= set(shared), "a part of the floor has no graph"

@@ -12,7 +12,7 @@ from glass_nav.evaluation import atlas_picture
 from glass_nav.evaluation.atlas_picture import AtlasDrawing
 from glass_nav.evaluation.pictures import MapImage
 from glass_nav.simulation import shipped_buildings
-from glass_nav.topology import atlas_file
+from glass_nav.topology import atlas_file, shipped_atlases
 from glass_nav.topology.atlas import Atlas, AtlasError
 from glass_nav.world import map_file
 from glass_nav.world.grid_map import GridMap
@@ -24,11 +24,13 @@ each edge, there and back; or one edge alone."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the subcommand."""
-    parser.add_argument("atlas", metavar="ATLAS", type=Path, help="atlas.json, atlas.npz, or the folder of one")
+    parser.add_argument("atlas", metavar="ATLAS",
+                        help="atlas.json, atlas.npz, the folder of one, or the name of an atlas of the package: "
+                             f"{', '.join(shipped_atlases.shipped())}")
     parser.add_argument("--map", type=Path, help="map_server .yaml, or MRPT .gridmap[.gz]; default: the map of the "
                                                  "package that the atlas was made from, else none")
     parser.add_argument("--edge", type=int, metavar="N", help="draw this one only")
-    parser.add_argument("--out", type=Path, metavar="PNG", help="default: beside the atlas, atlas.png or edge_N.png")
+    parser.add_argument("--out", type=Path, metavar="PNG", help="default: here, NAME.png or NAME_edge_N.png")
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
@@ -44,19 +46,19 @@ def main(arguments: argparse.Namespace) -> None:
     Raises:
         AtlasError, MapError, OSError: bad input; one line.
     """
-    path = atlas_file.find(arguments.atlas)
+    path = shipped_atlases.find(arguments.atlas)
     atlas = atlas_file.load(path)
+    edge = arguments.edge
+    if edge is not None and edge >= len(atlas.edges):
+        raise AtlasError(f"{path}: --edge must be 0 to {len(atlas.edges) - 1}, got {edge}")
     grid = _map(atlas, arguments.map)
     image = None if grid is None else MapImage(grid.occupancy, grid.resolution_m, grid.map_from_grid)
-    if arguments.edge is None:
-        out = arguments.out or path.with_name("atlas.png")
+    out = arguments.out or Path(f"{atlas.name}.png" if edge is None else f"{atlas.name}_edge_{edge}.png")
+    if edge is None:
         atlas_picture.draw_atlas(out, image, _drawing(atlas), atlas.name)
     else:
-        if arguments.edge >= len(atlas.edges):
-            raise AtlasError(f"{path}: --edge must be 0 to {len(atlas.edges) - 1}, got {arguments.edge}")
-        out = arguments.out or path.with_name(f"edge_{arguments.edge}.png")
-        atlas_picture.draw_edge(out, image, _drawing(atlas), arguments.edge, atlas.name)
-    print(f"drawn to {out}")
+        atlas_picture.draw_edge(out, image, _drawing(atlas), edge, atlas.name)
+    print(f"drawn to {out}" + ("" if grid is not None else "; --map MAP draws the map under it"))
 
 
 def _map(atlas: Atlas, path: Optional[Path]) -> Optional[GridMap]:

@@ -296,7 +296,7 @@ class _Chains:
         self.points = 0                        # parts that pruning left nothing of but a point
 
     def prune(self, leaf: float, share_of_r: float) -> None:
-        """Take off leaves, least salient first: those with length + r_end - r_junction < max(leaf, share r_junction)."""
+        """Take off leaves with length + r_end - r_junction < max(leaf, share r_junction), least salient first."""
         twigs: List[Tuple[float, int]] = []
 
         def judge(number: int) -> None:
@@ -541,8 +541,7 @@ class _Meetpoints:
 
 
 def _smooth(line: np.ndarray) -> np.ndarray:
-    """A line (n, 2) without the steps of the cells: points at equal distances, moved by a cell at most, ends not at all.
-    """
+    """A line (n, 2) without the steps of the cells: at equal distances, moved by a cell at most, the ends not at all."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     count = max(int(np.ceil(along[-1] / POINT_CELLS)), 1)
     at = np.linspace(0.0, along[-1], count + 1)
