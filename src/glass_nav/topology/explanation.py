@@ -25,7 +25,8 @@ def row(localizer: AtlasLocalizer, estimate: Estimate) -> Iterator[str]:
     depth, here = forest.depth, forest.meetpoints[-1]
     yield f"Search depth {depth}"
     if depth:
-        yield f"  match edge E{depth - 1}: {_edge_seen(forest.traversals[-1], forest.meetpoints[-2] if depth > 1 else None)}"
+        left = forest.meetpoints[-2] if depth > 1 else None
+        yield f"  match edge E{depth - 1}: {_edge_seen(forest.traversals[-1], left)}"
     yield f"  match node M{depth}: degree {here.degree}, r {here.r_m:.2f} m"
     yield from _shortened(list(_first_row(localizer, here)) if not depth else list(_expanded_row(localizer)))
     for errors in range(1, forest.errors + 1):
