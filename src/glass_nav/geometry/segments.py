@@ -49,7 +49,7 @@ def split_and_merge(points: np.ndarray, tolerance: float, least_length: float) -
         if runs and _away_from_line(points[runs[-1][0]:last + 1]).max() <= tolerance:
             first = runs.pop()[0]
         runs.append((first, last))
-    segments = []
+    segments: List[np.ndarray] = []
     for first, last in runs:
         segment = fit(points[first:last + 1])
         if np.hypot(*(segment[2:] - segment[:2])) >= least_length:

@@ -101,7 +101,7 @@ def build(grid_map: GridMap, params: VoronoiParams = VoronoiParams(),
     step()
     meetpoints = _Meetpoints(bounds.points, raw, twigs.kept())
     meetpoints.merge(params.merge_m / cell_m, params.equidistance_m / cell_m)
-    left_out = twigs.points + meetpoints.drop_small(params.smallest_component_m / cell_m)
+    left_out = meetpoints.drop_small(params.smallest_component_m / cell_m)
     step()
     graph = _in_map(grid_map, bounds, raw, meetpoints, left_out)
     step()
@@ -293,7 +293,6 @@ class _Chains:
         for number, (first, last) in enumerate(self._ends):
             self._at.setdefault(first, []).append(number)
             self._at.setdefault(last, []).append(number)
-        self.points = 0                        # parts that pruning left nothing of but a point
 
     def prune(self, leaf: float, share_of_r: float) -> None:
         """Take off leaves with length + r_end - r_junction < max(leaf, share r_junction), least salient first."""
@@ -320,24 +319,16 @@ class _Chains:
             left = self._at[junction]
             if len(left) == 2 and left[0] != left[1]:
                 judge(self._join(left[0], left[1], junction))
-            elif len(left) == 1:
-                judge(left[0])
-            elif not left:
-                self.points += 1
 
     def kept(self) -> List[np.ndarray]:
-        """Vertices (n,) of each chain that is left, both ends included."""
+        """Vertices (n,) of each chain that is left, both ends included, n >= 2."""
         kept = []
-        for number, alive in enumerate(self._alive):
-            if not alive:
-                continue
+        for number in np.flatnonzero(self._alive).tolist():
             vertices = self._vertices(number)
             first, last = (self._corner(number, side)[0] if len(self._at[self._ends[number][side]]) == 1 else 0
                            for side in (0, 1))
-            if first + last < len(vertices) - 1:
-                kept.append(vertices[first:len(vertices) - last])
-            else:
-                self.points += 1
+            first = min(first, len(vertices) - 2)
+            kept.append(vertices[first:max(len(vertices) - last, first + 2)])
         return kept
 
     def _free_end(self, number: int) -> int:
@@ -471,21 +462,27 @@ class _Meetpoints:
                         heapq.heappush(short, (self._length[changed], changed))
 
     def drop_small(self, least: float) -> int:
-        """Leave out parts with less way in them; returns how many there were."""
+        """Leave out parts with less way in them, or none; returns how many there were."""
         edges = sorted(self.edges)
         number = {node: index for index, node in enumerate(self.members)}
         count, part = _components(len(number), np.array([number[self.ends[edge][0]] for edge in edges], int),
                                   np.array([number[self.ends[edge][1]] for edge in edges], int))
         of_edge = np.array([part[number[self.ends[edge][0]]] for edge in edges], int)
         way = np.bincount(of_edge, [self._length[edge] for edge in edges], minlength=count)
-        self.edges -= {edge for edge, its in zip(edges, of_edge.tolist()) if way[its] < least}
-        self.members = {node: members for node, members in self.members.items() if way[part[number[node]]] >= least}
-        return int((way < least).sum())
+        small = (way < least) | (way == 0.0)
+        self.edges -= {edge for edge, its in zip(edges, of_edge.tolist()) if small[its]}
+        self.members = {node: members for node, members in self.members.items() if not small[part[number[node]]]}
+        return int(small.sum())
 
     def _contract(self, edge: int) -> List[int]:
-        """Both ends of an edge become its first end. Returns the edges whose length changed."""
-        kept, gone = self.ends[edge]
+        """Both ends of an edge become one node between them, or the junction if one is a dead end. Returns the edges
+        whose length changed.
+        """
+        kept, gone = sorted(self.ends[edge], key=lambda node: -len(self._at[node]))
         self._forget(edge)
+        if not self._at[gone]:
+            del self._at[gone], self.members[gone]
+            return self._dissolve(kept) if len(self._at[kept]) == 2 else []
         count = len(self.members[kept]), len(self.members[gone])
         shares = np.array(count) / sum(count)
         centre = shares[0] * self.position[kept] + shares[1] * self.position[gone]
@@ -499,7 +496,7 @@ class _Meetpoints:
         for other in set(self._at[gone]):
             self.ends[other] = [kept if end == gone else end for end in self.ends[other]]
         self._at[kept] += self._at.pop(gone)
-        return self._dissolve(kept) if len(self._at[kept]) == 2 else sorted(set(self._at[kept]))
+        return sorted(set(self._at[kept]))
 
     def _move_end(self, edge: int, node: int, centre: np.ndarray) -> None:
         """Let the line of an edge end there instead of at the node: what lies nearer than the node did is cut off."""
@@ -541,7 +538,7 @@ class _Meetpoints:
 
 
 def _smooth(line: np.ndarray) -> np.ndarray:
-    """A line (n, 2) without the steps of the cells: at equal distances, moved by a cell at most, the ends not at all."""
+    """A line (n, 2) without the steps of the cells: even points, moved by a cell at most, ends by none."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     count = max(int(np.ceil(along[-1] / POINT_CELLS)), 1)
     at = np.linspace(0.0, along[-1], count + 1)

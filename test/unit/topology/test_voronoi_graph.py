@@ -151,6 +151,12 @@ def test_corridors_that_meet_almost_in_one_point_are_a_cross():
         assert degrees(voronoi_graph.build(floor(15, 13, free))) == expected
 
 
+def test_a_branch_that_is_shorter_than_what_counts_as_one_point_is_none():
+    """The branch of the T is 3.75 m, its other arms are 4 m."""
+    graph = voronoi_graph.build(floor(12, 8, T), VoronoiParams(merge_m=3.9))
+    assert degrees(graph) == [0, 2, 0, 0, 0] and way_m(graph.lines_m[0]) == pytest.approx(8.0, abs=0.3)
+
+
 def test_parallel_ways_and_loops_are_edges_like_any():
     """A pillar in a corridor: two ways from one side of it to the other. A ring with a stem: an edge from T to T."""
     pillar = voronoi_graph.build(floor(12, 8, STRAIGHT, [(5.5, 5.6, 6.5, 6.4)]))
@@ -167,14 +173,19 @@ def test_every_part_of_the_floor_counts_if_it_is_large_enough():
     assert voronoi_graph.build(floor(14, 8, free), VoronoiParams(smallest_component_m=7.0)).left_out == 3
 
 
+def test_where_everything_is_too_small_to_count_there_is_no_graph():
+    assert len(voronoi_graph.build(floor(12, 8, T), VoronoiParams(smallest_obstacle_m=50.0)).r_m) == 0
+
+
 @pytest.mark.parametrize("grid_map", [
     pytest.param(floor(4, 4, []), id="walls only"),
     pytest.param(floor(4, 4, [(0, 0, 4, 4)], unknown=[(0, 0, 4, 4)]), id="nothing known"),
     pytest.param(floor(4, 4, [(1, 1, 1.3, 3)]), id="too narrow"),
     pytest.param(floor(4, 4, [(1, 1, 3, 3)]), id="a square room: only a point is left"),
+    pytest.param(floor(4, 4, [(1, 1, 3, 2.8)]), id="nearly square"),
     pytest.param(GridMap(np.zeros((1, 1), np.int8), 0.05, np.zeros(3)), id="one cell")])
 def test_without_a_way_the_graph_is_empty(grid_map):
-    graph = voronoi_graph.build(grid_map)
+    graph = voronoi_graph.build(grid_map, VoronoiParams(smallest_component_m=0.0))
     assert len(graph.r_m) == len(graph.lines_m) == len(graph.edge_node) == 0
     assert graph.position_m.shape == (0, 2) and graph.components()[0] == 0
 
