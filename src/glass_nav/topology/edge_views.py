@@ -42,7 +42,7 @@ class EdgeViews:
 
     def __init__(self, grid_map: GridMap, params: ViewParams = ViewParams()) -> None:
         self._params = params
-        self._caster = RayCaster(grid_map, unknown="stop")
+        self._caster = RayCaster(wall_segments.walls_closed(grid_map), unknown="stop")
         self._cell_m = grid_map.resolution_m
         self.walls = wall_segments.extract(grid_map)
         self._faces = cKDTree(self.walls.faces_m) if len(self.walls.faces_m) else None

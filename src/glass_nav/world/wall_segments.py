@@ -2,6 +2,7 @@
 
 The outline of free space is followed face by face, a face being a side between a free cell and another. Segments are
 fitted to the centres of the occupied cells behind the faces: beams that end at a wall draw it there. Glass is a wall.
+Mappers leave gaps in walls and unknown cells before them, so those close to an occupied one count as occupied.
 F faces, S segments.
 """
 
@@ -11,11 +12,13 @@ from dataclasses import dataclass
 from typing import List
 
 import numpy as np
+from scipy import ndimage
 
 from glass_nav.geometry import se2, segments
 from glass_nav.world.grid_map import GridMap
 
 TOLERANCE_CELLS = 1.5   # a wall that a mapper left rough is still one
+CLOSE_CELLS = 2         # of an occupied cell, an unknown one is wall
 LEAST_LENGTH_M = 0.3
 GAP_M = 0.3             # of unknown cells, within one wall
 
@@ -32,8 +35,16 @@ class WallSegments:
     face_segment: np.ndarray  # (F,) int: its segment, segments.NO_SEGMENT for none
 
 
+def walls_closed(grid_map: GridMap) -> GridMap:
+    """The map with the unknown cells in and before its walls occupied."""
+    near = ndimage.binary_dilation(grid_map.occupied, np.ones((3, 3), bool), iterations=CLOSE_CELLS)
+    occupancy = np.where(near & (grid_map.occupancy < 0), np.int8(100), grid_map.occupancy)
+    return GridMap(occupancy, grid_map.resolution_m, grid_map.map_from_grid)
+
+
 def extract(grid_map: GridMap) -> WallSegments:
     """All walls of a map; without any, no segments."""
+    grid_map = walls_closed(grid_map)
     resolution_m = grid_map.resolution_m
     cell, side = _faces(grid_map.free)
     behind = cell + _BEHIND[side]

@@ -6,6 +6,7 @@ import floors
 import numpy as np
 import pytest
 from floors import floor
+from scipy import ndimage
 
 from glass_nav.geometry import se2
 from glass_nav.topology import voronoi_graph
@@ -59,6 +60,15 @@ def test_a_floor_of_corridors_and_rooms_has_exactly_their_graph(rough):
         graph = voronoi_graph.build(floor(30, 24, along + rooms, rough=rough, seed=seed))
         assert degrees(graph) == [0, 6, 0, 6 + 6, 2], f"seed {seed}"
         assert len(graph.lines_m) == (6 * 1 + 12 * 3 + 2 * 4) / 2 and graph.components()[0] == 1
+
+
+@pytest.mark.parametrize("turn_deg", [7, 20, 33, 45])
+@pytest.mark.parametrize("free, expected", [(T, [0, 3, 0, 1, 0]), (CROSS, [0, 4, 0, 0, 1]), (L, [0, 2, 0, 0, 0]),
+                                            (ROOMS, [0, 6, 0, 4, 0])], ids=["T", "cross", "L", "rooms"])
+def test_the_steps_of_slanted_walls_change_nothing(turn_deg, free, expected):
+    straight = (floor(22, 13, free).occupancy == 0).astype(float)
+    slanted = np.where(ndimage.rotate(straight, turn_deg, order=1) > 0.5, 0, 100).astype(np.int8)
+    assert degrees(voronoi_graph.build(GridMap(slanted, 0.05, np.zeros(3)))) == expected
 
 
 def test_a_meetpoint_lies_where_the_closed_form_says():

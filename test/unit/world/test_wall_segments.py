@@ -53,6 +53,18 @@ def test_a_pane_of_one_cell_is_seen_from_both_sides():
     assert sorted(np.sign(at_pane[:, 2] - at_pane[:, 0])) == [-1.0, 1.0]
 
 
+def test_a_dotted_wall_behind_unknown_cells_is_a_wall():
+    """Every fourth cell of the lower wall is known, and so is none of those before it."""
+    occupancy = room()
+    occupancy[1, 2:-2] = UNKNOWN
+    occupancy[1, 2:-2:4] = 100
+    occupancy[2, 2:-2] = UNKNOWN
+    found = wall_segments.extract(grid(occupancy)).segments_m
+    lower = found[found[:, [1, 3]].max(axis=1) < 0.2]
+    assert len(lower) == 1 and lower[0, 2] - lower[0, 0] == pytest.approx(4.0, abs=0.1)
+    assert (lower[0, [1, 3]] <= 0.126).all()
+
+
 @pytest.mark.parametrize("gap_cells, pieces", [(3, 1), (20, 2)])
 def test_a_wall_goes_on_behind_a_small_gap_of_unknown_cells_only(gap_cells, pieces):
     occupancy = room()
