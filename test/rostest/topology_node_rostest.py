@@ -53,7 +53,7 @@ def traversal_msg(seen: observations.Traversal, stamp_ns: int) -> EdgeTraversal:
 
 
 def twofold() -> Atlas:
-    """A corridor with a side corridor to the left near either end, seen from the middle: half a turn changes nothing."""
+    """A corridor with a side corridor to the left near either end, seen from the middle: half a turn is no change."""
     position = np.array([[0.0, 0.0], [10.0, 0.0], [-5.0, 0.0], [15.0, 0.0], [0.0, 4.0], [10.0, -4.0]])
     ends = np.array([[0, 1], [2, 0], [1, 3], [0, 4], [1, 5]])
     step = position[ends[:, 1]] - position[ends[:, 0]]
