@@ -11,8 +11,8 @@ What is an obstacle:
 - Unknown cells cannot be driven through, so they bound the graph like walls. But no lidar sees that boundary: the real
   wall is somewhere beyond. So each node tells how far from any wall its obstacles are (doubt_m): 0 at walls, some cells
   where a wall has gaps, up to r at the frontier of what is known.
-- Posts and specks smaller than smallest_obstacle_m that the robot can pass on all sides make no meetpoints; the
-  clearance of an edge knows them.
+- Things smaller than smallest_obstacle_m that the robot can pass on all sides make no meetpoints; the clearance of an
+  edge knows them. Unknown specks of that size with no wall in them are free.
 
 V vertices of the raw graph, N nodes, E edges; coordinates inside are cells, x along columns, y along rows.
 """
@@ -124,15 +124,21 @@ def _bounds(grid_map: GridMap, clearance: float, smallest: float) -> _Bounds:
     _drop_specks(free, np.pi * clearance ** 2)
     rows, columns = np.nonzero(_around(free) & ~free)
     points = np.column_stack([columns, rows]) - 0.5  # centre of cell 0 is at 0.5, less the border of 1
-    doubt = _distance_of_walls(np.pad(grid_map.occupied, 1), rows, columns)
-    blob, _ = ndimage.label(~free, np.ones((3, 3), bool))
-    of_point = blob[rows, columns]
-    post = _posts(points, of_point, 2.0 * clearance, smallest)
-    if post.any():
-        filled = np.zeros(blob.max() + 1, bool)
-        filled[of_point[post]] = True
-        free |= filled[blob]
-    return _Bounds(points[~post], doubt[~post], points[post], free)
+    occupied = np.pad(grid_map.occupied, 1)
+    doubt = _distance_of_walls(occupied, rows, columns)
+    blobs, count = ndimage.label(~free, np.ones((3, 3), bool))
+    blob = blobs[rows, columns]
+    has_wall = np.zeros(count + 1, bool)
+    has_wall[blobs[occupied]] = True
+    speck = _is_small(points, blob, smallest) & ~has_wall[blob]
+    post = np.zeros(len(points), bool)
+    post[~speck] = _posts(points[~speck], blob[~speck], 2.0 * clearance, smallest)
+    if (post | speck).any():
+        passed = np.zeros(count + 1, bool)
+        passed[blob[post | speck]] = True
+        free |= passed[blobs]
+    bound = ~(post | speck)
+    return _Bounds(points[bound], doubt[bound], points[post], free)
 
 
 def _drop_specks(free: np.ndarray, least_cells: float) -> None:

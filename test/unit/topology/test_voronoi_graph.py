@@ -127,8 +127,10 @@ def test_posts_with_gaps_too_narrow_for_the_robot_are_one_thing():
     assert degrees(voronoi_graph.build(floor(12, 8, STRAIGHT, row))) == [0, 2, 0, 2, 0]
 
 
-def test_unknown_specks_make_no_meetpoints():
-    assert degrees(voronoi_graph.build(floor(12, 8, STRAIGHT, unknown=[(6, 6.3, 6.1, 6.4)]))) == [0, 2, 0, 0, 0]
+def test_unknown_specks_are_free_also_in_swarms():
+    swarm = [(5 + 0.2 * k, 5.3 + 0.2 * j, 5.1 + 0.2 * k, 5.4 + 0.2 * j) for k in range(5) for j in range(7)]
+    graph = voronoi_graph.build(floor(12, 8, STRAIGHT, unknown=swarm))
+    assert degrees(graph) == [0, 2, 0, 0, 0] and graph.line_clearance_m[0].min() > 0.9
 
 
 def test_no_way_leads_through_unknown_space_and_what_borders_on_it_is_in_doubt():
