@@ -203,8 +203,14 @@ class AtlasLocalizer:
             self._claim = _Claim(depth, dart, driven)
         needed = self._params.confirm_edges + (0 if self._params.document else int(errors[0]))
         confirmed = self._claim.confirmed(driven, depth)
-        if confirmed < needed and not self._all_driven(int(dart[0]), driven):
+        rival = (confirmed >= needed > 0 and self._params.max_detection_errors > 0
+                 and self._forest.has_rival(int(dart[0])))
+        if (confirmed < needed or rival) and not self._all_driven(int(dart[0]), driven):
             rank = self._towards_new_edges(int(dart[0]))
+            if rival:
+                reason = "one candidate, but if a meetpoint was missed just now it is the next"
+                return Estimate(TENTATIVE if count == 1 else SEARCHING, reason, depth, dart, errors,
+                                self._choice(rank, dart))
             if count == 1:
                 reason = f"one candidate, {needed - confirmed} edges must confirm it"
                 return Estimate(TENTATIVE, reason, depth, dart, errors, self._choice(rank, dart))

@@ -35,8 +35,8 @@ def row(localizer: AtlasLocalizer, estimate: Estimate) -> Iterator[str]:
                                f"  active with {errors} error{'s' * (errors > 1)} of the detector"
                                for dart, parent in zip(found.dart.tolist(), found.parent.tolist())])
     if localizer.params.document and depth and here.degree > 2 and len(estimate.dart) > 1:
-        left, right = vote.ballots(localizer.matcher, estimate.dart)
-        yield f"  votes: {left} left, {right} right"
+        ballots = vote.ballots(localizer.matcher, estimate.dart)
+        yield f"  votes: {ballots[0]} left, {ballots[1]} right"
     turn = ""
     if estimate.choice:
         turn = f"; turn {estimate.choice.name}" if depth else "; leave by any edge"

@@ -159,6 +159,16 @@ class SearchForest:
                 return found[::-1]
             (depth, errors), index = before, parent
 
+    def has_rival(self, dart: int) -> bool:
+        """Whether a candidate of the current depth came by an edge where one with a meetpoint missed fits as well: to
+        the next meetpoint, if that is near."""
+        came = self.path(dart)
+        if not came[-1][2]:
+            return False
+        departure = self._departures(np.array([came[-2][1]]), self.depth - 1)
+        _, arrival, _ = self._joined_edges(departure, self._traversals[-1], 1)
+        return bool(self._matcher.at(arrival, self._meetpoints[-1]).any())
+
     # -- rows
 
     def _work_out_last_row(self) -> None:

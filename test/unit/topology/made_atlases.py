@@ -59,7 +59,7 @@ def rotation_system(rng: np.random.Generator, values: int = 3) -> Atlas:
 def voronoi(nodes: int, seed: int, spacing_m: float = 8.0) -> Atlas:
     """The Voronoi graph of random points: all nodes of degree 3 but those that the rim cut; r is the true equidistance.
 
-    Ways are up to a third longer than their chords.
+    Ways are up to a third longer than their chords, and leave up to 20 degrees beside them.
     """
     from scipy.spatial import Voronoi, cKDTree
 
@@ -76,8 +76,11 @@ def voronoi(nodes: int, seed: int, spacing_m: float = 8.0) -> Atlas:
     position = diagram.vertices[names]
     r = cKDTree(points).query(position)[0]
     chord = np.linalg.norm(position[ends[:, 1]] - position[ends[:, 0]], axis=1)
-    return atlas_of(position, np.maximum(r, 0.05), ends, np.maximum(chord, 0.05) * rng.uniform(1.0, 1.33, len(ends)),
-                    name=f"voronoi_{nodes}_{seed}")
+    length = np.maximum(chord, 0.05) * rng.uniform(1.0, 1.33, len(ends))
+    step = position[ends[:, 1]] - position[ends[:, 0]]
+    out = np.arctan2(step[:, 1], step[:, 0])
+    bearing = np.stack([out, out + np.pi], axis=1).ravel() + rng.uniform(-0.35, 0.35, 2 * len(ends))
+    return atlas_of(position, np.maximum(r, 0.05), ends, length, bearing, name=f"voronoi_{nodes}_{seed}")
 
 
 def torus(columns: int, rows: int, spacing_m: float = 5.0) -> Atlas:
