@@ -13,7 +13,7 @@ from typing import List, Optional, Set, Tuple
 
 import numpy as np
 
-from glass_nav.geometry import angles
+from glass_nav.geometry import se2
 from glass_nav.topology import ambiguity, vote
 from glass_nav.topology.atlas import Atlas, Visits
 from glass_nav.topology.matching import Matcher, Tolerances
@@ -271,11 +271,8 @@ class _Claim:
 def poses_at(atlas: Atlas, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
     """(C, 3) poses in the frame map of a robot whose reference edges are darts (C,)."""
     behind = float(meetpoint.bearings_rad[0]) if len(meetpoint.bearings_rad) else np.pi
-    yaw = angles.wrap(atlas.darts.bearing_rad[dart] - behind)
-    cos, sin = angles.cos_sin(yaw)
-    x, y = meetpoint.centre_m
-    position = atlas.nodes.position_m[atlas.darts.node[dart]]
-    return np.stack([position[:, 0] - (cos * x - sin * y), position[:, 1] - (sin * x + cos * y), yaw], axis=-1)
+    base_from_dart = np.array([*meetpoint.centre_m, behind])
+    return se2.compose(atlas.map_from_dart(dart), se2.inverse(base_from_dart))
 
 
 def _straight_on(meetpoint: Meetpoint) -> int:

@@ -103,26 +103,6 @@ def turn_name(rank: int, degree: int) -> str:
     return RIGHT if rank == degree - 1 else f"RANK_{rank}"
 
 
-def turn_rank(word: str, degree: int) -> int:
-    """The rank that a word means at a meetpoint of that degree.
-
-    FORWARD is the only way on at degree 2 and the middle one where there is a middle.
-
-    Raises:
-        ObservationError: no edge of the meetpoint is meant.
-    """
-    ranks = {U_TURN: 0, LEFT: 1, RIGHT: degree - 1}
-    if degree == 1:
-        ranks = {U_TURN: 0}
-    if degree % 2 == 0:
-        ranks[FORWARD] = degree // 2
-    ranks.update({f"RANK_{rank}": rank for rank in range(degree)})
-    if word not in ranks:
-        raise ObservationError(f"turn {word!r}: no such edge at a meetpoint of degree {degree}, allowed "
-                               f"{', '.join(list(ranks))}")
-    return ranks[word]
-
-
 def refuse_rank(rank: int, degree: int) -> None:
     """Raises ObservationError if a meetpoint of that degree has no such edge."""
     if not 0 <= rank < degree:

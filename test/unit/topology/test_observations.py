@@ -8,7 +8,7 @@ from typing import Any, Dict
 import numpy as np
 import pytest
 
-from glass_nav.topology.observations import (Meetpoint, ObservationError, Traversal, refuse_rank, turn_name, turn_rank)
+from glass_nav.topology.observations import (Meetpoint, ObservationError, Traversal, refuse_rank, turn_name)
 
 
 @pytest.mark.parametrize("degree, names", [
@@ -16,18 +16,6 @@ from glass_nav.topology.observations import (Meetpoint, ObservationError, Traver
     (5, ["U_TURN", "LEFT", "RANK_2", "RANK_3", "RIGHT"])])
 def test_clockwise_from_behind_comes_left_and_right_is_last(degree: int, names: "list[str]") -> None:
     assert [turn_name(rank, degree) for rank in range(degree)] == names
-    assert [turn_rank(name, degree) for name in names] == list(range(degree))
-
-
-def test_at_degree_two_left_and_right_are_forward_and_at_four_forward_is_the_middle() -> None:
-    assert {turn_rank(word, 2) for word in ("LEFT", "RIGHT", "FORWARD")} == {1}
-    assert turn_rank("FORWARD", 4) == 2
-
-
-@pytest.mark.parametrize("word, degree", [("FORWARD", 3), ("LEFT", 1), ("RANK_3", 3), ("left", 3)])
-def test_a_word_that_means_no_edge_is_refused(word: str, degree: int) -> None:
-    with pytest.raises(ObservationError, match=f"turn '{word}': no such edge at a meetpoint of degree {degree}"):
-        turn_rank(word, degree)
 
 
 def test_a_rank_that_no_edge_has_is_refused() -> None:
