@@ -23,6 +23,7 @@ from glass_nav.topology.search_forest import NO_PARENT
 
 STATE_COLOURS = {SEARCHING: (230, 159, 0), TENTATIVE: (86, 180, 233), CONFIRMED: (0, 158, 115),
                  AMBIGUOUS: (204, 121, 167)}
+NAMESPACES = ("atlas", "nodes", *(state.lower() for state in STATE_COLOURS), "ruled_out", "forest", "text")
 ATLAS_RGB, NODE_RGB, RULED_OUT_RGB, FOREST_RGB = (130, 130, 130), (60, 60, 60), (213, 94, 0), (0, 114, 178)
 MOST_PATHS = 50  # of candidates; more would only hide the map
 
