@@ -111,12 +111,13 @@ def _draw_edges(axes: Any, atlas: AtlasDrawing) -> None:
 
 
 def _draw_nodes(axes: Any, atlas: AtlasDrawing) -> None:
-    from matplotlib.collections import EllipseCollection
+    from matplotlib.collections import PatchCollection
+    from matplotlib.patches import Circle
 
     if len(atlas.r_m) <= MOST_NUMBERS:
-        axes.add_collection(EllipseCollection(2.0 * atlas.r_m, 2.0 * atlas.r_m, np.zeros(len(atlas.r_m)), units="xy",
-                                              offsets=atlas.position_m, transOffset=axes.transData,
-                                              facecolors="none", edgecolors="#bbbbbb", linewidths=0.4, zorder=1.5))
+        circles = [Circle(tuple(point), r_m) for point, r_m in zip(atlas.position_m, atlas.r_m)]
+        axes.add_collection(PatchCollection(circles, facecolors="none", edgecolors="#bbbbbb", linewidths=0.4,
+                                            zorder=1.5))
     shown = np.minimum(atlas.degree, max(NODE_COLOURS))
     for degree, colour in NODE_COLOURS.items():
         chosen = shown == degree
@@ -130,9 +131,9 @@ def _draw_nodes(axes: Any, atlas: AtlasDrawing) -> None:
 
 
 def _draw_views(axes: Any, atlas: AtlasDrawing, seen: Sequence[np.ndarray], which: str) -> None:
-    from matplotlib import colormaps
+    from matplotlib import cm
 
-    colours = colormaps["tab20"].colors
+    colours = cm.tab20.colors
     for edge, (line, segments) in enumerate(zip(atlas.lines_m, seen)):
         colour = colours[edge % len(colours)]
         _draw_segments(axes, segments, colour, 1.6)
