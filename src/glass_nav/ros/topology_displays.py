@@ -110,7 +110,7 @@ def _rgb(rgb: "tuple[int, int, int]") -> ColorRGBA:
 def _text(header: Header, atlas: Atlas, text: str) -> Marker:
     """Above the atlas, readable from where all of it is seen."""
     low, high = atlas.nodes.position_m.min(axis=0), atlas.nodes.position_m.max(axis=0)
-    size = max(0.3, 0.03 * float((high - low).max()))
+    size = max(0.3, 0.018 * float((high - low).max()))
     pose = Pose(orientation=Quaternion(w=1.0))
     pose.position.x, pose.position.y = 0.5 * float(low[0] + high[0]), float(high[1]) + 2.0 * size
     return Marker(header=header, ns="text", id=0, type=Marker.TEXT_VIEW_FACING, action=Marker.ADD, pose=pose,

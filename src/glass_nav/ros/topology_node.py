@@ -305,7 +305,7 @@ class TopologyNode:
             return
         frame = self._p.global_frame_id
         self._markers.publish(topology_displays.search_markers(
-            self._localizer, self._estimate, self._listed_poses(), frame, f"{self._state}: {self._reason}",
+            self._localizer, self._estimate, self._listed_poses(), frame, f"{self._state}\n{self._reason}",
             self._atlas_markers))
 
     def _status_msg(self, stamp_ns: int) -> TopologyStatus:

@@ -17,7 +17,7 @@ import numpy as np
 
 from glass_nav.topology.matching import Matcher
 
-_POLLED = 192     # candidates whose expectations are compared, each with each
+_POLLED = 100     # candidates whose expectations are compared, each with each: 2 ms of a step
 _EQUAL = 1e-9     # survivors by which two turns differ only by rounding
 
 
