@@ -74,7 +74,8 @@ def main() -> int:
         print(f"{len(atlas.nodes)} nodes, {len(atlas.edges)} edges: arrays {size_mb(atlas):.0f} MB, process "
               f"{memory:.0f} MB at most, ready in {ready_s:.2f} s")
         limit = LIMITS_MS.get(nodes)
-        for what, p in (("no errors", TrialParams()), ("10 % missed, 5 % spurious", TrialParams(missed=0.1, spurious=0.05))):
+        for what, p in (("no errors", TrialParams()),
+                        ("10 % missed, 5 % spurious", TrialParams(missed=0.1, spurious=0.05))):
             slowest, edges, considered = slowest_steps_ms(localizer, world, p, arguments.trials, arguments.seed)
             verdict = ""
             if limit is not None and what == "no errors":

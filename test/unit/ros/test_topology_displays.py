@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from visualization_msgs.msg import Marker
 
+from glass_nav.msg import EdgeTraversal
 from glass_nav.ros import topology_displays, topology_messages
 from glass_nav.topology import atlas_file, shipped_atlases
 from glass_nav.topology.atlas_localizer import AtlasLocalizer, SearchParams, TurnChoice
 from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
-
-rospy = pytest.importorskip("rospy")
-from visualization_msgs.msg import Marker  # noqa: E402
-
-from glass_nav.msg import EdgeTraversal  # noqa: E402
 
 
 def shown(localizer, poses):
