@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import sys
 import threading
+from dataclasses import replace
 from typing import Any, Callable, Dict, Optional
 
 import actionlib
@@ -252,9 +253,13 @@ class TopologyNode:
                            f"{apart_s:.3f} s apart, allowed ~pairing_tolerance_s {self._p.pairing_tolerance_s:g} s")
             return
         self._waiting_traversal = None
-        estimate = self._localizer.update(
-            topology_messages.traversal_from_msg(traversal, self._estimate.choice),
-            topology_messages.meetpoint_from_msg(meetpoint))  # refused: the meetpoint stays, for another traversal
+        try:
+            estimate = self._localizer.update(
+                topology_messages.traversal_from_msg(traversal, self._estimate.choice),
+                topology_messages.meetpoint_from_msg(meetpoint))
+        except ObservationError as err:  # whichever of the two came last; the meetpoint waits for another traversal
+            self._log.warn(f"edge_traversal refused: {err}")
+            return
         self._waiting_meetpoint = None
         self._judge(estimate, meetpoint)
 
@@ -262,16 +267,20 @@ class TopologyNode:
         """Tell what a step found out."""
         assert self._localizer is not None
         stamp_ns, frame = conversions.ns_from_stamp(meetpoint.header.stamp), self._p.global_frame_id
+        given_up = (self._goal is not None and not estimate.done
+                    and 0 < self._goal.max_edges <= estimate.depth)
+        if given_up:
+            estimate = replace(estimate, choice=None)  # nobody is to drive on
         self._estimate = estimate
         self._set_state(estimate.state, estimate.reason, stamp_ns)
         rospy.loginfo(f"{estimate.depth} edges: {estimate.state}, {estimate.reason}")
         if self._goal is not None and not estimate.done:
             self._server.publish_feedback(LocalizeGloballyFeedback(self._status_msg(stamp_ns)))
-            if 0 < self._goal.max_edges <= estimate.depth:
-                self._finish_goal(f"not found behind {estimate.depth} edges: {estimate.reason}")
-                self._forget()
-                self._set_state(IDLE, f"gave up behind {estimate.depth} edges", stamp_ns)
-                return
+        if given_up:
+            self._finish_goal(f"not found behind {estimate.depth} edges: {estimate.reason}")
+            self._forget()
+            self._set_state(IDLE, f"gave up behind {estimate.depth} edges", stamp_ns)
+            return
         if estimate.choice is not None:
             self._turns.publish(topology_messages.turn_choice_msg(estimate.choice, stamp_ns, meetpoint.header.frame_id))
         if estimate.state == CONFIRMED:
