@@ -70,6 +70,17 @@ class GridMap:
         return ((rows >= 0) & (rows < self.occupancy.shape[0])
                 & (columns >= 0) & (columns < self.occupancy.shape[1]))
 
+    def fingerprint(self) -> str:
+        """SHA-256 of cells and place, in hex: equal for the map in a file and for the same one out of a message.
+
+        The resolution counts to a micrometre (messages carry it as float32), the origin to a millimetre.
+        """
+        place = (f"{self.occupancy.shape[0]} {self.occupancy.shape[1]} {self.resolution_m:.6f} "
+                 + " ".join(f"{round(float(value), 3) + 0.0:.3f}" for value in self.map_from_grid))
+        digest = hashlib.sha256(place.encode())
+        digest.update(np.ascontiguousarray(self.occupancy).tobytes())
+        return digest.hexdigest()
+
     def is_free(self, points_m: np.ndarray) -> np.ndarray:
         """(...) bool: points (..., 2) [m] of the frame map lie in a free cell."""
         rows, columns = self.cells(points_m)
