@@ -49,7 +49,7 @@ def main(arguments: argparse.Namespace) -> None:
     atlas = atlas_file.load(path)
     if arguments.map is not None:
         try:
-            atlas.refuse_other_map(map_file.load(arguments.map).fingerprint(), str(arguments.map))
+            atlas.refuse_other_map(map_file.load(arguments.map).fingerprint, str(arguments.map))
         except AtlasError as err:
             raise AtlasError(f"{path}: {err}") from err
     print(f"{path}: in order")

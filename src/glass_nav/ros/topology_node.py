@@ -195,7 +195,7 @@ class TopologyNode:
         """A map came: is the atlas one of it?"""
         topic = rospy.resolve_name("map")
         try:
-            self._map_fingerprint = conversions.map_from_msg(msg).fingerprint()
+            self._map_fingerprint = conversions.map_from_msg(msg).fingerprint
             if self._localizer is not None:
                 self._localizer.atlas.refuse_other_map(self._map_fingerprint, f"that of topic {topic}")
             elif self._state == NO_ATLAS:

@@ -102,7 +102,7 @@ class Darts:
 class MapReference:
     """The map that an atlas was made from."""
     name: str
-    sha256: str  # GridMap.fingerprint(); empty: not known, fits every map
+    sha256: str  # GridMap.fingerprint; empty: not known, fits every map
 
 
 @dataclass(frozen=True)
@@ -187,7 +187,7 @@ class Atlas:
         return np.concatenate([position, self.darts.bearing_rad[dart][..., None]], axis=-1)
 
     def refuse_other_map(self, fingerprint: str, what: str) -> None:
-        """Raises AtlasError if a map, by its GridMap.fingerprint(), is not the one that the atlas was made from."""
+        """Raises AtlasError if a map, by its GridMap.fingerprint, is not the one that the atlas was made from."""
         if self.source.sha256 and self.source.sha256 != fingerprint:
             raise AtlasError(f"was made from another map than {what}: from {self.source.name or 'one without a name'} "
                              f"with sha256 {self.source.sha256[:12]}..., got {fingerprint[:12]}...")

@@ -86,7 +86,7 @@ def _atlas(graph: VoronoiGraph, seen: Ragged, grid_map: GridMap, name: str, map_
                   Ragged.of([line[segments.corners(line, LINE_TOLERANCE_M)] for line in graph.lines_m], 2))
     bearing = np.array([bearings(line) for line in graph.lines_m]).ravel()
     node = graph.edge_node.ravel().astype(np.int64)
-    return Atlas(name, MapReference(map_name, grid_map.fingerprint()),
+    return Atlas(name, MapReference(map_name, grid_map.fingerprint),
                  Nodes(graph.position_m, graph.r_m, sigma_r_m, kind), edges, Darts(node, bearing, seen),
                  rings_clockwise(node, bearing, len(degree)), Visits.none(len(degree), len(edges)))
 

@@ -32,7 +32,7 @@ def faces(atlas):
 
 def test_a_cross_has_the_measures_of_its_corridors():
     atlas, graph = atlas_builder.build(CROSS, "cross", "drawn")
-    assert (atlas.name, atlas.source.name, atlas.source.sha256) == ("cross", "drawn", CROSS.fingerprint())
+    assert (atlas.name, atlas.source.name, atlas.source.sha256) == ("cross", "drawn", CROSS.fingerprint)
     middle = int(np.flatnonzero(atlas.nodes.kind == MEETPOINT)[0])
     assert atlas.degree[middle] == 4 and (atlas.nodes.kind == DEAD_END).sum() == 4
     np.testing.assert_allclose(atlas.nodes.position_m[middle], [7.0, 6.0], atol=0.03)
