@@ -15,7 +15,7 @@ from glass_nav.localization.start_pose import StartPose
 from glass_nav.params import ParamError
 
 # Of localization_node, beside AMCL's: without a meaning for the replay of a log.
-NODE_ONLY = frozenset(["transform_wait_s", "random_seed", "glass_map_period_s"])
+NODE_ONLY = frozenset(["transform_wait_s", "random_seed", "glass_map_period_s", "landmark_file"])
 
 
 @dataclass(frozen=True)

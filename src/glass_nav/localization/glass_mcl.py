@@ -8,16 +8,17 @@ the beams that are understood. GlassMcl.update() reads as the document does.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Optional, Tuple
+from typing import List, Optional, Tuple
 
 import numpy as np
 
 from glass_nav.geometry import angles, se2
-from glass_nav.localization import (beam_cases, beam_weights, glass_map, motion, pose_estimate, pose_quality,
-                                    preliminary_samples, proposal, reference_ranges, resampling,
+from glass_nav.localization import (beam_cases, beam_weights, bearing_weights, glass_map, motion, pose_estimate,
+                                    pose_quality, preliminary_samples, proposal, reference_ranges, resampling,
                                     scan_alignment, surface_scan)
 from glass_nav.localization.beam_cases import BeamCases, CaseVote
 from glass_nav.localization.beam_weights import BeamMixture
+from glass_nav.localization.bearing_weights import BearingMixture
 from glass_nav.localization.glass_map import GlassEvidence, GlassMap
 from glass_nav.localization.motion import OdometryNoise
 from glass_nav.localization.preliminary_samples import PreliminarySamples
@@ -29,11 +30,13 @@ from glass_nav.localization.resampling import ParticleCount
 from glass_nav.localization.scan_alignment import Alignment
 from glass_nav.localization.scan_anchor import ScanAnchor
 from glass_nav.localization.surface_scan import SurfaceScan
+from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan, ScanError
 from glass_nav.sensing.wall_thickness import wall_thickness
 from glass_nav.world.grid_map import GridMap
+from glass_nav.world.landmark_map import LandmarkMap
 
 _WIDEST_PLACE = np.array([1.0, 1.0, 0.7])  # deviations [m, m, rad] that preliminary samples can cover
 _LEAST_ENDS = 20       # of beams of known case that a pose is refined by
@@ -85,6 +88,7 @@ class GlassMclParams:
     glass: GlassEvidence = field(default_factory=GlassEvidence)
     mixture: BeamMixture = field(default_factory=BeamMixture)
     quality: QualityLimits = field(default_factory=QualityLimits)
+    bearings: BearingMixture = field(default_factory=BearingMixture)
 
 
 @dataclass(frozen=True)
@@ -126,6 +130,7 @@ class GlassMcl:
         self._quality = pose_quality.PoseQuality(params.quality)
         self._update_due = True
         self._updates = 0
+        self._bearings: List[Tuple[LandmarkBearings, LandmarkMap, np.ndarray]] = []  # odom_from_base at their stamp
 
     def set_map(self, grid_map: GridMap) -> None:
         """Another map; the particles stay where they are."""
@@ -190,6 +195,24 @@ class GlassMcl:
         """The next scan is used even if the robot did not move (service request_nomotion_update)."""
         self._update_due = True
 
+    def add_bearings(self, bearings: LandmarkBearings, landmarks: LandmarkMap, odom_from_base: np.ndarray) -> None:
+        """Evidence for the next update, which the next scan makes even if the robot does not move.
+
+        Args:
+            bearings: to landmarks.
+            landmarks: that they are of.
+            odom_from_base: (3,) odometry's pose at the stamp of the bearings.
+
+        Raises:
+            UnknownLandmark, ValueError: an id that is not on the map, odometry that is not finite; nothing is changed.
+        """
+        landmarks.numbers(bearings.ids)
+        odom_from_base = np.array(odom_from_base, float)
+        if odom_from_base.shape != (3,) or not np.all(np.isfinite(odom_from_base)):
+            raise ValueError(f"odometry of bearings must be finite x, y, yaw, got {odom_from_base}")
+        self._bearings.append((bearings, landmarks, odom_from_base))
+        self._update_due = True
+
     def update(self, scan: Scan, odom_from_base: np.ndarray) -> Estimate:
         """One scan and the odometry at its stamp -> pose.
 
@@ -208,6 +231,7 @@ class GlassMcl:
             cases, references = self._vote(scan, map_from_base, self._best.covariance)
             return self._estimate(scan, odom_from_base, cases, references)
         predicted = self._predict(odom_from_base)
+        self._weigh_by_bearings(predicted, odom_from_base)
         cases = self._correct(scan, predicted, odom_from_base)
         self._best = pose_estimate.of(self._particles, self._weights)
         self._resample()
@@ -216,6 +240,15 @@ class GlassMcl:
         self._update_due = False
         map_from_base = se2.compose(self._map_from_odom, odom_from_base)  # the vote was held at the aligned pose
         return self._estimate(scan, odom_from_base, cases, self._references(scan, map_from_base[None]), updated=True)
+
+    def _weigh_by_bearings(self, predicted: np.ndarray, odom_from_base: np.ndarray) -> None:
+        """What bearings were added since the last update say, before the scan is looked at."""
+        for bearings, landmarks, odom_from_then in self._bearings:
+            now_from_then = se2.compose(se2.inverse(odom_from_base), odom_from_then)
+            log_w = bearing_weights.log_weights(predicted, bearings.seen_from(bearings.stamp_ns, now_from_then),
+                                                landmarks, self._params.bearings)
+            self._weights = resampling.tempered(np.log(self._weights) + log_w)
+        self._bearings = []
 
     def _correct(self, scan: Scan, predicted: np.ndarray, odom_from_base: np.ndarray) -> BeamCases:
         """The scan places and weighs the particles, by the beams whose case is known."""
@@ -358,6 +391,7 @@ class GlassMcl:
         self._weights = np.full(len(particles), 1.0 / len(particles))
         self._best = pose_estimate.of(particles, self._weights)
         self._odom_from_base = None
+        self._bearings = []
         self._stamp_ns = None
         self._anchor = ScanAnchor(self._field)
         self._quality = pose_quality.PoseQuality(self._params.quality, searching)

@@ -3,7 +3,7 @@
 Wiring only; the answer comes from GlassMcl. Callbacks store, one loop works: nothing else touches the filter.
 
 Subscribes: scan (LaserScan), initialpose (PoseWithCovarianceStamped), map (OccupancyGrid, if ~use_map_topic),
-    tf odom <- base <- laser.
+    landmark_bearings (LandmarkBearings, if ~landmark_file is given), tf odom <- base <- laser.
 Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseArray, latched), tf map -> odom,
     ~status (LocalizationStatus, latched), ~beam_cases (BeamCases), /diagnostics;
     scan_surfaces (LaserScan): the scan for a costmap, with each beam cut at the first surface of the map that it
@@ -39,12 +39,14 @@ from visualization_msgs.msg import MarkerArray
 
 from glass_nav.geometry import se2
 from glass_nav.localization.glass_mcl import Estimate, GlassMcl
-from glass_nav.msg import BeamCases, LocalizationStatus
-from glass_nav.ros import beam_displays, conversions, endings, legend, params, wall_display
+from glass_nav.msg import BeamCases, LandmarkBearings, LocalizationStatus
+from glass_nav.ros import beam_displays, bearing_messages, conversions, endings, legend, params, wall_display
 from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Errand, Mailbox, WaitingScans
+from glass_nav.sensing import bearings
 from glass_nav.sensing.scan import Scan, ScanError
+from glass_nav.world import landmark_file, landmark_map
 from glass_nav.world.grid_map import GridMap
 
 TIME_JUMP_S = 0.5       # a clock that goes back by less is noise between machines
@@ -54,6 +56,7 @@ NO_SCAN_WARNING_S = 15.0  # as AMCL
 SILENCE_S = 3.0         # without a used scan for that long, ~status says why
 SETTLING_S = 5.0        # map server and player of a launch file need some seconds: no warning before
 ERRAND_TIMEOUT_S = 30.0
+LONGEST_TURN_S = 300.0  # of a sensor of bearings: odometry is remembered for so long, where there are landmarks
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,9 @@ class LocalizationNode:
         self._glass_changed = False  # since it was last sent
         self._trouble = "no scan used yet"
 
-        self._tf = tf2_ros.Buffer()
+        self._landmarks = landmark_file.load(p.node.landmark_file) if p.node.landmark_file else landmark_map.NONE
+        self._bearings: List[LandmarkBearings] = []  # wait for the next scan
+        self._tf = tf2_ros.Buffer(rospy.Duration(LONGEST_TURN_S) if len(self._landmarks) else None)
         self._broadcaster = tf2_ros.TransformBroadcaster()
         self._poses = rospy.Publisher("amcl_pose", PoseWithCovarianceStamped, queue_size=2, latch=True)
         self._particles = rospy.Publisher("particlecloud", PoseArray, queue_size=2, latch=True)
@@ -114,6 +119,8 @@ class LocalizationNode:
                                             queue_size=100, buff_size=2 ** 22, tcp_nodelay=True)
         rospy.Subscriber("initialpose", PoseWithCovarianceStamped, self._command(self._take_guess),
                          queue_size=2)
+        if len(self._landmarks):
+            rospy.Subscriber("landmark_bearings", LandmarkBearings, self._command(self._bearings.append), queue_size=10)
         if self._p.use_map_topic:
             rospy.Subscriber("map", OccupancyGrid, self._command(self._take_map_topic), queue_size=1,
                              buff_size=2 ** 24)
@@ -300,6 +307,32 @@ class LocalizationNode:
         x, y, yaw = map_from_base
         rospy.loginfo(f"starting at x {x:.3f} m, y {y:.3f} m, yaw {yaw:.3f} rad")
 
+    # -- bearings
+
+    def _add_bearings(self, scan_ns: int) -> None:
+        """Give the filter the bearings that came and are not newer than the scan, those to known landmarks."""
+        assert self._mcl is not None
+        ready = [msg for msg in self._bearings if conversions.ns_from_stamp(msg.header.stamp) <= scan_ns]
+        self._bearings[:] = [msg for msg in self._bearings if msg not in ready]
+        for msg in ready:
+            try:
+                mounting = conversions.mounting_from_transform(self._tf.lookup_transform(
+                    self._p.base_frame_id, conversions.frame_id(msg.header.frame_id), rospy.Time(0)).transform)
+                known = [bearing for bearing in bearing_messages.bearings_from_msg(msg, mounting)
+                         if bearing.landmark_id in self._landmarks]
+                if len(known) < len(msg.ids):
+                    self._log.warn(f"bearings to landmarks that are not in {self._p.landmark_file} are not used")
+                if known:
+                    odometry = np.array([self._odom_from_base(bearing.stamp_ns) for bearing in known])
+                    self._mcl.add_bearings(bearings.collected(known, odometry, mounting.base_from_laser),
+                                           self._landmarks, odometry[-1])
+            except (ValueError, tf2_ros.TransformException) as err:
+                self._log.warn(f"bearings not used: {err}")
+
+    def _odom_from_base(self, stamp_ns: int) -> np.ndarray:
+        return conversions.planar_from_transform(self._tf.lookup_transform(
+            self._p.odom_frame_id, self._p.base_frame_id, conversions.stamp_from_ns(stamp_ns)).transform)
+
     # -- scans
 
     def _receive(self, msg: LaserScan) -> None:
@@ -369,6 +402,7 @@ class LocalizationNode:
             scan = conversions.scan_from_msg(msg, mounting)
             if self._start is not None:
                 self._apply_start(scan.stamp_ns, odom_from_base)
+            self._add_bearings(scan.stamp_ns)
             estimate = self._mcl.update(scan, odom_from_base)
         except ScanError as err:  # the pose moves on with the odometry
             self._refuse(str(err))
@@ -462,6 +496,7 @@ class LocalizationNode:
     def _restart(self, why: str) -> None:
         """Stamps start over: forget them. In simulated time the robot starts over too, else it stays."""
         self._waiting.restart()
+        self._bearings.clear()
         self._tf.clear()
         self._stale_scans, self._start = 0, None
         self._last_scan_s = self._last_estimate_s = self._now_s
@@ -547,7 +582,12 @@ def main(name: str = "glass_localization") -> None:
         sys.exit(2)
     if unused:
         rospy.loginfo(f"parameters of amcl that this filter does not use: ~{', ~'.join(unused)}")
-    node = LocalizationNode(p)
+    try:
+        node = LocalizationNode(p)
+    except landmark_file.LandmarkError as err:
+        rospy.logfatal(f"{rospy.get_name()}: {err}")
+        rospy.signal_shutdown("the landmark file cannot be used")
+        sys.exit(2)
     try:
         node.run(ending)
     finally:
