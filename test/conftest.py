@@ -202,7 +202,8 @@ class RoomBag:
                 message = types["sensor_msgs/msg/LaserScan"](
                     header=header(fields["stamp_ns"], self.frame_prefix + fields["frame"] if fields["frame"] else ""),
                     angle_min=fields["angle_min"], angle_max=fields["angle_max"],
-                    angle_increment=fields["angle_increment"], time_increment=0.0, scan_time=0.1,
+                    angle_increment=fields["angle_increment"],
+                    time_increment=fields.get("time_increment", 0.0), scan_time=0.1,
                     range_min=fields["range_min"], range_max=fields["range_max"],
                     ranges=np.asarray(fields["ranges"], np.float32), intensities=np.zeros(0, np.float32))
                 for topic in self.scan_topics:

@@ -1,4 +1,4 @@
-# For mypy: the ray caster, compiled from cpp/; its typed face is the Python module that imports it.
+# For mypy: ray caster and scan matcher, compiled from cpp/; their typed faces are the Python modules that import it.
 from typing import Any
 
 def __getattr__(name: str) -> Any: ...

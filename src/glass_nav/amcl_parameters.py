@@ -6,7 +6,7 @@ used; so files written for amcl load.
 
 from __future__ import annotations
 
-from typing import Any, Dict, List, Mapping, Tuple
+from typing import Any, Callable, Dict, List, Mapping, Tuple
 
 from glass_nav import params
 
@@ -21,6 +21,29 @@ NAMES = frozenset("""
     resample_interval restore_defaults save_pose_rate selective_resampling std_warn_level_x
     std_warn_level_y std_warn_level_yaw tf_broadcast transform_tolerance update_min_a update_min_d
     use_map_topic""".split())
+
+# Ours that is left to its default, the parameter of AMCL that goes before it, and which of the two holds.
+_GIVES_WAY: "Tuple[Tuple[str, str, Callable[[Any, Any], Any]], ...]" = (
+    ("min_particles", "max_particles", min),
+    ("laser_sigma_hit_max", "laser_sigma_hit", max))
+
+
+def adapted(mapping: Mapping[str, Any], cls: type) -> Dict[str, Any]:
+    """The mapping, with those defaults of cls that a file written for amcl would contradict without naming them.
+
+    Two values that are both in the mapping are left as they are: to refuse them is the dataclass's business.
+
+    Args:
+        mapping: flat names -> values.
+        cls: dataclass that params.load() will fill.
+    """
+    defaults = params.as_mapping(cls())
+    changed = dict(mapping)
+    for ours, theirs, which in _GIVES_WAY:
+        given = mapping.get(theirs)
+        if ours not in mapping and ours in defaults and type(given) in (int, float):
+            changed[ours] = which(defaults[ours], given)
+    return changed
 
 
 def without_unused(mapping: Mapping[str, Any], cls: type,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import typing
-from typing import Any, Dict, Iterator, List, Mapping, Tuple, Type, TypeVar
+from typing import Any, Dict, Iterable, Iterator, List, Mapping, Tuple, Type, TypeVar
 
 T = TypeVar("T")
 
@@ -28,8 +28,9 @@ def load(cls: Type[T], mapping: Mapping[str, Any], owner: str) -> T:
     """An instance of the dataclass cls with the values of the mapping, defaults for the rest.
 
     Args:
-        cls: dataclass; fields are bool, int, float, str, or dataclasses of these.
-        mapping: flat names -> values; an int is taken for a float, nothing else is converted.
+        cls: dataclass; fields are bool, int, float, str, Tuple[str, ...], or dataclasses of these.
+        mapping: flat names -> values; an int is taken for a float, a whole float for an int and a list for a tuple, as
+            launch files write them; nothing else is converted.
         owner: who is asking, the first word of an error ("/localization", "params.yaml").
 
     Raises:
@@ -38,12 +39,17 @@ def load(cls: Type[T], mapping: Mapping[str, Any], owner: str) -> T:
     known = {name: kind for name, kind, _ in _leaves(cls)}
     for name in mapping:
         if name not in known:
-            near = difflib.get_close_matches(str(name), list(known), n=1)
-            hint = f"; did you mean ~{near[0]}?" if near else ""
-            raise ParamError(f"{owner}: unknown parameter ~{name}{hint}")
+            raise ParamError(unknown(name, known, owner))
     checked: Dict[str, Any] = {name: _typed(owner, name, known[name], value)
                                for name, value in mapping.items()}
     return _build(cls, checked, owner)
+
+
+def unknown(name: str, known: Iterable[str], owner: str) -> str:
+    """The line on a name that is not among the known ones."""
+    near = difflib.get_close_matches(str(name), sorted(known), n=1)
+    hint = f"; did you mean ~{near[0]}?" if near else ""
+    return f"{owner}: unknown parameter ~{name}{hint}"
 
 
 def as_mapping(instance: Any) -> Dict[str, Any]:
@@ -51,7 +57,8 @@ def as_mapping(instance: Any) -> Dict[str, Any]:
     flat: Dict[str, Any] = {}
     for field in dataclasses.fields(instance):
         value = getattr(instance, field.name)
-        flat.update(as_mapping(value) if dataclasses.is_dataclass(value) else {field.name: value})
+        flat.update(as_mapping(value) if dataclasses.is_dataclass(value) else
+                    {field.name: list(value) if isinstance(value, tuple) else value})
     return flat
 
 
@@ -68,6 +75,12 @@ def _leaves(cls: type) -> Iterator[Tuple[str, type, type]]:
 def _typed(owner: str, name: str, kind: type, value: Any) -> Any:
     if kind is float and type(value) is int:
         return float(value)
+    if kind is int and type(value) is float and value.is_integer():
+        return int(value)
+    if kind == Tuple[str, ...]:
+        if isinstance(value, (list, tuple)) and all(type(item) is str for item in value):
+            return tuple(value)
+        raise ParamError(f"{owner}: ~{name} must be a list of str, got {value!r}")
     if type(value) is not kind:  # bool is an int to isinstance, and "0" would be True to bool()
         raise ParamError(f"{owner}: ~{name} must be {kind.__name__}, got {value!r}")
     return value

@@ -20,7 +20,8 @@ import numpy as np
 from glass_nav.geometry import angles, se2
 from glass_nav.localization import motion, pose_estimate, resampling
 from glass_nav.localization.beam_cases import DIFFUSE, UNCERTAIN, BeamCases
-from glass_nav.localization.glass_mcl import GlassMcl, GlassMclParams
+from glass_nav.localization.glass_mcl import GlassMcl
+from glass_nav.localization.glass_mcl_params import GlassMclParams
 from glass_nav.localization.reference_ranges import ReferenceRanges
 from glass_nav.localization.resampling import ParticleCount
 from glass_nav.sensing.distance_field import DistanceField

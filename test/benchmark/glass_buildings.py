@@ -39,7 +39,8 @@ from glass_nav import params
 from glass_nav.evaluation import case_scores, pose_errors, replay_result
 from glass_nav.evaluation.case_scores import CaseScores, SurfaceScores
 from glass_nav.geometry.trajectory import Trajectory
-from glass_nav.localization.glass_mcl import Estimate, GlassMclParams
+from glass_nav.localization.glass_mcl import Estimate
+from glass_nav.localization.glass_mcl_params import GlassMclParams
 
 START_DEVIATION = np.array([0.1, 0.1, np.radians(3.0)])  # of the pose the localizers are told, and what they are told
 CASE_NAMES = ("uncertain", "diffuse", "specular", "1st penetration", "2nd penetration")

@@ -31,7 +31,8 @@ import yaml
 from glass_nav import params
 from glass_nav.cli import replay_run
 from glass_nav.evaluation import pose_errors
-from glass_nav.localization.glass_mcl import GlassMcl, GlassMclParams
+from glass_nav.localization.glass_mcl import GlassMcl
+from glass_nav.localization.glass_mcl_params import GlassMclParams
 from glass_nav.recording.log_file import open_log
 from glass_nav.recording.recording import LogOptions, Recording
 from glass_nav.world import map_file

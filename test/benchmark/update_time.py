@@ -33,7 +33,8 @@ import baselines
 import drives
 from glass_nav import params
 from glass_nav.localization.beam_weights import BeamMixture
-from glass_nav.localization.glass_mcl import GlassMcl, GlassMclParams
+from glass_nav.localization.glass_mcl import GlassMcl
+from glass_nav.localization.glass_mcl_params import GlassMclParams
 from glass_nav.localization.resampling import ParticleCount
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan

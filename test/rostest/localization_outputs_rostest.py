@@ -18,9 +18,9 @@ import numpy as np
 import rospy
 import rostest
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from localization_interface_rostest import BEAMS, Robot, changed, pose_message, room
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap, GetMapResponse
+from room_robot import BEAMS, Robot, changed, pose_message, room
 from rostest_support import Heard, LogLines, wait_until
 from sensor_msgs.msg import Image, LaserScan
 from std_srvs.srv import Empty
@@ -32,7 +32,7 @@ from glass_nav.ros import beam_displays, conversions, wall_display
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.world.grid_map import GridMap
 
-PANE_COLUMN = 140
+PANE_COLUMN = 160
 NODE = "/glass_localization"
 HEAD_ON_RAD = 0.15                    # up to this angle to its normal the pane answers
 MOUNTING = np.array([0.2, 0.0, 0.3])  # of the robot's lidar
@@ -43,7 +43,7 @@ def room_with_a_pane() -> GridMap:
     """The room, and a pane that parts its eastern third, 1.3 m and more from the robot."""
     empty = room()
     occupancy = empty.occupancy.copy()
-    occupancy[:, PANE_COLUMN] = 100
+    occupancy[20:170, PANE_COLUMN] = 100
     return GridMap(occupancy, empty.resolution_m, empty.map_from_grid)
 
 
@@ -84,8 +84,8 @@ class LocalizationOutputs(unittest.TestCase):
         cls.update = rospy.ServiceProxy("request_nomotion_update", Empty)
 
     def setUp(self) -> None:
-        self.robot.moving, self.robot.silent, self.robot.upside_down = False, False, False
-        self.robot.spoil = lambda msg: msg
+        self.robot.reset()
+        self.robot.moving = False
         self.assertTrue(wait_until(self.initialpose.get_num_connections, 20.0), "nobody listens to initialpose")
         self.assertTrue(wait_until(lambda: len(self.surfaces), 20.0), "no scan_surfaces within 20 s")
         self.localize()
@@ -139,17 +139,17 @@ class LocalizationOutputs(unittest.TestCase):
             self.assertEqual(getattr(out, name), getattr(scan, name))
 
     def test_a_lidar_that_hangs_upside_down_keeps_the_order_of_its_beams(self) -> None:
-        self.robot.silent = True
+        self.robot.lidar.silent = True
         self.robot.make_steps(2)
-        self.robot.upside_down = True
+        self.robot.lidar.upside_down = True
         self.robot.make_steps(2)  # no interpolation between the two mountings
-        self.robot.silent = False
+        self.robot.lidar.silent = False
         self.localize()
         out, scan = self.newest()
         self.check_cut_at_the_pane(out, scan, -BEAMS)
-        self.robot.silent = True
+        self.robot.lidar.silent = True
         self.robot.make_steps(2)
-        self.robot.upside_down = False
+        self.robot.lidar.upside_down = False
         self.robot.make_steps(2)
 
     def test_while_the_pose_is_not_trusted_the_scan_is_raw_and_flagged(self) -> None:
@@ -208,7 +208,7 @@ class LocalizationOutputs(unittest.TestCase):
         self.assertLess(np.abs(conversions.planar_from_pose(msg.info.origin) - self.grid_map.map_from_grid).max(), 1e-9)
         glass = np.array(msg.data).reshape(self.grid_map.occupancy.shape)
         self.assertTrue(np.all(glass[~self.grid_map.occupied] == -1))
-        pane, walls = glass[10:-10, PANE_COLUMN], np.concatenate([glass[:5].ravel(), glass[:, :5].ravel()])
+        pane, walls = glass[30:-30, PANE_COLUMN], np.concatenate([glass[20:25].ravel(), glass[:, 20:25].ravel()])
         self.assertGreater(np.count_nonzero(pane >= 0), 10)
         self.assertLess(np.median(walls[walls >= 0]), 0.5 * np.median(pane[pane >= 0]))
 
@@ -223,7 +223,7 @@ class LocalizationOutputs(unittest.TestCase):
         self.assertGreater(np.diff(stamps).min(), PERIOD_S - 0.2)  # a scan is up to 0.1 s old
 
     def test_the_glass_map_comes_without_a_scan_too(self) -> None:
-        self.robot.silent = True
+        self.robot.lidar.silent = True
         self.robot.make_steps(3)
         self.glass_map()
 
@@ -247,7 +247,7 @@ class LocalizationOutputs(unittest.TestCase):
 
     def test_silence_is_told_beside_the_robot(self) -> None:
         markers = Heard(f"{NODE}/beam_markers", MarkerArray)
-        self.robot.silent = True
+        self.robot.lidar.silent = True
         self.assertTrue(wait_until(lambda: markers.last and "no scan on /scan" in " ".join(
             markers.last.markers[-1].text.split("\n")), 10.0), "nothing said in ~beam_markers within 10 s")
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
 import threading
 import time
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Optional
+from typing import Any, Callable, Dict, Iterator, List, Optional
 
 import rosbag
 import rospy
@@ -25,6 +26,15 @@ def wait_until(condition: Callable[[], Any], timeout_s: float) -> bool:
             return True
         time.sleep(0.02)
     return bool(condition())
+
+
+@contextlib.contextmanager
+def part(name: str) -> Iterator[None]:
+    """A part of a test that is named where it fails; rosunit counts what fails in a subTest and does not show it."""
+    try:
+        yield
+    except Exception as err:
+        raise AssertionError(f"{name}: {type(err).__name__}: {err}") from err
 
 
 def data_dir() -> Optional[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Tuple
 
 import pytest
 
@@ -61,7 +62,7 @@ def test_a_whole_number_is_a_length():
     ({"loaded": "0"}, "/node: ~loaded must be bool, got '0'"),
     ({"loaded": 1}, "/node: ~loaded must be bool, got 1"),
     ({"wheel_count": True}, "/node: ~wheel_count must be int, got True"),
-    ({"wheel_count": 2.0}, "/node: ~wheel_count must be int, got 2.0"),
+    ({"wheel_count": 2.5}, "/node: ~wheel_count must be int, got 2.5"),
     ({"wheel_radius_m": True}, "/node: ~wheel_radius_m must be float, got True"),
     ({"wheel_radius_m": "0.1"}, "/node: ~wheel_radius_m must be float, got '0.1'"),
     ({"wheel_radius_m": None}, "/node: ~wheel_radius_m must be float, got None"),
@@ -77,3 +78,28 @@ def test_what_cannot_be_used_is_refused_in_one_line(given, text):
 def test_a_struct_is_not_a_value():
     with pytest.raises(ParamError, match="^/node: unknown parameter ~wheel(;|$)"):
         params.load(Cart, {"wheel": {}}, "/node")
+
+
+@dataclass(frozen=True)
+class Train:
+    carts: Tuple[str, ...] = ()
+    count: int = 0
+
+
+def test_a_list_of_names_is_a_tuple_and_writes_down_as_a_list():
+    train = params.load(Train, {"carts": ["a", "b"]}, "/node")
+    assert train.carts == ("a", "b")
+    assert params.as_mapping(train) == {"carts": ["a", "b"], "count": 0}
+
+
+def test_a_whole_float_is_a_count():
+    assert type(params.load(Train, {"count": 3.0}, "/node").count) is int
+
+
+@pytest.mark.parametrize("given, text", [({"carts": "a"}, "/node: ~carts must be a list of str, got 'a'"),
+                                         ({"carts": ["a", 1]}, "/node: ~carts must be a list of str, got ['a', 1]"),
+                                         ({"count": 3.5}, "/node: ~count must be int, got 3.5")])
+def test_other_lists_and_counts_are_refused(given, text):
+    with pytest.raises(ParamError) as err:
+        params.load(Train, given, "/node")
+    assert str(err.value) == text

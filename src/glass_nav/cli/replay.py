@@ -92,7 +92,7 @@ def main(arguments: argparse.Namespace) -> None:
     """
     settings, unused = (ReplayParams(), []) if arguments.params is None else replay_params.load(arguments.params)
     grid_map = map_file.load(arguments.map)
-    recording = open_log(arguments.log, _log_options(arguments, settings.frames))
+    recording = open_log(arguments.log, _log_options(arguments, settings))
     notes = list(recording.notes)
     if unused:
         notes.append(f"parameters that only a node uses: {', '.join(unused)}")
@@ -183,15 +183,15 @@ def _window(arguments: argparse.Namespace) -> Window:
     return Window(arguments.start, arguments.duration, arguments.every, arguments.max_scans)
 
 
-def _log_options(arguments: argparse.Namespace, frames: Frames) -> LogOptions:
+def _log_options(arguments: argparse.Namespace, settings: ReplayParams) -> LogOptions:
     """The command first, then a frame that the parameters name and that is not just the default."""
-    default = Frames()
+    default, frames = Frames(), settings.frames
     odom_frame = frames.odom_frame_id if frames.odom_frame_id != default.odom_frame_id else None
     base_frame = frames.base_frame_id if frames.base_frame_id != default.base_frame_id else None
     pose = arguments.laser_pose
     return LogOptions(arguments.scan_topic, arguments.odom_topic, arguments.base_frame or base_frame,
                       arguments.odom_frame or odom_frame, None if pose is None else (pose[0], pose[1], pose[2]),
-                      arguments.ground_truth, arguments.true_beams)
+                      arguments.ground_truth, arguments.true_beams, settings.deskew.deskew)
 
 
 def _start(mcl: GlassMcl, recording: Recording, arguments: argparse.Namespace,

@@ -10,12 +10,15 @@ from pathlib import Path
 from typing import Any, List, Tuple
 
 from glass_nav import amcl_parameters, params
-from glass_nav.localization.glass_mcl import GlassMclParams
+from glass_nav.localization.glass_mcl_params import GlassMclParams
 from glass_nav.localization.start_pose import StartPose
 from glass_nav.params import ParamError
+from glass_nav.sensing.deskew import Deskew
 
 # Of localization_node, beside AMCL's: without a meaning for the replay of a log.
-NODE_ONLY = frozenset(["transform_wait_s", "random_seed", "glass_map_period_s", "landmark_file"])
+NODE_ONLY = frozenset(["transform_wait_s", "random_seed", "glass_map_period_s", "scan_topics",
+                       "publish_tf_before_localized", "start_without_guess", "pose_file", "pose_file_max_age_s",
+                       "pose_file_max_speed_m_s", "landmark_file"])
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,7 @@ class ReplayParams:
     """All that a file may set."""
     frames: Frames = field(default_factory=Frames)
     start: StartPose = field(default_factory=StartPose)
+    deskew: Deskew = field(default_factory=Deskew)
     mcl: GlassMclParams = field(default_factory=GlassMclParams)
 
 
@@ -53,4 +57,4 @@ def load(path: Path) -> "Tuple[ReplayParams, List[str]]":
     if not isinstance(mapping, dict):
         raise ParamError(f"{path}: must hold names and values, got {type(mapping).__name__}")
     ours, unused = amcl_parameters.without_unused(mapping, ReplayParams, NODE_ONLY)
-    return params.load(ReplayParams, ours, str(path)), unused
+    return params.load(ReplayParams, amcl_parameters.adapted(ours, ReplayParams), str(path)), unused

@@ -135,7 +135,7 @@ class _Scores:
         self.cases = found if self.cases is None else self.cases + found
         if truth.crossing_m is not None:
             cut = estimate.surface_scan
-            surfaces = case_scores.of_surfaces(truth.crossing_m, cut.ranges_m, cut.cut, cut.trusted)
+            surfaces = case_scores.of_surfaces(truth.crossing_m, scan.as_measured(cut.ranges_m), cut.cut, cut.trusted)
             self.surfaces = surfaces if self.surfaces is None else self.surfaces + surfaces
         if self._example_at and self._scans > self._example_at[0]:
             del self._example_at[0]

@@ -45,6 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--changed", type=float, default=0.0, metavar="SHARE",
                         help="0 to 1 of the movable furniture stands elsewhere than on the map (default 0)")
     parser.add_argument("--rate", type=float, default=10.0, metavar="HZ", help="scans a second (default 10)")
+    parser.add_argument("--turn-time", type=float, default=0.0, metavar="S",
+                        help="from the first beam of a scan to the last one, while the robot moves on; default 0")
     parser.add_argument("--beams", type=int, metavar="N", help="of a scan; default: the preset's")
     parser.add_argument("--echo", choices=ECHOES, help="which echo the lidar reports; default: the preset's")
     parser.add_argument("--speed", type=float, default=0.6, metavar="M_S", help="m/s along the path (default 0.6)")
@@ -59,6 +61,8 @@ def usage_error(arguments: argparse.Namespace) -> Optional[str]:
         return f"--changed must be 0 to 1, got {arguments.changed}"
     if not 0.1 <= arguments.rate <= 1000.0:
         return f"--rate must be 0.1 to 1000 Hz, got {arguments.rate}"
+    if not 0.0 <= arguments.turn_time * arguments.rate <= 1.0:
+        return f"--turn-time must be >= 0 s and no longer than 1 / --rate, got {arguments.turn_time}"
     if not 0.0 < arguments.speed < math.inf:
         return f"--speed must be > 0 m/s, got {arguments.speed}"
     if not 0.01 <= arguments.resolution <= 1.0:
@@ -78,7 +82,8 @@ def main(arguments: argparse.Namespace) -> None:
     """
     building = building_file.load(shipped_buildings.find(arguments.building))
     simulation = Simulation(building, _lidar_model(arguments), RobotParams(arguments.robot), seed=arguments.seed,
-                            scan_rate_hz=arguments.rate, changed_share=arguments.changed)
+                            scan_rate_hz=arguments.rate, changed_share=arguments.changed,
+                            turn_time_s=arguments.turn_time)
     pace = FollowerParams(speed_m_s=arguments.speed)
     way_m = simulation.follower(arguments.path, pace).length_m
     grid_map = building_map.draw(building, arguments.resolution)

@@ -1,4 +1,5 @@
-/// The Python module _mrpt_grid. Private: docstrings, checks and defaults are in sensing/raycast.py.
+/// The Python module _mrpt_grid. Private: docstrings, checks and defaults are in sensing/raycast.py and
+/// sensing/scan_matcher.py.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +12,7 @@
 #include <pybind11/pybind11.h>
 
 #include "grid_raycaster.hpp"
+#include "scan_matcher.hpp"
 
 namespace py = pybind11;
 
@@ -129,6 +131,41 @@ py::tuple normals(const GridRaycaster& grid) {
   return py::make_tuple(normal_rad, linearity, offset_m);
 }
 
+std::unique_ptr<ScanMatcher> make_matcher(const Array<std::uint8_t>& scores, const Array<std::uint8_t>& allowed) {
+  if (scores.ndim() != 2 || allowed.ndim() != 2 || scores.shape(0) != allowed.shape(0) ||
+      scores.shape(1) != allowed.shape(1)) {
+    throw std::invalid_argument("scores and allowed must be (H, W)");
+  }
+  const auto height = static_cast<int>(scores.shape(0)), width = static_cast<int>(scores.shape(1));
+  const std::uint8_t *score = scores.data(), *may = allowed.data();
+  py::gil_scoped_release unlocked;
+  return std::make_unique<ScanMatcher>(score, may, height, width);
+}
+
+py::tuple search(const ScanMatcher& matcher, const Array<double>& points, const Array<double>& headings_rad,
+                 std::size_t keep) {
+  if (points.ndim() != 2 || points.shape(1) != 2) throw std::invalid_argument("points must be (B, 2)");
+  if (headings_rad.ndim() != 1) throw std::invalid_argument("headings must be (A,)");
+  std::vector<Match> found;
+  {
+    const double *point = points.data(), *heading = headings_rad.data();
+    const auto count = static_cast<std::size_t>(points.shape(0));
+    const auto headings = static_cast<std::size_t>(headings_rad.shape(0));
+    py::gil_scoped_release unlocked;
+    found = matcher.search(point, count, heading, headings, keep);
+  }
+  const std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(found.size())};
+  py::array_t<std::int32_t> row(shape), column(shape), turn(shape);
+  py::array_t<float> score(shape);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    row.mutable_data()[i] = found[i].row;
+    column.mutable_data()[i] = found[i].column;
+    turn.mutable_data()[i] = found[i].heading;
+    score.mutable_data()[i] = found[i].score;
+  }
+  return py::make_tuple(row, column, turn, score);
+}
+
 }  // namespace
 }  // namespace glass_nav
 
@@ -144,4 +181,7 @@ PYBIND11_MODULE(_mrpt_grid, module) {
       .def("simulate_scan_ray_raw", &simulate_scan_ray_raw, py::arg("poses"), py::arg("angles"),
            py::arg("max_range_m"))
       .def("normals", &normals);
+  py::class_<ScanMatcher>(module, "ScanMatcher")
+      .def(py::init(&make_matcher), py::arg("scores"), py::arg("allowed"))
+      .def("search", &search, py::arg("points"), py::arg("headings_rad"), py::arg("keep"));
 }

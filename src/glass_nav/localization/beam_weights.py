@@ -46,6 +46,9 @@ class BeamMixture:
         for name in ("laser_z_hit", "laser_z_rand", "laser_sigma_hit", "laser_independent_beams"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"~{name} must be > 0, got {getattr(self, name)}")
+        if not self.laser_sigma_hit_max >= self.laser_sigma_hit:
+            raise ValueError(f"~laser_sigma_hit_max must be >= ~laser_sigma_hit = {self.laser_sigma_hit}, "
+                             f"got {self.laser_sigma_hit_max}")
 
 
 def choose(case: np.ndarray, count: int) -> np.ndarray:

@@ -72,15 +72,19 @@ class GlassMap:
     _SCAN_SHARE = (0.25, 0.7)  # of a scan's evidence on each question: scans a step apart err alike
 
     def __init__(self, grid_map: GridMap, evidence: GlassEvidence) -> None:
-        self._evidence = evidence
         self._shape = grid_map.occupancy.shape
         self._occupied = np.pad(grid_map.occupied, 2).ravel()
         self._stride = self._shape[1] + 4
         # Log odds that beams added: can be seen through, and is there though it can; bordered by 2 cells.
         self._log_odds = np.zeros((2, len(self._occupied)), np.float32)
         self._crossed = np.zeros(len(self._occupied), bool)
-        self._prior = np.log([[evidence.glass_prior / (1.0 - evidence.glass_prior)], [_THERE / (1.0 - _THERE)]])
         self._kernel = self._neighbours()
+        self.weigh_by(evidence)
+
+    def weigh_by(self, evidence: GlassEvidence) -> None:
+        """What a crossing says from now on; what was learnt before stays."""
+        self._evidence = evidence
+        self._prior = np.log([[evidence.glass_prior / (1.0 - evidence.glass_prior)], [_THERE / (1.0 - _THERE)]])
 
     def chances(self, cell: np.ndarray) -> np.ndarray:
         """(2, ...) chances of flat cells (...) of the map: to be seen through, and if so to be there, which is glass

@@ -7,26 +7,22 @@ the beams that are understood. GlassMcl.update() reads as the document does.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import List, Optional, Tuple
+from dataclasses import dataclass
+from typing import Dict, List, Optional, Set, Tuple
 
 import numpy as np
 
-from glass_nav.geometry import angles, se2
-from glass_nav.localization import (beam_cases, beam_weights, bearing_weights, glass_map, motion, pose_estimate,
-                                    pose_quality, preliminary_samples, proposal, reference_ranges, resampling,
-                                    scan_alignment, surface_scan)
-from glass_nav.localization.beam_cases import BeamCases, CaseVote
-from glass_nav.localization.beam_weights import BeamMixture
-from glass_nav.localization.bearing_weights import BearingMixture
-from glass_nav.localization.glass_map import GlassEvidence, GlassMap
-from glass_nav.localization.motion import OdometryNoise
-from glass_nav.localization.preliminary_samples import PreliminarySamples
-from glass_nav.localization.pose_quality import QualityLimits
-from glass_nav.localization.proposal import Proposal
+from glass_nav.geometry import angles, polygons, se2
+from glass_nav.localization import (beam_cases, beam_weights, bearing_weights, glass_map, global_search, motion,
+                                    pose_estimate, pose_quality, preliminary_samples, proposal, reference_ranges,
+                                    resampling, scan_alignment, surface_scan)
+from glass_nav.localization.beam_cases import BeamCases
+from glass_nav.localization.glass_map import GlassMap
+from glass_nav.localization.glass_mcl_params import GlassMclParams
+from glass_nav.localization.global_search import GlobalSearch
+from glass_nav.localization.lost_watch import LostWatch
 from glass_nav.localization.range_residuals import RangeResiduals
 from glass_nav.localization.reference_ranges import LEAST_COS, ReferenceRanges
-from glass_nav.localization.resampling import ParticleCount
 from glass_nav.localization.scan_alignment import Alignment
 from glass_nav.localization.scan_anchor import ScanAnchor
 from glass_nav.localization.surface_scan import SurfaceScan
@@ -34,6 +30,7 @@ from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan, ScanError
+from glass_nav.sensing.scan_matcher import ScanMatcher
 from glass_nav.sensing.wall_thickness import wall_thickness
 from glass_nav.world.grid_map import GridMap
 from glass_nav.world.landmark_map import LandmarkMap
@@ -41,54 +38,9 @@ from glass_nav.world.landmark_map import LandmarkMap
 _WIDEST_PLACE = np.array([1.0, 1.0, 0.7])  # deviations [m, m, rad] that preliminary samples can cover
 _LEAST_ENDS = 20       # of beams of known case that a pose is refined by
 _NATS_OF_A_FULL_FIT = 20.0  # of log weight between a scan that fits nowhere and one that fits everywhere
-
-
-@dataclass(frozen=True)
-class Schedule:
-    """When a scan moves the particles; the names and meanings are AMCL's."""
-    update_min_d: float = 0.1       # way since the last update [m]
-    update_min_a: float = 0.1       # turn since the last update [rad]
-    resample_interval: int = 1      # updates between resamplings
-    raycast_threads: int = 1
-
-    def __post_init__(self) -> None:
-        for name in ("update_min_d", "update_min_a"):
-            if not getattr(self, name) >= 0.0:
-                raise ValueError(f"~{name} must be >= 0, got {getattr(self, name)}")
-        for name in ("resample_interval", "raycast_threads"):
-            if not getattr(self, name) >= 1:
-                raise ValueError(f"~{name} must be >= 1, got {getattr(self, name)}")
-
-
-@dataclass(frozen=True)
-class LaserLimits:
-    """Ranges that are looked at; the names and meanings are AMCL's."""
-    laser_min_range: float = -1.0   # [m] nearer ranges are no answers; < 0: as the scan says
-    laser_max_range: float = -1.0   # [m] farther ones neither; < 0: as the scan says
-
-    def __post_init__(self) -> None:
-        for name in ("laser_min_range", "laser_max_range"):
-            if not np.isfinite(getattr(self, name)):
-                raise ValueError(f"~{name} must be finite, got {getattr(self, name)}")
-        if 0.0 <= self.laser_max_range <= max(self.laser_min_range, 0.0):
-            raise ValueError("~laser_max_range must be above 0 and ~laser_min_range, or < 0 for the scan's own, "
-                             f"got {self.laser_max_range}")
-
-
-@dataclass(frozen=True)
-class GlassMclParams:
-    """All parameters of the filter, a struct per model."""
-    schedule: Schedule = field(default_factory=Schedule)
-    limits: LaserLimits = field(default_factory=LaserLimits)
-    count: ParticleCount = field(default_factory=ParticleCount)
-    odometry: OdometryNoise = field(default_factory=OdometryNoise)
-    proposal: Proposal = field(default_factory=Proposal)
-    samples: PreliminarySamples = field(default_factory=PreliminarySamples)
-    vote: CaseVote = field(default_factory=CaseVote)
-    glass: GlassEvidence = field(default_factory=GlassEvidence)
-    mixture: BeamMixture = field(default_factory=BeamMixture)
-    quality: QualityLimits = field(default_factory=QualityLimits)
-    bearings: BearingMixture = field(default_factory=BearingMixture)
+_FOUND = np.array([0.1, 0.1, 0.05])  # deviations [m, m, rad] of a place that was found among all others
+_SHOWN = 500           # candidates drawn for particlecloud
+_REACH = 3.5           # deviations of a given pose that are searched, where it is given vaguely
 
 
 @dataclass(frozen=True)
@@ -105,6 +57,7 @@ class Estimate:
     reason: str                 # the state in words
     used_share: float           # share of the answering beams that a case 1-4 explains
     updated: bool               # whether this scan moved the particles
+    reliability: float          # chance that the pose is right, 0..1
 
 
 class GlassMcl:
@@ -120,28 +73,44 @@ class GlassMcl:
         """
         self._params = params
         self._rng = rng
+        self._search: Optional[GlobalSearch] = None       # while the pose is not known
         self.set_map(grid_map)
         self._particles = np.zeros((0, 3))
         self._weights = np.zeros(0)
         self._odom_from_base: Optional[np.ndarray] = None  # at that update
         self._best: pose_estimate.PoseEstimate           # once started
         self._map_from_odom = np.zeros(3)                 # since the last update of the particles
-        self._stamp_ns: Optional[int] = None
+        self._stamps_ns: Dict[str, int] = {}              # of the last scan of each lidar
         self._quality = pose_quality.PoseQuality(params.quality)
-        self._update_due = True
+        self._up_to_date: Set[str] = set()                # lidars that had an update since the robot moved
         self._updates = 0
         self._bearings: List[Tuple[LandmarkBearings, LandmarkMap, np.ndarray]] = []  # odom_from_base at their stamp
 
     def set_map(self, grid_map: GridMap) -> None:
-        """Another map; the particles stay where they are."""
+        """Another map; the particles stay where they are. A search goes on in all of it."""
         self._grid_map = grid_map
         self._caster = RayCaster(grid_map, threads=self._params.schedule.raycast_threads)
         self._field = DistanceField(grid_map)
         self._thickness_m = wall_thickness(grid_map)
         self._anchor = ScanAnchor(self._field)
+        self._matcher: Optional[ScanMatcher] = None
+        self._watch = self._new_watch()
+        if self._search is not None:
+            self._search = self._new_search() if grid_map.free.any() else None
         self._residuals = RangeResiduals(0.5, self._params.mixture.laser_sigma_hit)
         self._glass_map = GlassMap(grid_map, self._params.glass)
-        self._update_due = True
+        self._up_to_date = set()
+
+    def reconfigure(self, params: GlassMclParams) -> None:
+        """Other parameters from the next scan on; the particles, the glass map and what the filter learnt stay."""
+        if params.schedule.raycast_threads != self._params.schedule.raycast_threads:
+            self._caster = RayCaster(self._grid_map, threads=params.schedule.raycast_threads)
+        self._glass_map.weigh_by(params.glass)
+        self._quality.limit_by(params.quality)
+        self._watch.decide_by(params.search)
+        if self._search is not None:
+            self._search.decide_by(params.search)
+        self._params = params
 
     @property
     def glass_map(self) -> GlassMap:
@@ -169,34 +138,44 @@ class GlassMcl:
         variance, axes = np.linalg.eigh(covariance)
         if variance.min() < -1e-6 * scale:
             raise ValueError(f"the covariance of a pose must not be negative, got {covariance.tolist()}")
-        count = self._params.count.max_particles
-        spread = axes * np.sqrt(np.maximum(variance, 0.0))
-        particles = pose + self._rng.standard_normal((count, 3)) @ spread.T
+        deviations = axes * np.sqrt(np.maximum(variance, 0.0))
+        particles = pose + self._rng.standard_normal((self._params.count.max_particles, 3)) @ deviations.T
         particles[:, 2] = angles.wrap(particles[:, 2])
-        self._start_with(particles, searching=False)
+        self._start_with(particles)
+        if np.any(np.sqrt(np.diag(covariance)) > _WIDEST_PLACE):
+            near = self._near(pose[:2], covariance[:2, :2])
+            self._search = self._new_search(near) if np.any(self._grid_map.free & near) else None
 
-    def scatter(self) -> None:
-        """Start over anywhere in the free cells of the map (service global_localization).
+    def scatter(self, area: Optional[np.ndarray] = None) -> None:
+        """Start over anywhere in the free cells of the map (service global_localization), or of a part of it.
+
+        Args:
+            area: (N, 2) corners [m, in map] of a polygon; the robot is in it. None: anywhere.
 
         Raises:
-            ValueError: the map has no free cell; nothing is changed then.
+            ValueError: the area is no polygon, or there is no free cell; nothing is changed then.
         """
-        rows, columns = np.nonzero(self._grid_map.free)
-        if not len(rows):
-            raise ValueError("the map has no free cell to put particles on")
+        free = self._grid_map.free if area is None else self._grid_map.free & self._within(area)
+        if not free.any():
+            raise ValueError(f"the {'map' if area is None else 'area'} has no free cell to put particles on")
+        search = self._new_search(None if area is None else free)
+        rows, columns = np.nonzero(free)
         count = self._params.count.max_particles
         chosen = self._rng.integers(len(rows), size=count)
         inside = self._rng.uniform(-0.5, 0.5, (2, count))
         points = self._grid_map.centres(rows[chosen] + inside[0], columns[chosen] + inside[1])
         yaw = self._rng.uniform(-np.pi, np.pi, count)
-        self._start_with(np.column_stack([points, yaw]), searching=True)
+        self._start_with(np.column_stack([points, yaw]))
+        self._search = search
 
     def request_update(self) -> None:
-        """The next scan is used even if the robot did not move (service request_nomotion_update)."""
-        self._update_due = True
+        """The next scan of each lidar is used even if the robot did not move (service request_nomotion_update)."""
+        self._up_to_date = set()
 
     def add_bearings(self, bearings: LandmarkBearings, landmarks: LandmarkMap, odom_from_base: np.ndarray) -> None:
         """Evidence for the next update, which the next scan makes even if the robot does not move.
+
+        Particles are weighed by it, and so are the places of a search once a scan was seen there.
 
         Args:
             bearings: to landmarks.
@@ -211,7 +190,7 @@ class GlassMcl:
         if odom_from_base.shape != (3,) or not np.all(np.isfinite(odom_from_base)):
             raise ValueError(f"odometry of bearings must be finite x, y, yaw, got {odom_from_base}")
         self._bearings.append((bearings, landmarks, odom_from_base))
-        self._update_due = True
+        self.request_update()
 
     def update(self, scan: Scan, odom_from_base: np.ndarray) -> Estimate:
         """One scan and the odometry at its stamp -> pose.
@@ -226,29 +205,104 @@ class GlassMcl:
         """
         scan = scan.limited(self._params.limits.laser_min_range, self._params.limits.laser_max_range)
         odom_from_base = self._checked(scan, odom_from_base)
-        if not self._is_due(odom_from_base):
+        if not self._is_due(scan.lidar, odom_from_base):
             map_from_base = se2.compose(self._map_from_odom, odom_from_base)
             cases, references = self._vote(scan, map_from_base, self._best.covariance)
             return self._estimate(scan, odom_from_base, cases, references)
-        predicted = self._predict(odom_from_base)
-        self._weigh_by_bearings(predicted, odom_from_base)
-        cases = self._correct(scan, predicted, odom_from_base)
-        self._best = pose_estimate.of(self._particles, self._weights)
-        self._resample()
+        if self._search is not None:
+            cases = self._seek(scan, odom_from_base)
+        else:
+            cases = self._track(scan, odom_from_base)
         self._map_from_odom = se2.compose(self._best.map_from_base, se2.inverse(odom_from_base))
         self._odom_from_base = odom_from_base
-        self._update_due = False
+        self._up_to_date.add(scan.lidar)
         map_from_base = se2.compose(self._map_from_odom, odom_from_base)  # the vote was held at the aligned pose
         return self._estimate(scan, odom_from_base, cases, self._references(scan, map_from_base[None]), updated=True)
 
-    def _weigh_by_bearings(self, predicted: np.ndarray, odom_from_base: np.ndarray) -> None:
-        """What bearings were added since the last update say, before the scan is looked at."""
-        for bearings, landmarks, odom_from_then in self._bearings:
-            now_from_then = se2.compose(se2.inverse(odom_from_base), odom_from_then)
-            log_w = bearing_weights.log_weights(predicted, bearings.seen_from(bearings.stamp_ns, now_from_then),
-                                                landmarks, self._params.bearings)
+    def _track(self, scan: Scan, odom_from_base: np.ndarray) -> BeamCases:
+        """The particles follow the robot; if the scans say that it is elsewhere, they go there."""
+        predicted = self._predict(odom_from_base)
+        for bearings, landmarks in self._bearings_from(odom_from_base):
+            log_w = bearing_weights.log_weights(predicted, bearings, landmarks, self._params.bearings)
             self._weights = resampling.tempered(np.log(self._weights) + log_w)
-        self._bearings = []
+        cases = self._place(scan, predicted, odom_from_base)
+        verdict = self._watch.observe(scan, odom_from_base, self._best.map_from_base)
+        self._quality.doubt(verdict)
+        if verdict.found is not None:
+            return self._settle(scan, odom_from_base, verdict.found, verdict.fit)
+        return cases
+
+    def _place(self, scan: Scan, predicted: np.ndarray, odom_from_base: np.ndarray) -> BeamCases:
+        """The scan places the particles, and the best cluster of them is the pose."""
+        cases = self._correct(scan, predicted, odom_from_base)
+        self._best = pose_estimate.of(self._particles, self._weights)
+        self._resample()
+        return cases
+
+    def _seek(self, scan: Scan, odom_from_base: np.ndarray) -> BeamCases:
+        """The pose is not known: follow all places where it may be. The particles are those places."""
+        assert self._search is not None
+        candidates = self._search.update(scan, odom_from_base, self._bearings_from(odom_from_base))
+        self._quality.seek(candidates)
+        if candidates.found:
+            return self._settle(scan, odom_from_base, candidates.poses[0], candidates.fit)
+        if len(candidates.poses):
+            shown = min(_SHOWN, self._params.count.max_particles)
+            drawn = resampling.low_variance(candidates.weights, shown, self._rng)
+            self._particles = candidates.poses[drawn]
+            self._weights = np.full(len(drawn), 1.0 / len(drawn))
+            here = global_search.same_place(candidates.poses, candidates.poses[0])
+            self._best = pose_estimate.PoseEstimate(candidates.poses[0], candidates.covariance,
+                                                    float(candidates.weights[here].sum()), here[drawn])
+        return self._vote(scan, self._best.map_from_base, np.zeros((3, 3)))[0]
+
+    def _settle(self, scan: Scan, odom_from_base: np.ndarray, map_from_base: np.ndarray, fit: float) -> BeamCases:
+        """The robot is found at a pose where scans fit that well: go on from there, beginning with this scan."""
+        particles = map_from_base + self._rng.standard_normal((self._params.count.max_particles, 3)) * _FOUND
+        particles[:, 2] = angles.wrap(particles[:, 2])
+        stamps_ns = self._stamps_ns
+        self._start_with(particles)
+        self._stamps_ns = stamps_ns
+        self._watch = self._new_watch(fit)
+        return self._place(scan, particles, odom_from_base)
+
+    def _new_search(self, area: Optional[np.ndarray] = None) -> GlobalSearch:
+        """Over the free cells of area (H, W), or all of them."""
+        matcher = self._everywhere() if area is None else ScanMatcher(self._grid_map, self._field, area)
+        return GlobalSearch(matcher, self._field, self._params.search)
+
+    def _new_watch(self, usual_fit: Optional[float] = None) -> LostWatch:
+        matcher = self._everywhere if self._grid_map.free.any() else None
+        return LostWatch(self._field, matcher, self._params.search, usual_fit)
+
+    def _everywhere(self) -> ScanMatcher:
+        if self._matcher is None:
+            self._matcher = ScanMatcher(self._grid_map, self._field)
+        return self._matcher
+
+    def _within(self, area: np.ndarray) -> np.ndarray:
+        """(H, W) bool: cells with their centres in a polygon (N, 2)."""
+        area = np.asarray(area, float)
+        if area.ndim != 2 or area.shape[1] != 2 or len(area) < 3 or not np.all(np.isfinite(area)):
+            raise ValueError(f"an area needs at least 3 corners of finite x, y, got {area.tolist()}")
+        return polygons.inside(area, self._centres().reshape(-1, 2)).reshape(self._grid_map.occupancy.shape)
+
+    def _centres(self) -> np.ndarray:
+        """(H, W, 2) centres [m] of all cells, in map."""
+        height, width = self._grid_map.occupancy.shape
+        return self._grid_map.centres(*np.mgrid[:height, :width])
+
+    def _near(self, point: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+        """(H, W) bool: cells within reach of a point (2,) that is known with that covariance (2, 2)."""
+        off = self._centres() - point
+        least = np.eye(2) * self._grid_map.resolution_m**2
+        return np.einsum("hwi,ij,hwj->hw", off, np.linalg.inv(covariance + least), off) <= _REACH**2
+
+    def _bearings_from(self, odom_from_base: np.ndarray) -> List[Tuple[LandmarkBearings, LandmarkMap]]:
+        """The bearings added since the last update, carried along by odometry to now; they are used once."""
+        added, self._bearings = self._bearings, []
+        return [(bearings.seen_from(bearings.stamp_ns, se2.compose(se2.inverse(odom_from_base), odom_from_then)),
+                 landmarks) for bearings, landmarks, odom_from_then in added]
 
     def _correct(self, scan: Scan, predicted: np.ndarray, odom_from_base: np.ndarray) -> BeamCases:
         """The scan places and weighs the particles, by the beams whose case is known."""
@@ -301,17 +355,20 @@ class GlassMcl:
         if odom_from_base.shape != (3,) or not np.all(np.isfinite(odom_from_base)):
             raise ScanError(f"scan at {scan.stamp_ns * 1e-9:.3f} s: odometry must be finite x, y, yaw, "
                             f"got {odom_from_base}")
-        if self._stamp_ns is not None and scan.stamp_ns < self._stamp_ns:
+        last_ns = self._stamps_ns.get(scan.lidar, scan.stamp_ns)
+        if scan.stamp_ns < last_ns:
             raise ScanError(f"scan at {scan.stamp_ns * 1e-9:.3f} s: time runs backwards, the last scan was "
-                            f"at {self._stamp_ns * 1e-9:.3f} s")
-        self._stamp_ns = scan.stamp_ns
+                            f"at {last_ns * 1e-9:.3f} s")
+        self._stamps_ns[scan.lidar] = scan.stamp_ns
         return odom_from_base
 
-    def _is_due(self, odom_from_base: np.ndarray) -> bool:
-        if self._update_due or self._odom_from_base is None:
-            return True
-        way, turn = motion.travelled(se2.compose(se2.inverse(self._odom_from_base), odom_from_base))
-        return way >= self._params.schedule.update_min_d or turn >= self._params.schedule.update_min_a
+    def _is_due(self, lidar: str, odom_from_base: np.ndarray) -> bool:
+        """As in AMCL: after enough way or turn, each lidar has one update."""
+        if self._odom_from_base is not None:
+            way, turn = motion.travelled(se2.compose(se2.inverse(self._odom_from_base), odom_from_base))
+            if way >= self._params.schedule.update_min_d or turn >= self._params.schedule.update_min_a:
+                self._up_to_date = set()
+        return lidar not in self._up_to_date
 
     def _predict(self, odom_from_base: np.ndarray) -> np.ndarray:
         if self._odom_from_base is None:  # the first scan: nothing to move from
@@ -357,7 +414,10 @@ class GlassMcl:
 
     def _resample(self) -> None:
         self._updates += 1
-        if self._updates % self._params.schedule.resample_interval:
+        schedule = self._params.schedule
+        if self._updates % schedule.resample_interval:
+            return
+        if schedule.selective_resampling and 2.0 * resampling.effective_count(self._weights) > len(self._weights):
             return
         limits = self._params.count
         drawn = resampling.low_variance(self._weights, limits.max_particles, self._rng)
@@ -374,10 +434,11 @@ class GlassMcl:
         used_share = float(np.count_nonzero(cases.case)) / answered if answered else float("nan")
         if updated:
             self._quality.observe(used_share)
-        state, reason = self._quality.judge(self._best)
-        surfaces = self._surfaces(scan, cases, references, state == pose_quality.LOCALIZED)
+        judgement = self._quality.judge(self._best)
+        surfaces = self._surfaces(scan, cases, references, judgement.state == pose_quality.LOCALIZED)
         return Estimate(scan.stamp_ns, map_from_base, self._best.covariance, self._map_from_odom, cases, surfaces,
-                        self._particles, state, reason, used_share, updated)
+                        self._particles, judgement.state, judgement.reason, used_share, updated,
+                        judgement.reliability)
 
     def _surfaces(self, scan: Scan, cases: BeamCases, references: ReferenceRanges, trusted: bool) -> SurfaceScan:
         """The scan cut at glass; references are of the pose that is told."""
@@ -386,13 +447,15 @@ class GlassMcl:
         return surface_scan.of(scan.ranges_m, cases.case, references, self._glass_map.chances(references.cell[0, 0]),
                                gate_m, scan.range_max_m, trusted)
 
-    def _start_with(self, particles: np.ndarray, searching: bool) -> None:
+    def _start_with(self, particles: np.ndarray) -> None:
         self._particles = particles
         self._weights = np.full(len(particles), 1.0 / len(particles))
         self._best = pose_estimate.of(particles, self._weights)
         self._odom_from_base = None
+        self._stamps_ns = {}
+        self._search = None
         self._bearings = []
-        self._stamp_ns = None
         self._anchor = ScanAnchor(self._field)
-        self._quality = pose_quality.PoseQuality(self._params.quality, searching)
-        self._update_due = True
+        self._watch = self._new_watch()
+        self._quality = pose_quality.PoseQuality(self._params.quality)
+        self._up_to_date = set()

@@ -1,21 +1,27 @@
-"""Is it lost?  The filter's own signs -> a state and a reason in words.
+"""Is it lost?  The filter's own signs -> a state, a reason in words, and a chance that the pose is right.
 
 Covariance alone does not tell: a filter that settled in the wrong corridor is sure of itself. What
-tells is how much of the scan the map explains at the pose, over several scans.
+tells is how much of the scan the map explains at the pose, whether scans fit as well as they used to, and
+whether they fit better elsewhere (lost_watch.py).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Tuple
+from typing import Optional
 
 import numpy as np
 
+from glass_nav.localization.global_search import Candidates
+from glass_nav.localization.lost_watch import Verdict
 from glass_nav.localization.pose_estimate import PoseEstimate
 
 UNKNOWN, GLOBAL_SEARCH, LOCALIZED, UNCERTAIN, LOST = (
     "UNKNOWN", "GLOBAL_SEARCH", "LOCALIZED", "UNCERTAIN", "LOST")
 STATES = (UNKNOWN, GLOBAL_SEARCH, LOCALIZED, UNCERTAIN, LOST)
+
+_POSSIBLE = 8.0    # nats behind the best: a place that still counts in words
+_LOST_BEHIND = 3.0  # nats that another place is better by
 
 
 @dataclass(frozen=True)
@@ -39,15 +45,28 @@ class QualityLimits:
                              f"{self.localized_min_cluster_share}")
 
 
+@dataclass(frozen=True)
+class Judgement:
+    """What to think of the pose."""
+    state: str
+    reason: str          # in one sentence
+    reliability: float   # chance that the pose is right, 0..1
+
+
 class PoseQuality:
     """Remembers how well the last scans were explained."""
 
     _MEMORY = 0.8  # weight of the past per update: about five updates
 
-    def __init__(self, limits: QualityLimits, searching: bool = False) -> None:
+    def __init__(self, limits: QualityLimits) -> None:
         self._limits = limits
-        self._searching = searching
+        self._candidates: Optional[Candidates] = None
+        self._verdict: Optional[Verdict] = None
         self._used_share = float("nan")
+
+    def limit_by(self, limits: QualityLimits) -> None:
+        """Other limits from now on; what was seen stays."""
+        self._limits = limits
 
     def observe(self, used_share: float) -> None:
         """Take in one update; NaN when no beam answered, which says nothing."""
@@ -55,8 +74,19 @@ class PoseQuality:
             past = used_share if np.isnan(self._used_share) else self._used_share
             self._used_share = self._MEMORY * past + (1.0 - self._MEMORY) * used_share
 
-    def judge(self, best: PoseEstimate) -> Tuple[str, str]:
-        """State and reason."""
+    def seek(self, candidates: Candidates) -> None:
+        """The pose is being looked for; these places are possible."""
+        self._candidates = candidates
+
+    def doubt(self, verdict: Verdict) -> None:
+        """What the watch says of the pose that is tracked."""
+        self._verdict = verdict
+
+    def judge(self, best: PoseEstimate) -> Judgement:
+        """Of the best cluster of particles."""
+        if self._candidates is not None:
+            known = best.share if len(self._candidates.poses) else 0.0
+            return Judgement(GLOBAL_SEARCH, _progress(self._candidates), min(known, 1.0))
         limits = self._limits
         position_sigma_m = float(np.sqrt(np.linalg.eigvalsh(best.covariance[:2, :2])[-1]))
         heading_sigma_rad = float(np.sqrt(best.covariance[2, 2]))
@@ -66,13 +96,47 @@ class PoseQuality:
         spread = (f"{best.share:.0%} of the weight in one place, sigma {position_sigma_m:.2f} m, "
                   f"{np.degrees(heading_sigma_rad):.1f} deg")
         if np.isnan(self._used_share):
-            return UNCERTAIN, f"no scan has been used yet; {spread}"
+            return Judgement(UNCERTAIN, f"no scan has been used yet; {spread}", 0.0)
         explained = f"the map explains {self._used_share:.0%} of the answering beams"
-        if self._searching and wide:
-            return GLOBAL_SEARCH, spread
+        reliability = _reliability(self._used_share, self._verdict, best)
+        elsewhere = _elsewhere(self._verdict)
+        if elsewhere is not None and self._verdict is not None and self._verdict.behind > _LOST_BEHIND:
+            return Judgement(LOST, f"{elsewhere}; {explained}", reliability)
         if self._used_share < limits.lost_used_share:
-            return LOST, explained
+            return Judgement(LOST, explained, reliability)
+        if elsewhere is not None:
+            return Judgement(UNCERTAIN, f"{elsewhere}; {explained}; {spread}", reliability)
         if wide or self._used_share < limits.uncertain_used_share:
-            return UNCERTAIN, f"{explained}; {spread}"
-        self._searching = False
-        return LOCALIZED, f"{explained}; {spread}"
+            return Judgement(UNCERTAIN, f"{explained}; {spread}", reliability)
+        return Judgement(LOCALIZED, f"{explained}; {spread}", reliability)
+
+
+def _progress(candidates: Candidates) -> str:
+    if not len(candidates.poses):
+        return "no scan has told anything yet"
+    possible = int(np.count_nonzero(candidates.weights > candidates.weights[0] * np.exp(-_POSSIBLE)))
+    x, y, yaw = candidates.poses[0]
+    best = f"the best at x {x:.1f} m, y {y:.1f} m, {np.degrees(yaw):.0f} deg, where scans fit by {candidates.fit:.0%}"
+    if possible == 1:
+        return f"one place is possible, {best}"
+    return f"{possible} places are possible, {best}"
+
+
+def _elsewhere(verdict: Optional[Verdict]) -> Optional[str]:
+    """Why to doubt the pose, in words; None: there is no reason."""
+    if verdict is None:
+        return None
+    if verdict.contested and verdict.candidates is not None:
+        x, y, _ = verdict.candidates.poses[0]
+        return f"the scans fit as well or better elsewhere, best at x {x:.1f} m, y {y:.1f} m"
+    if verdict.poor:
+        return f"the scans fit by {verdict.fit:.0%}, where they used to fit by {verdict.usual:.0%}"
+    return None
+
+
+def _reliability(used_share: float, verdict: Optional[Verdict], best: PoseEstimate) -> float:
+    """Chance that the pose is right, by logistic regression over drives of the benchmark."""
+    drop = 0.0 if verdict is None or np.isnan(verdict.fit) else max(0.0, verdict.usual - verdict.fit)
+    behind = -4.0 if verdict is None else float(np.clip(verdict.behind, -4.0, 8.0))
+    logit = 6.0 - 20.0 * drop - 2.0 * (1.0 - used_share) - 0.7 * (behind + 4.0)
+    return float(best.share / (1.0 + np.exp(-logit)))

@@ -57,10 +57,39 @@ def align(field: DistanceField, points_m: np.ndarray, poses: np.ndarray, iterati
     return Alignment(poses, information, np.mean(_FIT_SCALE_M**2 / (_FIT_SCALE_M**2 + distance**2), axis=1))
 
 
-def fit(field: DistanceField, points_m: np.ndarray, poses: np.ndarray) -> np.ndarray:
-    """(K,) how well the scan fits at poses (K, 3), as Alignment.fit."""
-    distance, _ = _residuals(field, points_m[:, 0], points_m[:, 1], np.asarray(poses, float))
-    return np.mean(_FIT_SCALE_M**2 / (_FIT_SCALE_M**2 + distance**2), axis=1)
+def align_near(field: DistanceField, points_m: np.ndarray, poses: np.ndarray, information: np.ndarray,
+               iterations: int = 4, first_scale_m: float = 0.2, last_scale_m: float = 0.06) -> np.ndarray:
+    """Slide the scan along the field, each start held where it is by what else is known of it.
+
+    Args:
+        field, points_m, iterations, first_scale_m, last_scale_m: as for align().
+        poses: (K, 3) starts in map.
+        information: (3, 3) of the starts, in units of one beam's [1 / 1 m of noise].
+
+    Returns:
+        (K, 3) poses.
+    """
+    starts = np.asarray(poses, float)
+    poses = starts.copy()
+    x, y = points_m[:, 0], points_m[:, 1]
+    shrink = (last_scale_m / first_scale_m) ** (1.0 / max(iterations - 1, 1))
+    for iteration in range(iterations):
+        distance, jacobian = _residuals(field, x, y, poses)
+        of_beams, gradient = _normal_equations(distance, jacobian, first_scale_m * shrink**iteration)
+        off = poses - starts
+        off[:, 2] = angles.wrap(off[:, 2])
+        poses -= np.linalg.solve(of_beams + information, (gradient + off @ information)[..., None])[..., 0]
+    poses[:, 2] = angles.wrap(poses[:, 2])
+    return poses
+
+
+def fit(field: DistanceField, points_m: np.ndarray, poses: np.ndarray, scale_m: float = _FIT_SCALE_M) -> np.ndarray:
+    """(K,) how well the scan fits at poses (K, 3), as Alignment.fit; a beam scale_m away from a wall by one half."""
+    poses = np.asarray(poses, float)
+    cos, sin = angles.cos_sin(poses[:, 2:])
+    x, y = points_m[:, 0], points_m[:, 1]
+    distance = field.distance(poses[:, :1] + cos * x - sin * y, poses[:, 1:2] + sin * x + cos * y)
+    return np.mean(scale_m**2 / (scale_m**2 + distance**2), axis=1)
 
 
 def median_distance(field: DistanceField, points_m: np.ndarray, pose: np.ndarray) -> float:

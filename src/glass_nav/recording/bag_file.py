@@ -6,6 +6,7 @@ so that a long log does not have to fit into memory.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +19,8 @@ from glass_nav.recording import frames, trajectory_file
 from glass_nav.recording.frames import FrameError, FrameTree, Transform
 from glass_nav.recording.recording import (BeamTruth, Entry, LogOptions, Recording, RecordingError, Refusal, Step,
                                            trajectory_from_samples)
-from glass_nav.sensing.scan import ScanError, scan_from_fields
+from glass_nav.sensing import deskew
+from glass_nav.sensing.scan import Scan, ScanError, scan_from_fields
 
 SCAN = "sensor_msgs/LaserScan"
 ODOMETRY = "nav_msgs/Odometry"
@@ -44,6 +46,7 @@ def open_log(path: Path, options: LogOptions) -> Recording:
             odometry = _odometry(bag, tree, options, notes)
             base_frame = _base_frame(bag, tree, odometry, options)
             _check_laser(bag, scan_topic, tree, base_frame, options)
+            notes += _turn_notes(bag, scan_topic, options.deskew)
             truth = _ground_truth(bag, options.ground_truth, notes)
             truth_topic = _true_beams_topic(bag, options.true_beams, notes)
             scan_count = bag.count(scan_topic)
@@ -51,7 +54,7 @@ def open_log(path: Path, options: LogOptions) -> Recording:
             raise (RecordingError(f"{err}; {bag.damage}") if bag.damage else err) from err
         if bag.damage:
             notes.append(bag.damage)
-    entries = _Entries(path, scan_topic, tree, odometry, base_frame, options.laser_pose)
+    entries = _Entries(path, scan_topic, tree, odometry, base_frame, options)
     beam_truth = None if truth_topic is None else _TrueBeams(path, truth_topic)
     return Recording(path.name, scan_count, entries, truth, notes, beam_truth)
 
@@ -229,6 +232,19 @@ def _check_laser(bag: _Bag, scan_topic: str, tree: FrameTree, base_frame: str, o
         return
 
 
+def _turn_notes(bag: _Bag, scan_topic: str, straighten: bool) -> List[str]:
+    """What the first scans tell of the time that the lidar takes for its beams."""
+    for _, message in itertools.islice(bag.messages(scan_topic), 3):
+        beams, step_s = len(message.ranges), float(message.time_increment)
+        fault = deskew.fault(beams, step_s, float(message.scan_time))
+        if fault is not None:
+            return [f"scans are taken as of one moment: {fault}"]
+        turn_ns = deskew.turn_ns(beams, step_s)
+        if turn_ns and straighten:
+            return [f"the lidar turns for {turn_ns * 1e-6:.0f} ms: scans are straightened by odometry"]
+    return []
+
+
 def _ground_truth(bag: _Bag, source: Optional[str], notes: List[str]) -> Optional[Trajectory]:
     if source == "none":
         return None
@@ -282,21 +298,21 @@ class _Entries:
     """Iterates the scans of a bag, opening it anew each time."""
 
     def __init__(self, path: Path, scan_topic: str, tree: FrameTree, odometry: _Odometry, base_frame: str,
-                 laser_pose: Optional[Tuple[float, float, float]]) -> None:
+                 options: LogOptions) -> None:
         self._path, self._scan_topic, self._tree, self._odometry = path, scan_topic, tree, odometry
-        self._base_frame, self._laser_pose = base_frame, laser_pose
+        self._base_frame, self._laser_pose, self._deskew = base_frame, options.laser_pose, options.deskew
 
     def __iter__(self) -> Iterator[Entry]:
-        latest_ns = -1
+        latest_ns: Dict[str, int] = {}  # by frame: there may be several lidars
         with _Bag(self._path) as bag:
             for _, message in bag.messages(self._scan_topic):
-                stamp_ns = _stamp_ns(message.header)
-                entry = self._entry(message, stamp_ns, latest_ns)
+                stamp_ns, frame = _stamp_ns(message.header), message.header.frame_id
+                entry = self._entry(message, stamp_ns, latest_ns.get(frame, -1))
                 if isinstance(entry, Step):
-                    latest_ns = stamp_ns
+                    latest_ns[frame] = stamp_ns
                 yield entry
             if bag.damage:
-                yield Refusal(max(latest_ns, 0), bag.damage)
+                yield Refusal(max(latest_ns.values(), default=0), bag.damage)
 
     def _entry(self, message: Any, stamp_ns: int, latest_ns: int) -> Entry:
         if stamp_ns < latest_ns:
@@ -316,12 +332,23 @@ class _Entries:
             odom_from_base = self._odometry.at(self._tree, self._base_frame, stamp_ns)
             scan = scan_from_fields(stamp_ns, message.ranges, float(message.angle_min),
                                     float(message.angle_increment), float(message.range_min),
-                                    float(message.range_max), np.array(base_from_laser), upside_down)
+                                    float(message.range_max), np.array(base_from_laser), upside_down, laser_frame,
+                                    float(message.time_increment))
+            scan = self._straightened(scan, float(message.scan_time))
         except FrameError as err:
             return Refusal(stamp_ns, str(err))
         except ScanError as err:
             return Refusal(stamp_ns, str(err).partition(": ")[2])
         return Step(scan, odom_from_base)
+
+    def _straightened(self, scan: Scan, scan_time_s: float) -> Scan:
+        """The scan without the robot's motion while the lidar turned, where the log tells of its time."""
+        turn_ns = deskew.turn_ns(len(scan), scan.time_increment_s)
+        if not (self._deskew and turn_ns) or deskew.fault(len(scan), scan.time_increment_s, scan_time_s):
+            return scan
+        stamps_ns = deskew.knots_ns(scan.stamp_ns, turn_ns)
+        poses = [self._odometry.at(self._tree, self._base_frame, int(stamp_ns)) for stamp_ns in stamps_ns]
+        return deskew.straightened(scan, Trajectory(stamps_ns, np.array(poses)))
 
 
 class _TrueBeams:

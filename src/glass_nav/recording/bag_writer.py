@@ -15,6 +15,7 @@ from typing import Any, Dict, Optional, Type
 import numpy as np
 
 from glass_nav.recording.recording import RecordingError
+from glass_nav.sensing import deskew
 from glass_nav.sensing.scan import Scan
 
 MAP, ODOM, BASE, LASER = "map", "odom", "base_link", "laser"
@@ -97,12 +98,14 @@ class BagWriter:
                    twist=self._new("geometry_msgs/TwistWithCovariance", twist=twist, covariance=np.zeros(36)))
 
     def scan(self, scan: Scan, period_s: float) -> None:
-        """/scan; the laser turns once in period_s."""
+        """/scan, recorded when its last beam was there; the laser turns once in period_s."""
         angles_rad = scan.angles_rad
         increment = float(angles_rad[1] - angles_rad[0]) if len(scan) > 1 else 0.0
-        self._send("/scan", scan.stamp_ns, header=self._header(scan.stamp_ns, LASER),
+        self._send("/scan", scan.stamp_ns + deskew.turn_ns(len(scan), scan.time_increment_s),
+                   header=self._header(scan.stamp_ns, LASER),
                    angle_min=float(angles_rad[0]), angle_max=float(angles_rad[-1]), angle_increment=increment,
-                   time_increment=0.0, scan_time=period_s, range_min=scan.range_min_m, range_max=scan.range_max_m,
+                   time_increment=scan.time_increment_s, scan_time=period_s,
+                   range_min=scan.range_min_m, range_max=scan.range_max_m,
                    ranges=scan.ranges_m.astype(np.float32), intensities=np.zeros(0, np.float32))
 
     def truth(self, stamp_ns: int, map_from_base: np.ndarray, case: np.ndarray, exact_m: np.ndarray,

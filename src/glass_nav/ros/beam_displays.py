@@ -48,7 +48,7 @@ def beam_cloud(scan: Scan, cases: BeamCases, height_m: float, base_frame: str) -
     """
     answered = scan.answered
     red, green, blue = CASE_COLOURS[cases.case[answered]].T
-    ends = replace(scan, ranges_m=scan.ranges_m[answered], angles_rad=scan.angles_rad[answered])
+    ends = replace(scan, ranges_m=scan.ranges_m[answered], angles_rad=scan.angles_rad[answered], origins_m=None)
     points = np.empty((len(ends), len(_CLOUD_FIELDS)), dtype="<f4")
     points[:, :2] = ends.points_in_base()
     points[:, 2] = height_m

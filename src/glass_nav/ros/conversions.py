@@ -13,6 +13,7 @@ from io import BytesIO
 import numpy as np
 import rospy
 from geometry_msgs.msg import (
+    PolygonStamped,
     Pose,
     PoseArray,
     PoseWithCovarianceStamped,
@@ -200,14 +201,14 @@ def scan_from_msg(msg: LaserScan, mounting: Mounting) -> Scan:
     """
     return scan_from_fields(ns_from_stamp(msg.header.stamp), np.array(msg.ranges, float), msg.angle_min,
                             msg.angle_increment, msg.range_min, msg.range_max, mounting.base_from_laser,
-                            mounting.upside_down)
+                            mounting.upside_down, frame_id(msg.header.frame_id), msg.time_increment)
 
 
 # What the `intensities` of scan_surfaces say of a beam.
 AS_MEASURED, CUT, NOT_JUDGED = 0.0, 1.0, -1.0
 
 
-def surface_scan_msg(msg: LaserScan, surface: SurfaceScan) -> LaserScan:
+def surface_scan_msg(msg: LaserScan, scan: Scan, surface: SurfaceScan) -> LaserScan:
     """The message of `scan_surfaces`: the scan with its beams cut at the first surface of the map.
 
     Fields, order and ranges are the driver's own, but for the ranges of beams that were cut and for the
@@ -215,10 +216,11 @@ def surface_scan_msg(msg: LaserScan, surface: SurfaceScan) -> LaserScan:
 
     Args:
         msg: as the driver sent it, upside down or not: its beams keep their order.
+        scan: the same for the filter.
         surface: beam by beam in that order.
     """
     ranges = np.array(msg.ranges, float)
-    ranges[surface.cut] = surface.ranges_m[surface.cut]
+    ranges[surface.cut] = scan.as_measured(surface.ranges_m)[surface.cut]
     flags = np.where(surface.cut, CUT, AS_MEASURED) if surface.trusted else np.full(len(ranges), NOT_JUDGED)
     return LaserScan(header=Header(stamp=msg.header.stamp, frame_id=frame_id(msg.header.frame_id)),
                      angle_min=msg.angle_min, angle_max=msg.angle_max, angle_increment=msg.angle_increment,
@@ -302,15 +304,27 @@ def is_finite(estimate: Estimate) -> bool:
                 and np.all(np.isfinite(estimate.covariance)))
 
 
-def status_msg(stamp_ns: int, map_frame: str, state: str, reason: str,
-               used_share: float) -> LocalizationStatus:
-    return LocalizationStatus(header(stamp_ns, map_frame), STATES[state], state, reason, used_share)
+def status_msg(stamp_ns: int, map_frame: str, state: str, reason: str, used_share: float,
+               reliability: float) -> LocalizationStatus:
+    return LocalizationStatus(header(stamp_ns, map_frame), STATES[state], state, reason, used_share, reliability)
 
 
-def beam_cases_msg(scan_header: Header, cases: BeamCases) -> BeamCasesMsg:
+def area_from_msg(msg: PolygonStamped, map_frame: str) -> np.ndarray:
+    """(N, 2) corners [m, in map] of an area to search; ValueError if it is none."""
+    if frame_id(msg.header.frame_id) != map_frame:
+        raise ValueError(f"the area must be given in frame {map_frame!r}, got {msg.header.frame_id!r}")
+    corners = np.array([(point.x, point.y) for point in msg.polygon.points], float).reshape(-1, 2)
+    if len(corners) < 3:
+        raise ValueError(f"an area needs at least 3 corners, got {len(corners)}")
+    if not np.all(np.isfinite(corners)):
+        raise ValueError(f"the corners of an area must be finite, got {corners.tolist()}")
+    return corners
+
+
+def beam_cases_msg(scan_header: Header, scan: Scan, cases: BeamCases) -> BeamCasesMsg:
     msg = BeamCasesMsg(header=Header(stamp=scan_header.stamp, frame_id=frame_id(scan_header.frame_id)))
     msg.cases = cases.case.astype(np.uint8).tobytes()
-    msg.expected, msg.residual = cases.expected_m.tolist(), cases.residual_m.tolist()
+    msg.expected, msg.residual = scan.as_measured(cases.expected_m).tolist(), cases.residual_m.tolist()
     msg.weight = cases.weight.tolist()
     return msg
 

@@ -41,7 +41,8 @@ def scan_msg(scan: Scan, period_s: float, frame: str) -> LaserScan:
     angles_rad = scan.angles_rad
     return LaserScan(header=conversions.header(scan.stamp_ns, frame), angle_min=angles_rad[0],
                      angle_max=angles_rad[-1], angle_increment=angles_rad[1] - angles_rad[0], scan_time=period_s,
-                     range_min=scan.range_min_m, range_max=scan.range_max_m, ranges=scan.ranges_m.tolist())
+                     time_increment=scan.time_increment_s, range_min=scan.range_min_m, range_max=scan.range_max_m,
+                     ranges=scan.ranges_m.tolist())
 
 
 def true_beams_msg(stamp_ns: int, truth: TrueScan, frame: str) -> TrueBeams:

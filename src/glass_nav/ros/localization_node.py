@@ -2,7 +2,8 @@
 
 Wiring only; the answer comes from GlassMcl. Callbacks store, one loop works: nothing else touches the filter.
 
-Subscribes: scan (LaserScan), initialpose (PoseWithCovarianceStamped), map (OccupancyGrid, if ~use_map_topic),
+Subscribes: scan (LaserScan; or each of ~scan_topics), initialpose (PoseWithCovarianceStamped), map (OccupancyGrid, if
+    ~use_map_topic), global_localization_area (PolygonStamped in the map's frame: the robot is searched for in it),
     landmark_bearings (LandmarkBearings, if ~landmark_file is given), tf odom <- base <- laser.
 Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseArray, latched), tf map -> odom,
     ~status (LocalizationStatus, latched), ~beam_cases (BeamCases), /diagnostics;
@@ -14,8 +15,9 @@ Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseAr
     for rviz, while somebody listens: ~beam_cloud (PointCloud2), ~beam_markers (MarkerArray, a namespace per case
     and one for the status), ~wall_markers (MarkerArray, latched: the glass map without what is unknown), ~legend
     (Image, latched).
-Services: global_localization, request_nomotion_update (Empty), set_map (SetMap). Calls static_map (GetMap).
-Parameters: LocalizationNodeParams and GlassMclParams, read once; explained in config/localization.yaml.
+Services: global_localization, request_nomotion_update (Empty), set_map (SetMap), ~set_parameters (Reconfigure, with
+    its topics ~parameter_descriptions and ~parameter_updates). Calls static_map (GetMap).
+Parameters: LocalizationNodeParams and GlassMclParams; explained in config/localization.yaml.
 """
 
 from __future__ import annotations
@@ -24,139 +26,112 @@ import logging
 import sys
 import threading
 import time
-from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Callable, Dict, List, Optional
 
 import numpy as np
+import rospkg
 import rospy
 import tf2_ros
-from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
+from geometry_msgs.msg import PolygonStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
-from nav_msgs.srv import GetMap, SetMap, SetMapRequest, SetMapResponse
-from sensor_msgs.msg import Image, LaserScan, PointCloud2
+from nav_msgs.srv import SetMap, SetMapRequest, SetMapResponse
+from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
-from visualization_msgs.msg import MarkerArray
 
-from glass_nav.geometry import se2
 from glass_nav.localization.glass_mcl import Estimate, GlassMcl
-from glass_nav.msg import BeamCases, LandmarkBearings, LocalizationStatus
-from glass_nav.ros import beam_displays, bearing_messages, conversions, endings, legend, params, wall_display
-from glass_nav.ros.diagnostics import Diagnostics
+from glass_nav.ros import conversions, endings, params, reconfigure, starts
+from glass_nav.ros.bearing_input import BearingInput
+from glass_nav.ros.bearing_messages import LONGEST_TURN_S
+from glass_nav.ros.diagnostics import Diagnostics, Situation
 from glass_nav.ros.log_throttle import LogThrottle
-from glass_nav.ros.mailbox import Errand, Mailbox, WaitingScans
-from glass_nav.sensing import bearings
+from glass_nav.ros.mailbox import Errand, Mailbox
+from glass_nav.ros.map_source import MapSource
+from glass_nav.ros.outputs import Outputs
+from glass_nav.ros.pose_memory import PoseMemory
+from glass_nav.ros.reconfigure import ReconfigureServer
+from glass_nav.ros.scan_input import STALE_SCANS, ScanInput
+from glass_nav.ros.starts import Starts
 from glass_nav.sensing.scan import Scan, ScanError
-from glass_nav.world import landmark_file, landmark_map
+from glass_nav.world import landmark_file
 from glass_nav.world.grid_map import GridMap
 
 TIME_JUMP_S = 0.5       # a clock that goes back by less is noise between machines
-STALE_SCANS = 20        # that many older scans in a row: the lidar's clock was set back
-GUESS_WAIT_S = 1.0      # how long an initialpose waits for a scan at or after its stamp
 NO_SCAN_WARNING_S = 15.0  # as AMCL
 SILENCE_S = 3.0         # without a used scan for that long, ~status says why
-SETTLING_S = 5.0        # map server and player of a launch file need some seconds: no warning before
+SETTLING_S = 5.0        # a player of a launch file needs some seconds: no warning before
 ERRAND_TIMEOUT_S = 30.0
-LONGEST_TURN_S = 300.0  # of a sensor of bearings: odometry is remembered for so long, where there are landmarks
-
-
-@dataclass(frozen=True)
-class _Start:
-    """A pose somebody gave, and when it came."""
-    guess: conversions.PoseGuess
-    arrival_s: float
 
 
 class LocalizationNode:
     """Wiring only: a message in, one call of the core, messages out."""
 
     def __init__(self, p: params.LocalizationParams) -> None:
-        self._p = p.node
-        self._mcl_params = p.mcl
+        self._p = p
         self._rng = p.node.rng
         self._mcl: Optional[GlassMcl] = None
         self._map: Optional[GridMap] = None
+        self._map_origin = ""  # where it came from, in words
         self._estimate: Optional[Estimate] = None
-        self._start: Optional[_Start] = None  # waits for its scan
-        self._restart_pose = (p.start.pose, p.start.covariance)  # where a bag starts over
-        self._publish_pose = True
+        self._scan: Optional[Scan] = None  # that the estimate was made of
+        self._pose_is_news = True
         self._log = LogThrottle()
         self._inbox = Mailbox(scans=100, commands=100)
-        self._waiting: WaitingScans[LaserScan] = WaitingScans(100, p.node.transform_wait_s)
-        self._now_s = rospy.get_time()
-        self._last_scan_s = self._last_estimate_s = self._now_s
-        self._stale_scans = 0
+        self._now_s = self._last_estimate_s = rospy.get_time()
         self._started_s = time.monotonic()
         self._simulated = bool(rospy.get_param("/use_sim_time", False))
-        self._next_report_s = self._next_map_request_s = 0.0  # by the monotonic clock
-        self._last_save_s = self._last_beams_s = self._last_particles_s = 0.0  # by ROS time
-        self._last_glass_s = 0.0
-        self._glass_changed = False  # since it was last sent
-        self._trouble = "no scan used yet"
+        self._next_report_s = 0.0  # by the monotonic clock
 
-        self._landmarks = landmark_file.load(p.node.landmark_file) if p.node.landmark_file else landmark_map.NONE
-        self._bearings: List[LandmarkBearings] = []  # wait for the next scan
-        self._tf = tf2_ros.Buffer(rospy.Duration(LONGEST_TURN_S) if len(self._landmarks) else None)
-        self._broadcaster = tf2_ros.TransformBroadcaster()
-        self._poses = rospy.Publisher("amcl_pose", PoseWithCovarianceStamped, queue_size=2, latch=True)
-        self._particles = rospy.Publisher("particlecloud", PoseArray, queue_size=2, latch=True)
-        self._status = rospy.Publisher("~status", LocalizationStatus, queue_size=5, latch=True)
-        self._beam_cases = rospy.Publisher("~beam_cases", BeamCases, queue_size=5)
-        self._surfaces = rospy.Publisher("scan_surfaces", LaserScan, queue_size=5)
-        self._glass_map = rospy.Publisher("~glass_map", OccupancyGrid, queue_size=1, latch=True)
-        self._beam_cloud = rospy.Publisher("~beam_cloud", PointCloud2, queue_size=2)
-        self._beam_markers = rospy.Publisher("~beam_markers", MarkerArray, queue_size=2)
-        self._wall_markers = rospy.Publisher("~wall_markers", MarkerArray, queue_size=1, latch=True)
-        self._legend = rospy.Publisher("~legend", Image, queue_size=1, latch=True)
-        self._legend.publish(legend.image_msg(self._p.global_frame_id))
-        self._diagnostics = Diagnostics(p.node, self._waiting.counts)
+        self._tf = tf2_ros.Buffer(rospy.Duration(LONGEST_TURN_S) if p.node.landmark_file else None)
+        self._scans = ScanInput(p.node, p.deskew, self._tf, self._log)
+        self._bearings = BearingInput(p.node, self._tf, self._log)
+        self._maps = MapSource(p.node, self._log, self._use_map)
+        self._starts = Starts(p, self._tf)
+        self._memory = PoseMemory(p.pose_file, self._log)
+        self._outputs = Outputs(p.node)
+        self._diagnostics = Diagnostics(p.node, self._scans.counts)
 
         rospy.Service("global_localization", Empty, self._serve_global_localization)
         rospy.Service("request_nomotion_update", Empty, self._serve_nomotion_update)
         rospy.Service("set_map", SetMap, self._serve_set_map)
-        # Subscribers last: they may fire at once. Nagle's algorithm would hold small messages for 40 ms.
+        self._reconfigure = ReconfigureServer(
+            params.changeable(p), reconfigure.explanations(_parameter_file()),
+            lambda values: self._run_errand(lambda: self._take_parameters(values)))
+        # Subscribers last: they may fire at once.
         self._listener = tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
-        self._scan_input = rospy.Subscriber("scan", LaserScan, lambda msg: self._inbox.put("scans", msg),
-                                            queue_size=100, buff_size=2 ** 22, tcp_nodelay=True)
-        rospy.Subscriber("initialpose", PoseWithCovarianceStamped, self._command(self._take_guess),
-                         queue_size=2)
-        if len(self._landmarks):
-            rospy.Subscriber("landmark_bearings", LandmarkBearings, self._command(self._bearings.append), queue_size=10)
-        if self._p.use_map_topic:
-            rospy.Subscriber("map", OccupancyGrid, self._command(self._take_map_topic), queue_size=1,
+        self._scans.subscribe(lambda msg: self._inbox.put("scans", msg))
+        self._bearings.subscribe(self._command(self._bearings.receive))
+        rospy.Subscriber("initialpose", PoseWithCovarianceStamped, self._command(self._take_guess), queue_size=2)
+        rospy.Subscriber("global_localization_area", PolygonStamped, self._command(self._take_area), queue_size=2)
+        if p.node.use_map_topic:
+            rospy.Subscriber("map", OccupancyGrid, self._command(self._maps.take_topic), queue_size=1,
                              buff_size=2 ** 24)
 
     def run(self, ending: threading.Event) -> None:
         """The only thread that touches the filter; returns when ROS shuts down or ending is set."""
         while not (rospy.is_shutdown() or ending.is_set()):
-            mail = self._inbox.take(timeout_s=0.01 if len(self._waiting) else 0.1)
+            mail = self._inbox.take(timeout_s=0.01 if self._scans.is_waiting else 0.1)
             if self._clock_jumped_back():
                 mail["scans"] = []  # from before the jump
             for command in mail["commands"]:
                 command()
-            if self._mcl is None and not self._p.use_map_topic:
-                self._request_map()
+            self._maps.request()
+            mail["scans"] += self._inbox.take_now("scans")  # a new map takes a while
+            unusable = "there is no map yet" if self._mcl is None else None
             for msg in mail["scans"]:
-                self._receive(msg)
-            msg, given_up = self._waiting.take_ready(self._has_transforms, self._now_s)
-            if given_up:
-                self._say_no_transform(given_up[-1])
-            if msg is not None:
-                self._step(msg)
-            self._send_glass_map()
+                if self._scans.receive(msg, self._now_s, unusable):
+                    self._restart(f"the last {STALE_SCANS} scans are older than the one before them")
+            if self._mcl is not None:
+                for msg in self._scans.take_ready(self._now_s):
+                    self._step(msg)
+            if self._mcl is not None and self._map is not None:
+                stamp_ns = 0 if self._estimate is None else self._estimate.stamp_ns
+                self._outputs.send_glass_map(self._mcl, self._map, stamp_ns, self._now_s)
             self._report()
 
     def save_pose(self) -> None:
-        """The pose to the parameter server, as AMCL does; the next start of the node begins there."""
-        if self._estimate is None:
-            return
-        pose, covariance = self._estimate.map_from_base, self._estimate.covariance
-        try:
-            for name, value in (("x", pose[0]), ("y", pose[1]), ("a", pose[2])):
-                rospy.set_param(f"~initial_pose_{name}", float(value))
-            for name, index in (("xx", 0), ("yy", 1), ("aa", 2)):
-                rospy.set_param(f"~initial_cov_{name}", float(covariance[index, index]))
-        except OSError as err:
-            self._log.warn(f"the pose is not saved: no parameter server ({err})", period_s=60.0)
+        """For the next start."""
+        self._memory.save()
 
     # -- callbacks of other threads: they store, services also wait for the outcome
 
@@ -170,7 +145,7 @@ class LocalizationNode:
 
     def _serve_global_localization(self, _request: EmptyRequest) -> EmptyResponse:
         try:
-            self._run_errand(self._scatter)
+            self._run_errand(self._search)
         except (ValueError, TimeoutError) as err:
             rospy.logwarn(f"global_localization refused: {err}")
             raise rospy.ServiceException(str(err)) from err
@@ -191,303 +166,128 @@ class LocalizationNode:
             return SetMapResponse(success=False)
         return SetMapResponse(success=True)
 
-    # -- maps
+    # -- maps, poses and parameters from outside
 
     def _core(self) -> GlassMcl:
         if self._mcl is None:
             raise ValueError("there is no map yet")
         return self._mcl
 
-    def _request_map(self) -> None:
-        """Ask static_map once; the loop comes back to it until there is a map."""
-        if time.monotonic() < self._next_map_request_s:
-            return
-        self._next_map_request_s = time.monotonic() + 0.5
-        name = rospy.resolve_name("static_map")
-        try:
-            rospy.wait_for_service(name, timeout=0.1)
-        except rospy.ROSException:
-            self._trouble = f"no map: there is no service {name}"
-            if self._settled() and not rospy.is_shutdown():
-                self._log.warn(self._trouble)
-            return
-        try:
-            msg = rospy.ServiceProxy(name, GetMap)().map
-            self._use_map(conversions.map_from_msg(msg), msg.header.frame_id, f"service {name}")
-        except rospy.ServiceException as err:
-            self._trouble = f"no map: service {name} fails: {err}"
-            self._log.warn(self._trouble)
-        except ValueError as err:
-            self._trouble = f"no map: the one of service {name} is refused: {err}"
-            self._log.error(self._trouble)
-
-    def _take_map_topic(self, msg: OccupancyGrid) -> None:
-        if self._map is not None and self._p.first_map_only:
-            return
-        origin = f"topic {rospy.resolve_name('map')}"
-        try:
-            self._use_map(conversions.map_from_msg(msg), msg.header.frame_id, origin)
-        except ValueError as err:
-            rospy.logerr(f"the map of {origin} is refused: {err}")
-
-    def _set_map_and_pose(self, request: SetMapRequest) -> None:
-        guess = conversions.guess_from_msg(request.initial_pose, self._p.global_frame_id)
-        grid_map = conversions.map_from_msg(request.map)
-        _refuse_outside(guess, grid_map)
-        self._use_map(grid_map, request.map.header.frame_id, "service set_map")
-        self._start = _Start(guess, self._now_s)
-        if self._p.force_update_after_set_map:
-            self._core().request_update()
-
     def _use_map(self, grid_map: GridMap, frame: str, origin: str) -> None:
         """Build the filter around the first map; a later one leaves the particles where they are."""
         if self._mcl is None:
-            self._mcl = self._new_core(grid_map, *self._restart_pose)
+            self._map = grid_map
+            self._begin()
+        elif self._map is not None and grid_map.digest == self._map.digest:
+            rospy.loginfo(f"the map from {origin} is the one that is in use: nothing changes")
+            return
         else:
             self._mcl.set_map(grid_map)
-        self._map, self._glass_changed = grid_map, True
+            self._map = grid_map
+        self._map_origin = origin
+        self._outputs.glass_is_news()
         height, width = grid_map.occupancy.shape
         rospy.loginfo(f"map of {width} x {height} cells of {grid_map.resolution_m:g} m from {origin}")
-        if conversions.frame_id(frame) != self._p.global_frame_id:
+        if conversions.frame_id(frame) != self._p.node.global_frame_id:
             rospy.logwarn(f"the map says it is in frame {frame!r}, ~global_frame_id is "
-                          f"{self._p.global_frame_id!r}: used as the latter")
+                          f"{self._p.node.global_frame_id!r}: used as the latter")
 
-    def _new_core(self, grid_map: GridMap, map_from_base: np.ndarray, covariance: np.ndarray) -> GlassMcl:
-        mcl = GlassMcl(self._mcl_params, grid_map, self._rng)
-        mcl.set_pose(map_from_base, covariance)
-        self._publish_pose = True
-        return mcl
+    def _set_map_and_pose(self, request: SetMapRequest) -> None:
+        guess = conversions.guess_from_msg(request.initial_pose, self._p.node.global_frame_id)
+        grid_map = conversions.map_from_msg(request.map)
+        starts.refuse_outside(guess, grid_map)
+        self._maps.take(grid_map, request.map.header.frame_id, "service set_map")
+        self._starts.give(guess, self._now_s)
+        if self._p.node.force_update_after_set_map:
+            self._core().request_update()
 
-    # -- poses from outside
+    def _begin(self) -> str:
+        """A new filter, at the start that there is; where, in words."""
+        assert self._map is not None
+        self._mcl = GlassMcl(self._p.mcl, self._map, self._rng)
+        self._outputs.start_over()
+        self._pose_is_news = True
+        return self._starts.begin(self._mcl)
 
     def _take_guess(self, msg: PoseWithCovarianceStamped) -> None:
         try:
-            guess = conversions.guess_from_msg(msg, self._p.global_frame_id)
+            guess = conversions.guess_from_msg(msg, self._p.node.global_frame_id)
             if self._map is not None:
-                _refuse_outside(guess, self._map)
+                starts.refuse_outside(guess, self._map)
         except ValueError as err:
             rospy.logwarn(f"initialpose refused: {err}")
             return
-        self._start = _Start(guess, self._now_s)
+        self._starts.give(guess, self._now_s)
 
-    def _scatter(self) -> None:
-        self._core().scatter()
-        self._start, self._publish_pose = None, True
-        rospy.loginfo("global localization: the robot may be anywhere in the map")
-
-    def _apply_start(self, scan_ns: int, odom_from_base: np.ndarray) -> None:
-        """Give the filter the pose that waits, moved forward by the odometry from its stamp to the scan's."""
-        assert self._start is not None and self._mcl is not None and self._map is not None
-        guess = self._start.guess
-        overdue = self._now_s - self._start.arrival_s > GUESS_WAIT_S
-        if guess.stamp_ns > scan_ns and not overdue:
-            return  # a scan at or after its stamp is on its way
-        self._start = None
-        map_from_base = guess.map_from_base
-        if guess.stamp_ns != 0:
-            try:
-                odom_from_then = conversions.planar_from_transform(
-                    self._tf.lookup_transform(self._p.odom_frame_id, self._p.base_frame_id,
-                                              conversions.stamp_from_ns(guess.stamp_ns)).transform)
-                moved = se2.compose(se2.inverse(odom_from_then), odom_from_base)
-                map_from_base = se2.compose(map_from_base, moved)
-            except (tf2_ros.TransformException, ValueError) as err:
-                rospy.logwarn(f"initialpose of {guess.stamp_ns * 1e-9:.3f} s taken as of now: "
-                              f"no odometry at its stamp ({err})")
+    def _take_area(self, msg: PolygonStamped) -> None:
         try:
-            _refuse_outside(guess, self._map)
-            self._mcl.set_pose(map_from_base, guess.covariance)
+            self._search(conversions.area_from_msg(msg, self._p.node.global_frame_id))
         except ValueError as err:
-            rospy.logwarn(f"initialpose refused: {err}")
-            return
-        self._restart_pose = (guess.map_from_base, guess.covariance)
-        self._publish_pose = True
-        if self._p.force_update_after_initialpose:
-            self._mcl.request_update()
-        x, y, yaw = map_from_base
-        rospy.loginfo(f"starting at x {x:.3f} m, y {y:.3f} m, yaw {yaw:.3f} rad")
+            rospy.logwarn(f"global_localization_area refused: {err}")
 
-    # -- bearings
+    def _search(self, area: Optional[np.ndarray] = None) -> None:
+        """Start over anywhere in the map, or in an area (N, 2) of it; ValueError if there is no room."""
+        self._core().scatter(area)
+        self._starts.forget()
+        self._outputs.start_over()
+        self._pose_is_news = True
+        where = "the map" if area is None else f"an area of {len(area)} corners"
+        rospy.loginfo(f"global localization: the robot may be anywhere in {where}")
 
-    def _add_bearings(self, scan_ns: int) -> None:
-        """Give the filter the bearings that came and are not newer than the scan, those to known landmarks."""
-        assert self._mcl is not None
-        ready = [msg for msg in self._bearings if conversions.ns_from_stamp(msg.header.stamp) <= scan_ns]
-        self._bearings[:] = [msg for msg in self._bearings if msg not in ready]
-        for msg in ready:
-            try:
-                mounting = conversions.mounting_from_transform(self._tf.lookup_transform(
-                    self._p.base_frame_id, conversions.frame_id(msg.header.frame_id), rospy.Time(0)).transform)
-                known = [bearing for bearing in bearing_messages.bearings_from_msg(msg, mounting)
-                         if bearing.landmark_id in self._landmarks]
-                if len(known) < len(msg.ids):
-                    self._log.warn(f"bearings to landmarks that are not in {self._p.landmark_file} are not used")
-                if known:
-                    odometry = np.array([self._odom_from_base(bearing.stamp_ns) for bearing in known])
-                    self._mcl.add_bearings(bearings.collected(known, odometry, mounting.base_from_laser),
-                                           self._landmarks, odometry[-1])
-            except (ValueError, tf2_ros.TransformException) as err:
-                self._log.warn(f"bearings not used: {err}")
-
-    def _odom_from_base(self, stamp_ns: int) -> np.ndarray:
-        return conversions.planar_from_transform(self._tf.lookup_transform(
-            self._p.odom_frame_id, self._p.base_frame_id, conversions.stamp_from_ns(stamp_ns)).transform)
+    def _take_parameters(self, values: Dict[str, Any]) -> None:
+        """Other parameters; what the filter knows stays. ParamError if one cannot be used, and then none is."""
+        p = params.changed(self._p, values, rospy.get_name())
+        if self._mcl is not None:
+            self._mcl.reconfigure(p.mcl)
+        self._p = p
+        self._scans.reconfigure(p.node, p.deskew)
+        self._outputs.reconfigure(p.node)
+        self._diagnostics.reconfigure(p.node)
 
     # -- scans
 
-    def _receive(self, msg: LaserScan) -> None:
-        """Let a scan wait for its transforms, unless it cannot be used at all."""
-        self._waiting.counts.received += 1
-        self._last_scan_s = self._now_s
-        stamp_ns = conversions.ns_from_stamp(msg.header.stamp)
-        if self._mcl is None:
-            self._refuse("there is no map yet")
-        elif stamp_ns == 0:
-            self._refuse("it has no stamp")
-        elif not conversions.frame_id(msg.header.frame_id):
-            self._refuse("it has no frame_id")
-        elif self._waiting.add(msg, stamp_ns, self._now_s):
-            self._stale_scans = 0
-        else:
-            self._refuse(f"its stamp {stamp_ns * 1e-9:.3f} s is not after that of the last one used")
-            self._stale_scans += 1
-            if self._stale_scans >= STALE_SCANS:
-                self._restart(f"the last {STALE_SCANS} scans are older than the one before them")
-
-    def _refuse(self, why: str) -> None:
-        self._waiting.counts.refused += 1
-        self._trouble = f"scan refused: {why}"
-        self._log.warn(self._trouble)
-
-    def _transform_pairs(self, msg: LaserScan) -> "List[tuple[str, str]]":
-        return [(self._p.odom_frame_id, self._p.base_frame_id),
-                (self._p.base_frame_id, conversions.frame_id(msg.header.frame_id))]
-
-    def _has_transforms(self, msg: LaserScan) -> bool:
-        return all(self._tf.can_transform(target, source, msg.header.stamp)
-                   for target, source in self._transform_pairs(msg))
-
-    def _say_no_transform(self, msg: LaserScan) -> None:
-        """The first pair that is missing, with tf's own reason."""
-        wait = f"{self._p.transform_wait_s:g} s"
-        for target, source in self._transform_pairs(msg):
-            try:
-                self._tf.lookup_transform(target, source, msg.header.stamp)
-            except tf2_ros.TransformException as err:
-                self._trouble = f"no transform {target} <- {source} at the scan's stamp: {err}"
-                self._log.warn(f"scan dropped after {wait}: {self._trouble}")
-                return
-        self._log.warn(f"scan dropped: its transform came later than {wait}")
-
     def _step(self, msg: LaserScan) -> None:
         """One scan through the filter."""
-        assert self._mcl is not None
-        (odom, base), (_, laser) = self._transform_pairs(msg)
+        assert self._mcl is not None and self._map is not None
         try:
-            odom_from_base = conversions.planar_from_transform(
-                self._tf.lookup_transform(odom, base, msg.header.stamp).transform)
-            mounting = conversions.mounting_from_transform(
-                self._tf.lookup_transform(base, laser, msg.header.stamp).transform)
-        except tf2_ros.TransformException as err:  # tf was cleared since it was asked
-            self._refuse(f"no transform: {err}")
-            return
+            placed = self._scans.place(msg)
         except ScanError as err:
-            self._refuse(str(err))
+            self._pass_over(msg, str(err))
             return
-        except ValueError as err:
-            self._refuse(f"transform {odom} <- {base}: {err}")
-            return
-        started = time.process_time()
+        began_cpu_s, began_s = time.process_time(), time.monotonic()
+        if self._starts.apply(self._mcl, self._map, placed.scan.stamp_ns, placed.odom_from_base, self._now_s):
+            self._pose_is_news = True
+            if self._p.node.force_update_after_initialpose:
+                self._mcl.request_update()
+        self._bearings.give(self._mcl, placed.scan.stamp_ns)
         try:
-            scan = conversions.scan_from_msg(msg, mounting)
-            if self._start is not None:
-                self._apply_start(scan.stamp_ns, odom_from_base)
-            self._add_bearings(scan.stamp_ns)
-            estimate = self._mcl.update(scan, odom_from_base)
-        except ScanError as err:  # the pose moves on with the odometry
-            self._refuse(str(err))
-            if self._estimate is not None:
-                stamp_ns = conversions.ns_from_stamp(msg.header.stamp)
-                self._send_transform(stamp_ns, self._estimate.map_from_odom)
+            estimate = self._mcl.update(placed.scan, placed.odom_from_base)
+        except ValueError as err:  # ScanError, and what the filter cannot work out: a robot drives on by odometry
+            self._pass_over(msg, str(err))
             return
-        self._diagnostics.add_update(time.process_time() - started)
+        self._diagnostics.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
         if not conversions.is_finite(estimate):
-            self._waiting.counts.refused += 1
+            self._scans.counts.refused += 1
             self._log.error("the filter's pose is not finite: nothing is published")
             return
-        self._waiting.counts.used += 1
-        self._estimate, self._last_estimate_s = estimate, self._now_s
-        self._send_transform(estimate.stamp_ns, estimate.map_from_odom)
-        self._surfaces.publish(conversions.surface_scan_msg(msg, estimate.surface_scan))
-        self._publish(estimate)
-        self._glass_changed = self._glass_changed or estimate.updated
-        if self._beam_cases.get_num_connections():
-            self._beam_cases.publish(conversions.beam_cases_msg(msg.header, estimate.cases))
-        self._show_beams(scan, estimate, mounting.height_m)
-        if self._p.save_pose_rate > 0.0 and self._due("_last_save_s", self._p.save_pose_rate):
-            self.save_pose()
+        self._scans.counts.used += 1
+        self._estimate, self._scan, self._last_estimate_s = estimate, placed.scan, self._now_s
+        self._outputs.send(msg, placed, estimate, self._now_s, self._pose_is_news)
+        self._pose_is_news = False
+        self._memory.take(estimate, self._map.digest, self._p.node.save_pose_rate, self._now_s)
 
-    # -- output
-
-    def _send_transform(self, stamp_ns: int, map_from_odom: np.ndarray) -> None:
-        if self._p.tf_broadcast:
-            valid_until_ns = stamp_ns + round(self._p.transform_tolerance * 1e9)
-            self._broadcaster.sendTransform(conversions.transform_stamped(
-                valid_until_ns, self._p.global_frame_id, self._p.odom_frame_id, map_from_odom))
-
-    def _publish(self, estimate: Estimate) -> None:
-        frame = self._p.global_frame_id
-        self._status.publish(conversions.status_msg(estimate.stamp_ns, frame, estimate.state, estimate.reason,
-                                                    estimate.used_share))
-        if not (estimate.updated or self._publish_pose):
-            return
-        self._poses.publish(conversions.pose_msg(estimate, frame))
-        if self._publish_pose or self._due("_last_particles_s", self._p.gui_publish_rate):
-            self._particles.publish(conversions.pose_array(estimate.stamp_ns, frame, estimate.particles))
-        self._publish_pose = False
-
-    def _show_beams(self, scan: Scan, estimate: Estimate, height_m: float) -> None:
-        """The beams for rviz, if it listens and it is time."""
-        listeners = self._beam_cloud.get_num_connections(), self._beam_markers.get_num_connections()
-        if not any(listeners) or not self._due("_last_beams_s", self._p.gui_publish_rate):
-            return
-        base = self._p.base_frame_id
-        if listeners[0]:
-            self._beam_cloud.publish(beam_displays.beam_cloud(scan, estimate.cases, height_m, base))
-        if listeners[1]:
-            markers = beam_displays.beam_markers(scan, estimate.cases, estimate.surface_scan, height_m, base)
-            markers.markers.append(beam_displays.status_marker(
-                estimate.map_from_base, self._p.global_frame_id, estimate.state, estimate.reason,
-                estimate.used_share))
-            self._beam_markers.publish(markers)
-
-    def _send_glass_map(self) -> None:
-        """The glass map, if it is news to somebody and it is time."""
-        if self._mcl is None or self._map is None or not self._glass_changed:
-            return
-        period_s = self._p.glass_map_period_s
-        listeners = self._glass_map.get_num_connections() + self._wall_markers.get_num_connections()
-        if not listeners or 0.0 <= self._now_s - self._last_glass_s < period_s:
-            return
-        self._last_glass_s, self._glass_changed = self._now_s, False
-        stamp_ns = 0 if self._estimate is None else self._estimate.stamp_ns
-        frame, glass = self._p.global_frame_id, self._mcl.glass_map.occupancy()
-        self._glass_map.publish(conversions.glass_map_msg(stamp_ns, frame, self._map, glass))
-        self._wall_markers.publish(wall_display.wall_markers(frame, self._map, glass))
-
-    def _due(self, last: str, rate_hz: float) -> bool:
-        """Whether 1 / rate has passed since the time in the attribute `last`, which then becomes now."""
-        if rate_hz > 0.0 and 0.0 <= self._now_s - getattr(self, last) < 1.0 / rate_hz:
-            return False
-        setattr(self, last, self._now_s)
-        return True
+    def _pass_over(self, msg: LaserScan, why: str) -> None:
+        """A scan that cannot be used: the pose moves on with the odometry all the same."""
+        self._scans.refuse(why)
+        if self._estimate is not None:
+            self._outputs.send_transform(conversions.ns_from_stamp(msg.header.stamp), self._estimate.map_from_odom)
 
     # -- time, and what is missing
 
     def _clock_jumped_back(self) -> bool:
         before_s, self._now_s = self._now_s, rospy.get_time()
         if before_s == 0.0:  # the first /clock
-            self._last_scan_s = self._last_estimate_s = self._now_s
+            self._scans.last_arrival_s = self._last_estimate_s = self._now_s
         if self._now_s >= before_s - TIME_JUMP_S:
             return False
         self._restart(f"time jumped back by {before_s - self._now_s:.3f} s")
@@ -495,22 +295,17 @@ class LocalizationNode:
 
     def _restart(self, why: str) -> None:
         """Stamps start over: forget them. In simulated time the robot starts over too, else it stays."""
-        self._waiting.restart()
-        self._bearings.clear()
+        self._scans.restart(self._now_s)
+        self._bearings.restart()
         self._tf.clear()
-        self._stale_scans, self._start = 0, None
-        self._last_scan_s = self._last_estimate_s = self._now_s
+        self._starts.forget()
+        self._last_estimate_s = self._now_s
         if not self._simulated and self._estimate is not None:
-            self._restart_pose = (self._estimate.map_from_base, self._estimate.covariance)
-        self._rng = self._p.rng  # a bag that starts over gives the same poses again
-        if self._map is not None:
-            self._mcl = self._new_core(self._map, *self._restart_pose)
-            self._glass_changed = True
-        x, y, yaw = self._restart_pose[0]
-        where = "the last pose it was given" if self._simulated else "its last pose"
-        rospy.logwarn(f"{why}: the filter starts over at {where}, x {x:.3f} m, y {y:.3f} m, "
-                      f"yaw {yaw:.3f} rad")
+            self._starts.begin_at(self._estimate.map_from_base, self._estimate.covariance)
         self._estimate = None
+        self._rng = self._p.node.rng  # a bag that starts over gives the same poses again
+        if self._map is not None:
+            rospy.logwarn(f"{why}: the filter starts over {self._begin()}")
 
     def _report(self) -> None:
         """Once a second: diagnostics, and in words what is missing if no scan is being used."""
@@ -519,75 +314,70 @@ class LocalizationNode:
         self._next_report_s = time.monotonic() + 1.0
         trouble = self._missing()
         if trouble is not None:
-            self._say_trouble(trouble)
-        self._diagnostics.publish(self._estimate, trouble)
-
-    def _say_trouble(self, trouble: str) -> None:
-        """~status, and the words in rviz, while no scan is being used."""
-        stamp_ns, where, state = 0, None, "UNKNOWN"
-        if self._estimate is not None:
-            stamp_ns, where, state = self._estimate.stamp_ns, self._estimate.map_from_base, "UNCERTAIN"
-        frame = self._p.global_frame_id
-        self._status.publish(conversions.status_msg(stamp_ns, frame, state, trouble, float("nan")))
-        if self._beam_markers.get_num_connections():
-            self._beam_markers.publish(MarkerArray([beam_displays.status_marker(where, frame, state, trouble,
-                                                                                float("nan"))]))
-
-    def _settled(self) -> bool:
-        return time.monotonic() - self._started_s > SETTLING_S
+            self._outputs.send_trouble(self._estimate, trouble)
+        self._diagnostics.publish(Situation(
+            self._estimate, self._scan, trouble, self._map, self._map_origin if self._map else self._maps.trouble or
+            "no map yet", self._scans.period_s, self._scans.lidars))
 
     def _missing(self) -> Optional[str]:
         """Why no scan is being used; None while all is well."""
         if self._now_s == 0.0:
             trouble = "time stands still: /use_sim_time is set and nothing publishes /clock"
-            if self._settled():
+            if time.monotonic() - self._started_s > SETTLING_S:
                 self._log.warn(trouble, NO_SCAN_WARNING_S)
             return trouble
-        without_scan_s = self._now_s - self._last_scan_s
-        topic = rospy.resolve_name("scan")
-        silence = (f"no scan on {topic} for {without_scan_s:.0f} s: "
-                   + ("its publisher is silent" if self._scan_input.get_num_connections()
-                      else "nobody publishes it"))
+        without_scan_s = self._now_s - self._scans.last_arrival_s
         if without_scan_s > NO_SCAN_WARNING_S:
-            self._log.warn(silence, NO_SCAN_WARNING_S)
+            self._log.warn(self._scans.silence(self._now_s), NO_SCAN_WARNING_S)
         if self._mcl is None:
-            return self._trouble if self._trouble.startswith("no map") else "no map yet"
+            return self._maps.trouble or "no map yet"
         if without_scan_s > SILENCE_S:
-            return silence
+            return self._scans.silence(self._now_s)
         if self._now_s - self._last_estimate_s > SILENCE_S or self._estimate is None:
-            return self._trouble
+            return self._scans.trouble
         return None
 
 
-def _refuse_outside(guess: conversions.PoseGuess, grid_map: GridMap) -> None:
-    if not grid_map.contains(*grid_map.cells(guess.map_from_base[:2])):
-        x, y = guess.map_from_base[:2]
-        raise ValueError(f"the pose x {x:.3f} m, y {y:.3f} m lies outside the map")
+def _parameter_file() -> Optional[Path]:
+    """config/localization.yaml, which explains the parameters."""
+    try:
+        return Path(rospkg.RosPack().get_path("glass_nav")) / "config" / "localization.yaml"
+    except rospkg.ResourceNotFound:
+        return None
 
 
 def main(name: str = "glass_localization") -> None:
-    """Start the node; exit code 2 if a parameter cannot be used."""
+    """Start the node; exit code 2 if a parameter or the landmark file cannot be used."""
     rospy.init_node(name, disable_signals=True)
+    if "--run-from-bag" in rospy.myargv():
+        rospy.logfatal(f"{rospy.get_name()}: --run-from-bag is the command glass_nav replay here: "
+                       "rosrun glass_nav glass_nav replay BAG --map MAP --out FOLDER")
+        sys.exit(2)
     ending = endings.event_on_signals()
     core_log = logging.getLogger("glass_nav")
     core_log.handlers = logging.getLogger("rosout").handlers
     core_log.setLevel(logging.INFO)
     core_log.propagate = False
     given: Dict[str, Any] = rospy.get_param("~", {})
+    unknown: List[str] = []
+    if name == "amcl":
+        given, unknown = params.without_unknown(given, rospy.get_name())
     try:
         p, unused = params.localization_params(given, rospy.get_name())
     except params.ParamError as err:
         rospy.logfatal(str(err))
         rospy.signal_shutdown("a parameter cannot be used")
         sys.exit(2)
-    if unused:
-        rospy.loginfo(f"parameters of amcl that this filter does not use: ~{', ~'.join(unused)}")
     try:
         node = LocalizationNode(p)
     except landmark_file.LandmarkError as err:
         rospy.logfatal(f"{rospy.get_name()}: {err}")
         rospy.signal_shutdown("the landmark file cannot be used")
         sys.exit(2)
+    for line in unknown:
+        rospy.logwarn(line)
+    if unused:
+        rospy.loginfo(f"parameters of amcl that this filter does not use: ~{', ~'.join(unused)}")
     try:
         node.run(ending)
     finally:

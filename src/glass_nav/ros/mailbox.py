@@ -40,6 +40,13 @@ class Mailbox:
                 items.clear()
             return taken
 
+    def take_now(self, lane: str) -> List[Any]:
+        """What lies in one lane, oldest first; without waiting."""
+        with self._changed:
+            taken = list(self._lanes[lane])
+            self._lanes[lane].clear()
+            return taken
+
 
 class Errand:
     """Something the run loop shall do for another thread, which waits for the outcome."""
@@ -74,7 +81,7 @@ class Errand:
 class ScanCounts:
     """Where the scans went since the start; received is the sum of the others.
 
-    WaitingScans counts the last three, its user the first three.
+    WaitingScans counts the last three, its user the first three; those of several lidars share one.
     """
     received: int = 0
     used: int = 0
@@ -91,16 +98,18 @@ class WaitingScans(Generic[T]):
     that is older than one already handed out is never handed out, so stamps only ascend.
     """
 
-    def __init__(self, capacity: int, limit_s: float) -> None:
+    def __init__(self, capacity: int, limit_s: float, counts: Optional[ScanCounts] = None) -> None:
         """
         Args:
             capacity: scans that may wait; the oldest goes first.
             limit_s: how long one may wait, by the clock that add() and take_ready() are given.
+            counts: to be kept with those of other lidars; its own when not given.
         """
         self._waiting: List[Tuple[float, int, T]] = []  # arrival [s], stamp [ns], scan
-        self._capacity, self._limit_s = capacity, limit_s
+        self._capacity = capacity
         self._newest_ns: Optional[int] = None
-        self.counts = ScanCounts()
+        self.limit_s = limit_s
+        self.counts = ScanCounts() if counts is None else counts
 
     def __len__(self) -> int:
         return len(self._waiting)
@@ -109,11 +118,10 @@ class WaitingScans(Generic[T]):
         """Let a scan wait; False if its stamp is not after that of the last one handed out."""
         if self._newest_ns is not None and stamp_ns <= self._newest_ns:
             return False
-        self._waiting.append((now_s, stamp_ns, scan))
-        if len(self._waiting) > self._capacity:
-            del self._waiting[0]
+        waiting = [*self._waiting, (now_s, stamp_ns, scan)]
+        if len(waiting) > self._capacity:
             self.counts.dropped_no_transform += 1
-        self.counts.waiting = len(self._waiting)
+        self._keep(waiting[-self._capacity:])
         return True
 
     def take_ready(self, is_ready: Callable[[T], bool], now_s: float) -> "Tuple[Optional[T], List[T]]":
@@ -124,16 +132,19 @@ class WaitingScans(Generic[T]):
                 ready, self._newest_ns = scan, stamp_ns
                 newer = [waiting for waiting in self._waiting if waiting[1] > stamp_ns]
                 self.counts.superseded += len(self._waiting) - len(newer) - 1
-                self._waiting = newer
+                self._keep(newer)
                 break
-        given_up = [scan for arrival_s, _, scan in self._waiting if now_s - arrival_s > self._limit_s]
-        self._waiting = [waiting for waiting in self._waiting if now_s - waiting[0] <= self._limit_s]
+        given_up = [scan for arrival_s, _, scan in self._waiting if now_s - arrival_s > self.limit_s]
+        self._keep([waiting for waiting in self._waiting if now_s - waiting[0] <= self.limit_s])
         self.counts.dropped_no_transform += len(given_up)
-        self.counts.waiting = len(self._waiting)
         return ready, given_up
 
     def restart(self) -> None:
         """Forget what waits and which stamps were used: time has jumped."""
         self.counts.dropped_no_transform += len(self._waiting)
-        self.counts.waiting = 0
-        self._waiting, self._newest_ns = [], None
+        self._keep([])
+        self._newest_ns = None
+
+    def _keep(self, waiting: "List[Tuple[float, int, T]]") -> None:
+        self.counts.waiting += len(waiting) - len(self._waiting)
+        self._waiting = waiting

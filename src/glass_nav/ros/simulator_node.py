@@ -65,6 +65,7 @@ class SimulatorNodeParams:
     seed: int = 0
     changed: float = 0.0              # share of the movable furniture that moved since the map was drawn
     scan_rate_hz: float = 10.0
+    turn_time_s: float = 0.0          # from the first beam of a scan to the last one
     speed_factor: float = 1.0         # simulated seconds in a second; 0: as fast as the localization follows
     laser_x_m: float = 0.12           # where the laser sits on the robot
     laser_y_m: float = 0.0
@@ -289,7 +290,8 @@ def _drive(p: SimulatorNodeParams) -> _Drive:
     scanner = ScannerModel(reading_rad=math.radians(p.landmark_reading_deg), move_s=p.landmark_move_s)
     simulation = Simulation(building, model, RobotParams(p.robot), seed=p.seed, scan_rate_hz=p.scan_rate_hz,
                             base_from_laser=np.array([p.laser_x_m, p.laser_y_m, p.laser_yaw_rad]),
-                            changed_share=p.changed, scanner=scanner if len(building.tags) else None,
+                            changed_share=p.changed, turn_time_s=p.turn_time_s,
+                            scanner=scanner if len(building.tags) else None,
                             base_from_emitter=np.array([p.emitter_x_m, p.emitter_y_m, p.emitter_yaw_rad]))
     if p.path in ("", "none"):  # roslaunch cannot hand on an empty argument of its command line
         return _Drive(simulation, None)

@@ -6,6 +6,7 @@ B beams. Ranges follow REP 117: -inf too near, +inf nothing met, NaN no measurem
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Optional
 
 import numpy as np
 
@@ -23,6 +24,9 @@ class Scan:
     range_min_m: float
     range_max_m: float
     base_from_laser: np.ndarray  # (3,) planar pose of the laser on the robot
+    lidar: str = ""              # which one of several: by its frame
+    time_increment_s: float = 0.0  # from each beam to the next; 0: all at the stamp
+    origins_m: Optional[np.ndarray] = None  # (B, 2) where in the laser's frame each beam began; None: at (0, 0)
 
     def __len__(self) -> int:
         return len(self.ranges_m)
@@ -38,6 +42,18 @@ class Scan:
         bearing = self.angles_rad + yaw
         ranges_m = np.where(self.answered, self.ranges_m, np.nan)
         return np.stack([x + ranges_m * np.cos(bearing), y + ranges_m * np.sin(bearing)], axis=-1)
+
+    def as_measured(self, ranges_m: np.ndarray) -> np.ndarray:
+        """(B,) ranges of points on the beams from where each beam began, given those from the laser at the stamp.
+
+        Differs for a scan that was straightened, see deskew.py: the driver's ranges are from there.
+        """
+        if self.origins_m is None:
+            return ranges_m
+        there = np.isfinite(ranges_m)
+        along_m = np.where(there, ranges_m, 0.0)
+        return np.where(there, np.hypot(along_m * np.cos(self.angles_rad) - self.origins_m[:, 0],
+                                        along_m * np.sin(self.angles_rad) - self.origins_m[:, 1]), ranges_m)
 
     def limited(self, min_range_m: float, max_range_m: float) -> "Scan":
         """The same turn without the ranges outside these limits; a negative limit is the scan's own.
@@ -61,7 +77,8 @@ class Scan:
 
 def scan_from_fields(stamp_ns: int, ranges_m: np.ndarray, angle_min_rad: float,
                      angle_increment_rad: float, range_min_m: float, range_max_m: float,
-                     base_from_laser: np.ndarray, upside_down: bool = False) -> Scan:
+                     base_from_laser: np.ndarray, upside_down: bool = False, lidar: str = "",
+                     time_increment_s: float = 0.0) -> Scan:
     """The fields of a LaserScan as a Scan, by REP 117.
 
     A range at or beyond range_max is +inf (nothing met), one below range_min -inf (too near),
@@ -75,6 +92,8 @@ def scan_from_fields(stamp_ns: int, ranges_m: np.ndarray, angle_min_rad: float,
         range_min_m, range_max_m: the sensor's limits.
         base_from_laser: (3,) planar pose of the laser on the robot.
         upside_down: the laser's z points down; its angles run clockwise seen from above.
+        lidar: name of the lidar where there are several.
+        time_increment_s: from each beam to the next.
 
     Raises:
         ScanError: no beams, or fields that describe no lidar.
@@ -100,4 +119,5 @@ def scan_from_fields(stamp_ns: int, ranges_m: np.ndarray, angle_min_rad: float,
         ranges_m[ranges_m < range_min_m] = -np.inf
         ranges_m[failed] = np.nan
     return Scan(int(stamp_ns), ranges_m, -angles_rad if upside_down else angles_rad,
-                float(range_min_m), float(range_max_m), np.asarray(base_from_laser, float))
+                float(range_min_m), float(range_max_m), np.asarray(base_from_laser, float), lidar,
+                time_increment_s)

@@ -13,8 +13,9 @@ from typing import Iterator, List, Optional, Tuple, Union
 import numpy as np
 
 from glass_nav.geometry import se2
+from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.sensing.scan import Scan, scan_from_fields
-from glass_nav.simulation import lidar, path_follower
+from glass_nav.simulation import lidar, path_follower, turning
 from glass_nav.simulation.building import Building
 from glass_nav.simulation.landmark_scanner import LandmarkScanner, ScannerModel, Turn
 from glass_nav.simulation.lidar import LidarModel, TrueScan
@@ -44,13 +45,21 @@ class OdometrySample:
 @dataclass(frozen=True)
 class Frame:
     """One turn of the lidar, and where the robot truly was."""
-    stamp_ns: int
-    map_from_base: np.ndarray   # (3,) truth
-    odom_from_base: np.ndarray  # (3,)
+    stamp_ns: int               # of the first beam
+    map_from_base: np.ndarray   # (3,) truth, then
+    odom_from_base: np.ndarray  # (3,) then
     scan: Scan
     truth: TrueScan
-    odometry: Tuple[OdometrySample, ...]  # all readings since the frame before, the last one at stamp_ns
+    odometry: Tuple[OdometrySample, ...]  # all readings since the frame before, the last one at the last beam
     blocked: bool               # an obstacle stopped the robot since then
+
+
+@dataclass(frozen=True)
+class _Moment:
+    """Where the robot was, and what odometry said."""
+    stamp_ns: int
+    map_from_base: np.ndarray   # (3,)
+    odom_from_base: np.ndarray  # (3,)
 
 
 class Simulation:
@@ -60,7 +69,7 @@ class Simulation:
                  odometry: OdometryParams = OdometryParams(),
                  base_from_laser: "Union[Tuple[float, float, float], np.ndarray]" = LASER, seed: int = 0,
                  scan_rate_hz: float = 10.0, changed_share: float = 0.0, start: Optional[np.ndarray] = None,
-                 scanner: Optional[ScannerModel] = None,
+                 turn_time_s: float = 0.0, scanner: Optional[ScannerModel] = None,
                  base_from_emitter: "Union[Tuple[float, float, float], np.ndarray]" = EMITTER) -> None:
         """
         Args:
@@ -68,6 +77,7 @@ class Simulation:
             seed: >= 0.
             changed_share: of the movable things that somebody moved since the map was drawn.
             start: (3,) map_from_base; the building's own when not given, and drive() begins at its path's start.
+            turn_time_s: the lidar takes from its first beam to its last one; 0: all at one moment.
             scanner: looks for the building's tags, if there is one.
             base_from_emitter: (3,) where that sits.
 
@@ -78,6 +88,9 @@ class Simulation:
             raise ValueError(f"seed must be a whole number >= 0, got {seed!r}")
         if not 0.1 <= scan_rate_hz <= 1000.0:
             raise ValueError(f"scan rate must be 0.1 to 1000 Hz, got {scan_rate_hz}")
+        if not 0.0 <= turn_time_s * scan_rate_hz <= 1.0:
+            raise ValueError(f"a turn of the lidar must take >= 0 s and no longer than the scan period of "
+                             f"{1.0 / scan_rate_hz:g} s, got {turn_time_s}")
         if np.shape(base_from_laser) != (3,) or not np.all(np.isfinite(base_from_laser)):
             raise ValueError(f"the laser's pose on the robot must be finite x, y, yaw, got {base_from_laser}")
         if np.shape(base_from_emitter) != (3,) or not np.all(np.isfinite(base_from_emitter)):
@@ -85,6 +98,7 @@ class Simulation:
         furniture, wheels, light = np.random.SeedSequence(seed).spawn(3)
         self.building = building.changed(changed_share, np.random.default_rng(furniture))
         self.lidar_model, self.scan_period_s = lidar_model, 1.0 / scan_rate_hz
+        self._turn_ns = round(turn_time_s * 1e9)
         self.base_from_laser = np.array(base_from_laser, float)
         self._lidar_rng = np.random.default_rng(light)
         surfaces = self.building.surfaces
@@ -96,6 +110,7 @@ class Simulation:
         self._robot = self._robot_at(building.start if start is None else np.asarray(start, float))
         self._start_given = start is not None
         self._readings: List[OdometrySample] = [self.reading]
+        self._track: List[_Moment] = [self._moment]  # of the last turn of the lidar
         self.base_from_emitter = np.array(base_from_emitter, float)
         self._scanner = None if scanner is None else LandmarkScanner(scanner, self.building)
 
@@ -144,18 +159,30 @@ class Simulation:
                 for turn in self._scanner.take_turns()]
 
     def look(self) -> Frame:
-        """One turn of the lidar, now."""
-        model, stamp_ns = self.lidar_model, self.stamp_ns
-        map_from_laser = se2.compose(self.map_from_base, self.base_from_laser)
-        truth = lidar.scan(model, self.building, map_from_laser, self._time_ns * 1e-9, self._lidar_rng)
+        """One turn of the lidar, which ends now. Before there was time for one it is of one moment."""
+        model = self.lidar_model
+        turn_ns = self._turn_ns if self._turn_ns <= self._time_ns else 0
+        stamp_ns = self.stamp_ns - turn_ns
+        track = Trajectory(np.array([moment.stamp_ns for moment in self._track], np.int64),
+                           np.array([moment.map_from_base for moment in self._track]))
+        map_from_base = track.at(np.int64(stamp_ns))
+        if turn_ns:
+            knots_ns = np.append(stamp_ns, track.stamps_ns[track.stamps_ns > stamp_ns])
+            map_from_laser = Trajectory(knots_ns, se2.compose(track.at(knots_ns), self.base_from_laser))
+            truth = turning.scan(model, self.building, map_from_laser, turn_ns, START_NS, self._lidar_rng)
+        else:
+            truth = lidar.scan(model, self.building, se2.compose(map_from_base, self.base_from_laser),
+                               self._time_ns * 1e-9, self._lidar_rng)
         angles_rad = model.angles_rad
         ranges_m = truth.ranges_m.astype(np.float32)  # all that a LaserScan holds
         scan = scan_from_fields(stamp_ns, ranges_m, float(angles_rad[0]), float(angles_rad[1] - angles_rad[0]),
-                                model.range_min_m, model.range_max_m, self.base_from_laser)
+                                model.range_min_m, model.range_max_m, self.base_from_laser,
+                                time_increment_s=turn_ns * 1e-9 / (model.beams - 1))
+        odom_from_base = Trajectory(track.stamps_ns, np.array([moment.odom_from_base for moment in self._track])
+                                    ).at(np.int64(stamp_ns))
         readings, self._readings = tuple(self._readings), []
         blocked, self._blocked = self._blocked, False
-        return Frame(stamp_ns, self.map_from_base, self._wheels.odom_from_base, scan, truth,
-                     readings or (self.reading,), blocked)
+        return Frame(stamp_ns, map_from_base, odom_from_base, scan, truth, readings or (self.reading,), blocked)
 
     def follower(self, path: "Union[str, np.ndarray]", p: FollowerParams = FollowerParams()) -> PathFollower:
         """For a path by name or file, see path_follower.find(), or waypoints (W, 2). Puts a robot that has not moved
@@ -169,6 +196,7 @@ class Simulation:
         follower = PathFollower(path, self._robot_params, p)
         if self._time_ns == 0 and not self._start_given:
             self._robot = self._robot_at(follower.start)
+            self._track = [self._moment]
         return follower
 
     def drive(self, path: "Union[str, np.ndarray]", p: FollowerParams = FollowerParams()) -> Iterator[Frame]:
@@ -211,6 +239,13 @@ class Simulation:
             self._scanner.step(end_ns, se2.compose(self.map_from_base, self.base_from_emitter))
         self._blocked = self._blocked or self._robot.blocked
         self._readings.append(self.reading)
+        self._track.append(self._moment)
+        while len(self._track) > 2 and self._track[1].stamp_ns <= self.stamp_ns - self._turn_ns:
+            del self._track[0]
+
+    @property
+    def _moment(self) -> "_Moment":
+        return _Moment(self.stamp_ns, self.map_from_base, self._wheels.odom_from_base)
 
     def _robot_at(self, map_from_base: np.ndarray) -> Robot:
         if map_from_base.shape != (3,) or not np.all(np.isfinite(map_from_base)):

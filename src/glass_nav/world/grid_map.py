@@ -6,7 +6,9 @@ H rows, W columns. The grid may be turned in the map (a map_server origin with y
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -34,6 +36,13 @@ class GridMap:
             raise ValueError(f"a map needs resolution > 0 m, got {self.resolution_m}")
         if np.shape(self.map_from_grid) != (3,) or not np.all(np.isfinite(self.map_from_grid)):
             raise ValueError(f"a map needs an origin of x, y, yaw, all finite, got {self.map_from_grid}")
+
+    @cached_property
+    def digest(self) -> str:
+        """16 hexadecimal digits that another map, or the same one elsewhere, does not have."""
+        place = np.round(np.append(self.map_from_grid, self.resolution_m), 6) + 0.0  # no -0; float32 in messages
+        shape = np.array(self.occupancy.shape, np.int64)
+        return hashlib.sha256(shape.tobytes() + place.tobytes() + self.occupancy.tobytes()).hexdigest()[:16]
 
     @property
     def occupied(self) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from glass_nav.geometry import angles, se2
-from glass_nav.localization.glass_mcl import GlassMclParams
+from glass_nav.localization.glass_mcl_params import GlassMclParams
 from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import GridMap
 

@@ -11,7 +11,7 @@ import pytest
 
 from glass_nav.evaluation import case_scores, replay_result
 from glass_nav.evaluation.case_scores import SurfaceScores
-from glass_nav.localization.glass_mcl import GlassMclParams
+from glass_nav.localization.glass_mcl_params import GlassMclParams
 
 REPO = Path(__file__).resolve().parents[3]
 sys.path.append(str(REPO / "test" / "benchmark"))

@@ -10,10 +10,9 @@ import pytest
 from buildings import BASE_FROM_LASER, GLASS_ROOM, L_ROOM, SECOND_NS, Building, loop_drive, odometry, off
 from glass_nav import params
 from glass_nav.geometry import angles, se2
-from glass_nav.localization import scan_alignment
-from glass_nav.localization.glass_mcl import GlassMcl, GlassMclParams, LaserLimits, Schedule
+from glass_nav.localization.glass_mcl import GlassMcl
+from glass_nav.localization.glass_mcl_params import GlassMclParams, LaserLimits, Schedule
 from glass_nav.sensing import bearings
-from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.scan import Scan, ScanError
 from glass_nav.world import landmark_map
 from glass_nav.world.grid_map import GridMap
@@ -304,35 +303,63 @@ def test_where_the_map_lies_and_how_it_is_turned_does_not_matter(drive, where):
         assert way_m < 0.05 and turn_rad < np.radians(1.5)
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_scans_leave_one_place_of_a_scatter(seed):
-    """Not always the right one, yet one where the scans fit."""
-    drive = Drive(seed=seed, steps=8)
-    mcl = GlassMcl(parameters(min_particles=1000, max_particles=3000), MAPS[L_ROOM], np.random.default_rng(seed))
+@pytest.mark.parametrize("seed", range(4))
+def test_from_anywhere_scans_lead_to_the_right_place(seed):
+    drive = Drive(seed=seed, steps=40)
+    mcl = GlassMcl(parameters(), MAPS[L_ROOM], np.random.default_rng(seed))
     mcl.scatter()
-    last = drive.through(mcl)[-1]
-    assert np.sqrt(np.linalg.eigvalsh(last.covariance[:2, :2])[-1]) < 0.1
-    assert last.used_share > 0.6
-    assert last.state == "LOCALIZED"
+    estimates = drive.through(mcl)
+    states = [estimate.state for estimate in estimates]
+    assert states[0] == "GLOBAL_SEARCH" and states[-1] == "LOCALIZED"
+    way_m, _ = drive.errors(estimates).T
+    assert all(way_m[index] < 0.1 for index, state in enumerate(states) if state == "LOCALIZED")
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_over_a_large_building_a_scatter_thins_out_where_the_scan_does_not_fit(seed):
-    rng = np.random.default_rng(seed)
-    walls = [(x, 10.0, x, 13.0 + x / 10) for x in range(3, 40, 4)] + [(x, 0.0, x, 6.0) for x in range(5, 40, 7)]
-    building = Building([(0, 0), (40, 0), (40, 20), (0, 20)], walls=walls)
-    true = np.array([9.0, 14.0, 0.3])
-    scan, odom = building.scan(true, rng=rng), np.zeros(3)
-    mcl = GlassMcl(parameters(max_particles=1500), building.grid_map(), np.random.default_rng(seed))
+def test_while_places_look_alike_all_of_them_are_told():
+    """In a square room without a mark there are four."""
+    room = Building([(0, 0), (6, 0), (6, 6), (0, 6)])
+    mcl = GlassMcl(parameters(), room.grid_map(), np.random.default_rng(0))
     mcl.scatter()
-    blind = mcl.update(replace(scan, ranges_m=np.full(180, np.nan)), odom)
-    mcl.request_update()
-    seen = mcl.update(scan, odom)
-    field = DistanceField(building.grid_map())
-    fits = [scan_alignment.fit(field, scan.points_in_base(), estimate.particles) for estimate in (blind, seen)]
-    assert fits[1].mean() > 1.2 * fits[0].mean()
-    assert np.mean(fits[1] > np.median(fits[0])) > 0.6
-    assert seen.state == "GLOBAL_SEARCH" and " of the weight in one place, sigma " in seen.reason
+    true = np.array([2.0, 2.5, 0.3])
+    told = mcl.update(room.scan(true), np.zeros(3))
+    assert told.state == "GLOBAL_SEARCH" and "places are possible, the best at x " in told.reason
+    centre = np.array([3.0, 3.0])
+    for quarter in range(4):
+        turned = se2.compose(np.array([*centre, quarter * np.pi / 2]), np.array([*(true[:2] - centre), true[2]]))
+        off_m, off_rad = np.array([off(particle, turned) for particle in told.particles]).T
+        assert np.any((off_m < 0.15) & (off_rad < np.radians(3.0))), quarter
+    assert told.covariance[0, 0] > 0.5  # of all of them, not of one
+    assert told.reliability < 0.5
+
+
+def test_in_an_area_only_what_lies_in_it_is_a_candidate():
+    room = Building([(0, 0), (6, 0), (6, 6), (0, 6)])
+    mcl = GlassMcl(parameters(), room.grid_map(), np.random.default_rng(0))
+    mcl.scatter(np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0]]))
+    true = np.array([2.0, 2.5, 0.3])
+    told = mcl.update(room.scan(true), np.zeros(3))
+    assert np.all(told.particles[:, :2] < 3.7)  # an alignment may lead out by decimetres
+    assert off(told.map_from_base, true)[0] < 0.1
+
+
+def test_a_pose_given_too_vaguely_to_track_is_looked_for_within_its_reach():
+    drive = Drive(seed=1, steps=40)
+    mcl = GlassMcl(parameters(), MAPS[L_ROOM], np.random.default_rng(1))
+    mcl.set_pose(drive.true[0] + [0.8, -0.5, 0.5], np.diag([1.5, 1.5, 1.0]) ** 2)
+    estimates = drive.through(mcl)
+    assert estimates[0].state == "GLOBAL_SEARCH" and estimates[-1].state == "LOCALIZED"
+    assert drive.errors(estimates)[-1, 0] < 0.05
+
+
+def test_a_scan_without_answers_leaves_a_search_where_it_is():
+    drive = Drive(steps=2)
+    mcl = GlassMcl(parameters(), MAPS[L_ROOM], np.random.default_rng(0))
+    mcl.scatter()
+    blind = mcl.update(replace(drive.scans[0], ranges_m=np.full(len(drive.scans[0]), np.nan)), drive.odometry[0])
+    assert blind.state == "GLOBAL_SEARCH" and blind.reason == "no scan has told anything yet"
+    assert np.isfinite(blind.map_from_base).all() and blind.reliability < 0.5
+    seen = mcl.update(drive.scans[1], drive.odometry[1])
+    assert "possible" in seen.reason
 
 
 # -- what happens between and beside good scans
@@ -426,6 +453,63 @@ def test_a_requested_update_uses_the_next_scan_of_a_robot_that_stands(drive):
     assert [mcl.update(scan, drive.odometry[0]).updated for scan in scans] == [True, False]
 
 
+def seen_by(scan, lidar, later_ns=0):
+    return replace(scan, lidar=lidar, stamp_ns=scan.stamp_ns + later_ns)
+
+
+def test_of_two_lidars_each_has_its_update_after_a_move(drive):
+    mcl = started(update_min_d=0.2, update_min_a=0.2)
+    still, moved = drive.odometry[0], se2.compose(drive.odometry[0], np.array([0.21, 0.0, 0.0]))
+    updated = [mcl.update(seen_by(drive.scans[index], lidar), odom).updated for index, (lidar, odom) in enumerate([
+        ("front", still), ("rear", still), ("front", still), ("rear", still),
+        ("rear", moved), ("front", moved), ("rear", moved), ("front", moved)])]
+    assert updated == [True, True, False, False, True, True, False, False]
+
+
+def test_two_lidars_need_not_agree_on_the_order_of_their_stamps(drive):
+    mcl = started()
+    mcl.update(seen_by(drive.scans[1], "front"), drive.odometry[1])
+    mcl.update(seen_by(drive.scans[1], "rear", -20_000_000), drive.odometry[1])  # its scan came late
+    refused(mcl, ScanError, "scan at 0.970 s: time runs backwards, the last scan was at 0.980 s",
+            lambda mcl: mcl.update(seen_by(drive.scans[1], "rear", -30_000_000), drive.odometry[1]))
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_two_half_blind_lidars_track_like_one_that_sees_all(seed):
+    whole = Drive(seed=seed)
+    mcl = started(at=whole.true[0])
+    halves = {"front": slice(45, 135), "rear": np.r_[0:45, 135:180]}
+    off_m = []
+    for scan, odom, true in zip(whole.scans, whole.odometry, whole.true):
+        for late, (lidar, beams) in enumerate(halves.items()):
+            part = replace(scan, ranges_m=scan.ranges_m[beams], angles_rad=scan.angles_rad[beams])
+            estimate = mcl.update(seen_by(part, lidar, late), odom)
+            off_m.append(off(estimate.map_from_base, true)[0])
+    assert max(off_m) < 0.05
+
+
+def test_other_parameters_leave_what_the_filter_knows(drive):
+    mcl, twin = started(min_particles=300), started(min_particles=300)
+    for each in (mcl, twin):
+        drive.through(each, last=10)
+    mcl.reconfigure(parameters(min_particles=300))
+    same(drive.through(mcl, 10, 11)[0], drive.through(twin, 10, 11)[0])  # to the last bit, random numbers included
+    mcl.reconfigure(parameters(min_particles=700, max_particles=700, localized_max_position_sigma_m=1e-6,
+                               glass_prior=0.6, raycast_threads=2))
+    after = drive.through(mcl, 11, 12)[0]
+    assert len(after.particles) == 700
+    assert after.state == "UNCERTAIN"  # by the new limit
+    assert off(after.map_from_base, drive.true[11])[0] < 0.05
+    wall = np.array([0])
+    assert mcl.glass_map.chances(wall)[0] != twin.glass_map.chances(wall)[0]
+    np.testing.assert_array_equal(mcl.glass_map.occupancy() >= 0, drive_on(twin, drive, 11).glass_map.occupancy() >= 0)
+
+
+def drive_on(mcl, drive, index):
+    drive.through(mcl, index, index + 1)
+    return mcl
+
+
 def test_another_map_leaves_the_particles_where_they_are(drive):
     mcl = started(odom_alpha1=0.0, odom_alpha2=0.0, odom_alpha3=0.0, odom_alpha4=0.0)
     before = drive.through(mcl, last=3)[-1]
@@ -487,6 +571,35 @@ def test_a_scatter_covers_the_free_cells_and_nothing_else(seed):
     rows, _ = grid_map.cells(found[:, :2])
     assert np.mean(rows >= 30) == pytest.approx(25.0 / 325.0, abs=0.03)  # by area
     assert np.histogram(found[:, 2], 8, (-np.pi, np.pi))[0].min() > 200  # any heading
+
+
+CORNER = np.array([[0.2, 0.2], [2.0, 0.2], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.2, 2.0]])
+
+
+def test_in_an_area_particles_are_scattered_nowhere_else():
+    mcl = GlassMcl(parameters(max_particles=3000, min_particles=3000), MAPS[L_ROOM], np.random.default_rng(1))
+    mcl.scatter(CORNER)
+    estimate = mcl.update(Scan(0, np.full(4, np.nan), np.arange(4.0), 0.1, 10.0, np.zeros(3)), np.zeros(3))
+    found = estimate.particles[:, :2]
+    assert MAPS[L_ROOM].is_free(found).all()
+    half_cell_m = 0.5 * MAPS[L_ROOM].resolution_m
+    assert (found.min(axis=0) >= 0.2 - half_cell_m).all() and (found.max(axis=0) <= 2.0 + half_cell_m).all()
+    assert not np.any((found > 1.0 + half_cell_m).all(axis=1))  # the corner that is cut out
+    assert np.mean(found[:, 0] > 1.0) == pytest.approx(0.8 / (0.8 * 1.8 + 0.8), abs=0.05)  # by area
+
+
+@pytest.mark.parametrize("area, text", [
+    pytest.param(CORNER + 50.0, "the area has no free cell to put particles on", id="outside"),
+    pytest.param(CORNER[:2], "an area needs at least 3 corners of finite x, y, got [[0.2, 0.2], [2.0, 0.2]]",
+                 id="line"),
+    pytest.param(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, np.nan]]),
+                 "an area needs at least 3 corners of finite x, y, got [[0.0, 0.0], [1.0, 0.0], [1.0, nan]]",
+                 id="NaN")])
+def test_an_area_that_is_none_changes_nothing(drive, area, text):
+    mcl = started()
+    drive.through(mcl, last=3)
+    refused(mcl, ValueError, text, lambda mcl: mcl.scatter(area))
+    assert drive.errors(drive.through(mcl, 3, 8))[:, 0].max() < 0.05
 
 
 # -- what it says
@@ -633,6 +746,28 @@ def test_on_a_map_without_free_cells_nothing_can_be_scattered(drive, cell):
     assert drive.errors(drive.through(mcl, 3, 8))[:, 0].max() < 0.05  # it still knows where it was
 
 
+@pytest.mark.parametrize("cell", [100, -1])
+@pytest.mark.parametrize("start", ["placed", "placed vaguely", "searched for"])
+def test_a_robot_on_a_map_without_room_goes_on_by_odometry(drive, cell, start):
+    mcl = started()
+    if start == "searched for":
+        mcl.scatter()
+    mcl.set_map(GridMap(np.full((200, 200), cell, np.int8), 0.05, np.array([-2.0, -2.0, 0.0])))
+    if start == "placed vaguely":
+        mcl.set_pose(drive.true[0], np.diag([4.0, 4.0, 1.0]))
+    estimates = drive.through(mcl, last=20)
+    assert all(np.all(np.isfinite(estimate.map_from_base)) for estimate in estimates)
+    assert not any(estimate.state == "LOCALIZED" for estimate in estimates[5:])
+
+
+def test_a_search_goes_on_in_another_map():
+    drive = Drive(GLASS_ROOM, seed=2, centre=(3.0, 1.6), glass_share=0.3)
+    mcl = started(L_ROOM, drive.true[0])
+    mcl.scatter()
+    mcl.set_map(MAPS[GLASS_ROOM])
+    assert drive.errors(drive.through(mcl))[-5:, 0].max() < 0.1
+
+
 def test_on_a_map_without_walls_odometry_alone_leads():
     drive = Drive(way_share=0.0)
     empty = GridMap(np.zeros((100, 140), np.int8), 0.05, np.zeros(3))
@@ -763,6 +898,21 @@ def test_bearings_agree_with_a_drive_and_one_wrong_does_no_harm(drive):
             taken.angles_rad[1] += 1.0
             mcl.add_bearings(taken, TAGS, odom)
         assert off(mcl.update(scan, odom).map_from_base, true)[0] < 0.06
+
+
+def test_bearings_end_a_search_among_places_that_look_alike():
+    square = Building([(0, 0), (6, 0), (6, 6), (0, 6)])
+    true, rng = np.array([2.0, 1.5, 0.4]), np.random.default_rng(0)
+    mcl = GlassMcl(parameters(), square.grid_map(), np.random.default_rng(0))
+    mcl.scatter()
+    states = []
+    for second in range(4):
+        if second == 2:
+            mcl.add_bearings(tags_seen(true), TAGS, np.zeros(3))
+        estimate = mcl.update(square.scan(true, second * SECOND_NS, rng), np.zeros(3))
+        states.append(estimate.state)
+    assert states[:2] == ["GLOBAL_SEARCH"] * 2 and "GLOBAL_SEARCH" not in states[2:]
+    assert off(estimate.map_from_base, true)[0] < 0.1
 
 
 def test_bearings_that_cannot_be_used_are_refused_and_change_nothing(drive):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from glass_nav.localization.global_search import Candidates
+from glass_nav.localization.lost_watch import Verdict
 from glass_nav.localization.pose_estimate import PoseEstimate
 from glass_nav.localization.pose_quality import PoseQuality, QualityLimits
 
@@ -18,11 +20,27 @@ LIMITS = QualityLimits(localized_max_position_sigma_m=0.3, localized_max_heading
                        localized_min_cluster_share=0.8, uncertain_used_share=0.4, lost_used_share=0.2)
 
 
-def judged(used_shares, estimate=None):
+SURE = dict(fit=0.95, usual=0.95, behind=-np.inf, doubted=False, found=None, candidates=None)
+
+
+def candidates(count=3, fit=0.9):
+    weights = np.exp(-3.0 * np.arange(count))
+    poses = np.column_stack([2.0 + 3.0 * np.arange(count), np.ones(count), np.full(count, np.pi / 2)])
+    return Candidates(poses, weights / weights.sum(), fit, 3.0, False)
+
+
+def judgement(used_shares, estimate=None, **verdict):
     quality = PoseQuality(LIMITS)
     for used_share in used_shares:
         quality.observe(used_share)
+    if verdict:
+        quality.doubt(Verdict(**{**SURE, **verdict}))
     return quality.judge(best() if estimate is None else estimate)
+
+
+def judged(used_shares, estimate=None, **verdict):
+    told = judgement(used_shares, estimate, **verdict)
+    return told.state, told.reason
 
 
 def test_a_narrow_pose_that_explains_the_scan_is_localized():
@@ -76,16 +94,52 @@ def test_a_scan_without_answers_says_nothing():
     assert judged([0.9, np.nan, np.nan]) == judged([0.9])
 
 
-def test_a_search_goes_on_until_one_place_is_left():
-    quality = PoseQuality(LIMITS, searching=True)
-    quality.observe(0.1)
-    wide = best(share=0.3)
-    assert quality.judge(wide) == ("GLOBAL_SEARCH", "30% of the weight in one place, sigma 0.05 m, 1.1 deg")
-    quality.observe(1.0)
-    for _ in range(10):
-        quality.observe(1.0)
-    assert quality.judge(best())[0] == "LOCALIZED"
-    assert quality.judge(wide)[0] == "UNCERTAIN"  # found once, the search is over
+def test_scans_that_fit_better_elsewhere_make_a_pose_uncertain_and_lost_if_they_do_by_far():
+    better = dict(fit=0.8, doubted=True, candidates=candidates())
+    assert judged([0.9], behind=2.0, **better) == (
+        "UNCERTAIN", "the scans fit as well or better elsewhere, best at x 2.0 m, y 1.0 m; the map explains 90% of the "
+                     "answering beams; 100% of the weight in one place, sigma 0.05 m, 1.1 deg")
+    assert judged([0.9], behind=4.0, **better) == (
+        "LOST", "the scans fit as well or better elsewhere, best at x 2.0 m, y 1.0 m; the map explains 90% of the "
+                "answering beams")
+    assert judged([0.9], behind=-2.0, **better)[0] == "LOCALIZED"
+
+
+def test_scans_that_fit_here_as_they_used_to_are_not_called_elsewhere():
+    """In a corridor without a mark many places fit as well."""
+    assert judged([0.9], behind=4.0, candidates=candidates())[0] == "LOCALIZED"
+
+
+def test_scans_that_fit_far_worse_than_they_used_to_make_a_pose_uncertain():
+    state, reason = judged([0.9], fit=0.5, usual=0.9, doubted=True)
+    assert state == "UNCERTAIN" and reason.startswith("the scans fit by 50%, where they used to fit by 90%; ")
+    assert judged([0.9], fit=0.7, usual=0.9, doubted=True)[0] == "LOCALIZED"
+
+
+def test_a_search_says_how_many_places_are_possible():
+    quality = PoseQuality(LIMITS)
+    quality.observe(0.9)
+    quality.seek(candidates(2))
+    told = quality.judge(best(share=0.6))
+    assert told.state == "GLOBAL_SEARCH"
+    assert told.reason == "2 places are possible, the best at x 2.0 m, y 1.0 m, 90 deg, where scans fit by 90%"
+    assert told.reliability == 0.6
+    quality.seek(candidates(1))
+    assert quality.judge(best()).reason.startswith("one place is possible, the best at x 2.0 m")
+    quality.seek(Candidates(np.zeros((0, 3)), np.zeros(0), np.nan, 0.0, False))
+    assert quality.judge(best()).reason == "no scan has told anything yet"
+
+
+@pytest.mark.parametrize("worse", [dict(fit=0.6), dict(doubted=True, behind=3.0)], ids=["fit", "behind"])
+def test_each_sign_of_a_wrong_pose_makes_it_less_reliable(worse):
+    assert judgement([0.95], **worse).reliability < judgement([0.95], fit=0.95).reliability - 0.1
+
+
+def test_reliability_is_a_chance_and_falls_with_what_the_map_explains_and_with_other_clusters():
+    values = [judgement([used], best(share=share), fit=0.95).reliability for used, share in
+              [(1.0, 1.0), (0.7, 1.0), (0.3, 1.0), (0.3, 0.5), (0.0, 0.5)]]
+    assert all(0.0 <= value <= 1.0 for value in values) and values == sorted(values, reverse=True)
+    assert values[0] > 0.97 and judgement([]).reliability == 0.0
 
 
 @pytest.mark.parametrize("values, text", [

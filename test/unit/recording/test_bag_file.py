@@ -69,6 +69,49 @@ def test_scan_points_lie_on_the_walls_however_the_laser_is_mounted(room_bag, rol
         assert bag.distance_to_wall(se2.transform_points(true, step.scan.points_in_base())).max() < 1e-4
 
 
+def turning(step_s):
+    """Scans whose ranges are of one moment, and which say that their beams were step_s apart."""
+    return lambda index, fields: {**fields, "time_increment": step_s}
+
+
+@pytest.mark.parametrize("odometry", ["tf", "topic"])
+def test_a_lidar_that_turns_is_straightened_by_odometry(room_bag, odometry):
+    step_s = 0.001
+    bag = room_bag(scan_fields=turning(step_s), odometry=odometry)
+    recording = open_log(bag.write())
+    assert recording.notes[-1] == "ground truth from /ground_truth"
+    assert "the lidar turns for 59 ms: scans are straightened by odometry" in recording.notes
+    raw = steps(open_log(bag.path, LogOptions(deskew=False)))[5].scan
+    scan = steps(recording)[5].scan
+    # As the bag was written, the robot turns by 0.4 rad/s and drives at 0.5 m/s.
+    beam = 50
+    np.testing.assert_allclose(scan.as_measured(scan.ranges_m), raw.ranges_m, atol=1e-6)
+    then = bag.poses(np.array([bag.stamps_ns[5], bag.stamps_ns[5] + 50_000_000]))
+    laser = se2.compose(then[1], np.array(bag.laser))
+    bearing = raw.angles_rad[beam] + laser[2]
+    end = laser[:2] + raw.ranges_m[beam] * np.array([np.cos(bearing), np.sin(bearing)])
+    np.testing.assert_allclose(se2.transform_points(then[0], scan.points_in_base()[beam]), end, atol=1e-3)
+
+
+def test_a_time_that_no_lidar_takes_is_said_and_not_used(room_bag):
+    recording = open_log(room_bag(scan_fields=turning(1.0)).write())
+    assert ("scans are taken as of one moment: time_increment 1 s times 60 beams makes 59 s, the most for one turn is "
+            "0.15 s") in recording.notes
+    assert all(step.scan.origins_m is None for step in steps(recording))
+
+
+def test_two_lidars_on_one_topic_are_told_apart_by_frame(room_bag):
+    def rear_is_late(index, fields):
+        if index % 2 == 0:
+            return fields
+        return {**fields, "frame": "base_link", "stamp_ns": fields["stamp_ns"] - 150_000_000}
+
+    taken = steps(open_log(room_bag(scan_fields=rear_is_late).write()))
+    assert [step.scan.lidar for step in taken[:4]] == ["laser", "base_link", "laser", "base_link"]
+    assert taken[3].scan.stamp_ns < taken[2].scan.stamp_ns  # each by its own clock
+    np.testing.assert_allclose(taken[3].scan.base_from_laser, 0.0, atol=1e-12)
+
+
 def test_a_laser_on_its_side_is_refused_scan_by_scan(room_bag):
     bag = room_bag(laser_roll=np.pi / 2)
     assert {entry.reason for entry in open_log(bag.write())} == {"the laser is tilted by 90 degrees"}

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from io import BytesIO
 
 import numpy as np
 import pytest
 import rospy
-from geometry_msgs.msg import Pose, PoseArray, PoseWithCovarianceStamped, Quaternion, Transform, Vector3
+from geometry_msgs.msg import (Point32, PolygonStamped, Pose, PoseArray, PoseWithCovarianceStamped, Quaternion,
+                               Transform, Vector3)
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
@@ -139,7 +142,7 @@ def estimate(particles: int = 3) -> Estimate:
     poses = np.random.default_rng(0).uniform(-3, 3, (particles, 3))
     surface = SurfaceScan(np.array([1.1, np.inf, 2.0]), np.array([False, False, True]), True)
     return Estimate(1_000_000_001, np.array([1.0, 2.0, 0.5]), covariance, np.zeros(3), cases, surface, poses,
-                    "LOCALIZED", "for the test", 0.9, True)
+                    "LOCALIZED", "for the test", 0.9, True, 0.8)
 
 
 def test_the_pose_message_holds_the_covariance_at_x_y_and_yaw():
@@ -170,12 +173,37 @@ def test_an_estimate_with_nan_is_told_from_one_without(field):
 
 
 def test_the_status_says_the_state_as_number_and_word():
-    msg = sent_and_received(conversions.status_msg(7, "map", "LOST", "nothing fits", 0.1))
+    msg = sent_and_received(conversions.status_msg(7, "map", "LOST", "nothing fits", 0.1, 0.25))
     assert (msg.state, msg.state_name, msg.reason) == (LocalizationStatus.LOST, "LOST", "nothing fits")
+    assert (msg.used_share, msg.reliability) == pytest.approx((0.1, 0.25))
+
+
+def area(*corners, frame="/map"):
+    msg = PolygonStamped(header=Header(frame_id=frame))
+    msg.polygon.points = [Point32(x, y, 0.0) for x, y in corners]
+    return msg
+
+
+def test_an_area_is_its_corners():
+    corners = conversions.area_from_msg(area((0.0, 0.0), (2.0, 0.0), (2.0, 1.5)), "map")
+    assert corners.tolist() == [[0.0, 0.0], [2.0, 0.0], [2.0, 1.5]]
+
+
+@pytest.mark.parametrize("msg, text", [
+    (area((0.0, 0.0), (1.0, 0.0)), "an area needs at least 3 corners, got 2"),
+    (area(), "an area needs at least 3 corners, got 0"),
+    (area((0.0, 0.0), (1.0, 0.0), (math.nan, 1.0)), "the corners of an area must be finite, got [[0.0, 0.0], "
+                                                    "[1.0, 0.0], [nan, 1.0]]"),
+    (area((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), frame="odom"), "the area must be given in frame 'map', got 'odom'")])
+def test_an_area_that_is_none_is_refused(msg, text):
+    with pytest.raises(ValueError) as err:
+        conversions.area_from_msg(msg, "map")
+    assert str(err.value) == text
 
 
 def test_beam_cases_arrive_beam_by_beam():
     msg = sent_and_received(conversions.beam_cases_msg(Header(stamp=rospy.Time(3), frame_id="/laser"),
+                                                       conversions.scan_from_msg(scan_message(), upright()),
                                                        estimate().cases), BeamCasesMsg)
     assert list(msg.cases) == [1, 0, 4]
     assert (msg.header.frame_id, msg.header.stamp) == ("laser", rospy.Time(3))
@@ -231,9 +259,13 @@ def surface_scan(cut_m: "list[float]", trusted: bool = True) -> SurfaceScan:
     return SurfaceScan(np.where(np.isnan(cut), [1.0, np.inf, 2.0], cut), ~np.isnan(cut), trusted)
 
 
+def cut(msg: LaserScan, surface: SurfaceScan) -> LaserScan:
+    return conversions.surface_scan_msg(msg, conversions.scan_from_msg(msg, upright()), surface)
+
+
 def test_beams_are_cut_in_the_order_of_the_message_and_flagged():
     msg = scan_message(ranges=[1.0, np.inf, 2.0], intensities=[7.0, 8.0, 9.0], time_increment=0.001, scan_time=0.1)
-    out = sent_and_received(conversions.surface_scan_msg(msg, surface_scan([np.nan, 0.7, 1.5])))
+    out = sent_and_received(cut(msg, surface_scan([np.nan, 0.7, 1.5])))
     assert out.ranges == pytest.approx([1.0, 0.7, 1.5])
     assert list(out.intensities) == [0.0, 1.0, 1.0]
     assert out.header.stamp == msg.header.stamp and out.header.frame_id == "laser"
@@ -244,13 +276,13 @@ def test_beams_are_cut_in_the_order_of_the_message_and_flagged():
 def test_what_is_not_cut_stays_as_the_driver_wrote_it():
     wrote = [0.0, -np.inf, 11.0, np.nan, 0.05]  # no answer in old drivers' ways, too near
     surface = SurfaceScan(np.full(5, np.nan), np.zeros(5, bool), True)
-    out = conversions.surface_scan_msg(scan_message(ranges=wrote), surface)
+    out = cut(scan_message(ranges=wrote), surface)
     assert np.array_equal(out.ranges, wrote, equal_nan=True)
     assert out.intensities == [0.0] * 5
 
 
 def test_a_raw_scan_is_told_by_its_intensities():
-    out = conversions.surface_scan_msg(scan_message(), surface_scan([np.nan] * 3, trusted=False))
+    out = cut(scan_message(), surface_scan([np.nan] * 3, trusted=False))
     assert out.ranges == [1.0, np.inf, 2.0]
     assert out.intensities == [-1.0] * 3
 
@@ -258,7 +290,18 @@ def test_a_raw_scan_is_told_by_its_intensities():
 def test_the_frame_of_a_cut_scan_has_no_slash():
     msg = scan_message()
     msg.header.frame_id = "/laser"
-    assert conversions.surface_scan_msg(msg, surface_scan([np.nan] * 3)).header.frame_id == "laser"
+    assert cut(msg, surface_scan([np.nan] * 3)).header.frame_id == "laser"
+
+
+def test_a_cut_of_a_straightened_scan_is_told_from_where_its_beam_began():
+    msg = scan_message(ranges=[1.0, np.inf, 2.0])
+    began = np.array([[0.0, 0.0], [0.3, 0.4], [0.0, 0.0]])  # the middle beam, straight ahead from beside its way
+    scan = replace(conversions.scan_from_msg(msg, upright()), origins_m=began)
+    out = conversions.surface_scan_msg(msg, scan, surface_scan([np.nan, 1.1, np.nan]))
+    assert out.ranges == pytest.approx([1.0, np.hypot(0.8, 0.4), 2.0])
+    cases = replace(estimate().cases, expected_m=np.array([1.0, np.nan, 2.0]))
+    told = conversions.beam_cases_msg(msg.header, scan, cases)
+    assert told.expected == pytest.approx([1.0, np.nan, 2.0], nan_ok=True)
 
 
 # -- maps

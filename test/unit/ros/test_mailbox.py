@@ -8,7 +8,7 @@ from typing import List
 
 import pytest
 
-from glass_nav.ros.mailbox import Errand, Mailbox, WaitingScans
+from glass_nav.ros.mailbox import Errand, Mailbox, ScanCounts, WaitingScans
 
 
 def test_items_come_out_once_in_their_order_by_lane():
@@ -106,6 +106,28 @@ def test_no_more_scans_wait_than_there_is_room_for():
     assert len(scans) == 3
     assert scans.counts.dropped_no_transform == 997
     assert scans.take_ready(lambda scan: True, 0.0)[0] == 999
+
+
+def test_one_lane_can_be_emptied_alone():
+    box = Mailbox(scans=10, commands=10)
+    for scan in (1, 2):
+        box.put("scans", scan)
+    box.put("commands", "stop")
+    assert box.take_now("scans") == [1, 2] and box.take_now("scans") == []
+    assert box.take(0.0) == {"scans": [], "commands": ["stop"]}
+
+
+def test_two_lidars_are_counted_together():
+    counts = ScanCounts()
+    front, rear = (WaitingScans(2, 1.0, counts) for _ in range(2))
+    for stamp in (10, 20, 30):
+        front.add(stamp, stamp, now_s=0.0)
+    rear.add(10, 10, now_s=0.0)
+    assert (counts.waiting, counts.dropped_no_transform) == (3, 1)
+    assert front.take_ready(stamps(30), 0.1) == (30, [])
+    assert (counts.waiting, counts.superseded) == (1, 1)
+    rear.restart()
+    assert (counts.waiting, counts.dropped_no_transform) == (0, 2)
 
 
 def test_after_a_restart_earlier_stamps_are_taken():

@@ -11,7 +11,8 @@ import yaml
 
 from glass_nav import amcl_parameters
 from glass_nav.params import as_mapping
-from glass_nav.ros.params import LocalizationParams, ParamError, localization_params
+from glass_nav.ros.params import (LocalizationParams, ParamError, changeable, changed, localization_params,
+                                  without_unknown)
 
 REPO = Path(__file__).parents[3]
 
@@ -92,3 +93,35 @@ def test_the_start_is_given_as_pose_and_covariance():
     p, _ = localization_params({"initial_pose_x": 1, "initial_pose_a": 0.5, "initial_cov_yy": 4.0}, "/n")
     assert p.start.pose.tolist() == [1.0, 0.0, 0.5]
     assert np.diag(p.start.covariance)[1] == 4.0
+
+
+def test_names_that_nobody_knows_are_taken_off_and_said():
+    ours, lines = without_unknown({"receive_map_topic": True, "max_particles": 5, "laser_z_short": 0.1}, "/amcl")
+    assert ours == {"max_particles": 5, "laser_z_short": 0.1}
+    assert lines == ["/amcl: unknown parameter ~receive_map_topic; did you mean ~use_map_topic?; not used, as by amcl"]
+
+
+def test_all_parameters_of_the_filter_may_change_and_no_frame():
+    p = LocalizationParams()
+    values = changeable(p)
+    assert set(as_mapping(p.mcl)) <= set(values)
+    assert {"transform_tolerance", "tf_broadcast"} <= set(values)
+    assert not {"odom_frame_id", "scan_topics", "random_seed", "initial_pose_x"} & set(values)
+
+
+def test_changed_values_reach_their_struct_and_the_rest_stays():
+    before, _ = localization_params({"odom_frame_id": "o", "max_particles": 100}, "/n")
+    after = changed(before, {"laser_z_hit": 0.5, "transform_tolerance": 0.3}, "/n")
+    assert (after.mcl.mixture.laser_z_hit, after.node.transform_tolerance) == (0.5, 0.3)
+    assert (after.node.odom_frame_id, after.mcl.count) == ("o", before.mcl.count)
+    with pytest.raises(ParamError, match="/n: ~laser_z_hit must be > 0, got 0.0"):
+        changed(before, {"laser_z_hit": 0.0}, "/n")
+
+
+@pytest.mark.parametrize("topics, text", [(["a", "a"], "~scan_topics must name each topic once, got ['a', 'a']"),
+                                          (["a", ""], "~scan_topics must name each topic once, got ['a', '']"),
+                                          ("a", "~scan_topics must be a list of str, got 'a'")])
+def test_topics_of_lidars_are_names(topics, text):
+    with pytest.raises(ParamError) as error:
+        localization_params({"scan_topics": topics}, "/n")
+    assert str(error.value) == f"/n: {text}"

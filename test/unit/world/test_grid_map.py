@@ -23,6 +23,16 @@ def test_a_cell_is_where_rows_times_resolution_put_it():
     np.testing.assert_allclose(turned.centres(np.array(2), np.array(1)), [10.0 - 1.25, 20.0 + 0.75])
 
 
+def test_a_digest_tells_maps_apart_and_is_the_same_for_the_same_one():
+    cells = np.zeros((3, 4))
+    other = cells.copy()
+    other[1, 2] = 100
+    maps = [grid(cells), grid(other), grid(cells.T), grid(cells, (1.0, 0.0, 0.0)), grid(cells, (0.0, 0.0, 0.1)),
+            grid(cells, resolution_m=0.05)]
+    assert len({each.digest for each in maps}) == len(maps)
+    assert grid(cells, (-0.0, 0.0, 1e-9), float(np.float32(0.1))).digest == grid(cells).digest  # by a message
+
+
 @pytest.mark.parametrize("origin", ORIGINS)
 def test_the_centre_of_a_cell_lies_in_that_cell(origin):
     rows, columns = np.indices((7, 5))

@@ -1,0 +1,116 @@
+"""Drives with the truth beside, recorded and simulated, and what may befall a robot on them.
+
+A track is a map and frames of scan, odometry and true pose. Names: those of the logs in GLASS_NAV_DATA (default
+../shared/data beside the repository), and those of the buildings in maps/.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import Iterator, List, NamedTuple, Tuple
+
+import numpy as np
+
+import drives
+import replay_logs
+from glass_nav.geometry import angles, se2
+from glass_nav.recording.recording import Refusal
+from glass_nav.sensing.scan import Scan
+from glass_nav.world.grid_map import GridMap
+
+LOGS = tuple(replay_logs.PEERS)
+RIGHT_M, RIGHT_RAD = 0.7, np.radians(20.0)  # the references of the Wean logs are good to 0.3 m
+
+
+class Moment(NamedTuple):
+    """One scan and where the robot was."""
+    scan: Scan
+    odom_from_base: np.ndarray  # (3,)
+    map_from_base: np.ndarray   # (3,) the truth
+
+
+class Track(NamedTuple):
+    """A robot on its way."""
+    name: str
+    grid_map: GridMap
+    moments: List[Moment]
+
+
+def names() -> List[str]:
+    """All tracks there are."""
+    return [*LOGS, *drives.buildings()]
+
+
+@lru_cache(maxsize=4)
+def load(name: str, seed: int) -> Track:
+    """The track of that name; of a building the drive, its lidar and its noise go with the seed."""
+    if name not in LOGS:
+        presets = drives.lidars()
+        grid_map, frames = drives.drive(name, presets[seed % len(presets)], seed)
+        return Track(name, grid_map, [Moment(frame.scan, frame.odom_from_base, frame.map_from_base)
+                                      for frame in frames])
+    recording, grid_map = replay_logs.load(name, False)
+    truth = recording.ground_truth
+    assert truth is not None
+    return Track(name, grid_map, [Moment(entry.scan, entry.odom_from_base, truth.at(np.int64(entry.scan.stamp_ns)))
+                                  for entry in recording if not isinstance(entry, Refusal)])
+
+
+def start_of(track: Track, rng: np.random.Generator, share: float = 1.0 / 3.0) -> int:
+    """A moment of the first part of the track."""
+    return int(rng.integers(max(1, int(share * len(track.moments)))))
+
+
+def carried_away(track: Track, rng: np.random.Generator, before_m: float,
+                 least_m: float = 2.0) -> Tuple[List[Moment], int]:
+    """A drive in which the robot is carried to another place and notices nothing, and the moment it is set down.
+
+    The odometry goes on as if nothing had happened; so do the stamps.
+
+    Args:
+        track: the drive.
+        rng: source of all randomness.
+        before_m: way before.
+        least_m: how far it is carried, or it is turned by more than half a right angle.
+    """
+    way = ways(track.moments)
+    half = [index for index in range(len(way)) if way[index] >= before_m]
+    lifted = int(rng.choice(half[:max(1, len(half) // 2)]))
+    begin = int(np.searchsorted(way, way[lifted] - before_m))
+    here = track.moments[lifted].map_from_base
+    there = [index for index, moment in enumerate(track.moments[:int(0.8 * len(way))])
+             if not _near(moment.map_from_base, here, least_m, np.radians(45.0))]
+    down = int(rng.choice(there))
+    ahead = track.moments[lifted]
+    shift_ns = ahead.scan.stamp_ns - track.moments[down].scan.stamp_ns + 1
+    odom_from_odom = se2.compose(ahead.odom_from_base, se2.inverse(track.moments[down].odom_from_base))
+    after = [Moment(replace(moment.scan, stamp_ns=moment.scan.stamp_ns + shift_ns),
+                    se2.compose(odom_from_odom, moment.odom_from_base), moment.map_from_base)
+             for moment in track.moments[down:]]
+    return track.moments[begin:lifted + 1] + after, lifted + 1 - begin
+
+
+def ways(moments: List[Moment]) -> np.ndarray:
+    """(N,) way driven [m] up to each moment."""
+    points = np.array([moment.map_from_base[:2] for moment in moments])
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+
+
+def is_right(map_from_base: np.ndarray, truth: np.ndarray) -> bool:
+    """The pose is that place."""
+    return _near(map_from_base, truth, RIGHT_M, RIGHT_RAD)
+
+
+def moments_of(track: Track, start: int, most_m: float) -> Iterator[Tuple[float, Moment]]:
+    """Way since the start [m] and moment, up to so much way."""
+    way = ways(track.moments[start:])
+    for way_m, moment in zip(way, track.moments[start:]):
+        if way_m > most_m:
+            return
+        yield float(way_m), moment
+
+
+def _near(pose: np.ndarray, other: np.ndarray, reach_m: float, reach_rad: float) -> bool:
+    off = pose - other
+    return bool(np.hypot(off[0], off[1]) < reach_m and abs(angles.wrap(off[2])) < reach_rad)
