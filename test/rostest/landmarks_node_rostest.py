@@ -26,7 +26,7 @@ from glass_nav.sensing.bearings import LandmarkBearing
 from glass_nav.world import landmark_file
 
 TURN_S = 60.0  # by the wall clock: a turn takes about as long in simulated time, which runs faster
-LISTENERS = 2  # to the bearings: node and this test
+LISTENERS = 3  # to the bearings: node, localization, and this test
 NEAR_M, NEAR_RAD = 0.3, 0.05
 LANDMARKS = landmark_file.load(REPO / "maps" / "glass_office" / "landmarks.yaml")
 
@@ -116,6 +116,9 @@ class Landmarks(unittest.TestCase):
         count, exact = len(self.starts), self.see_now()
         self.assertTrue(wait_until(lambda: stamp_ns(self.fixes.last) == stamp_ns(exact), 10.0), "no fix")
         self.assertNear(self.fixes.last, self.true_pose(stamp_ns(self.fixes.last)), 0.05)
+        self.assertTrue(wait_until(lambda: stamp_ns(self.poses.last) >= stamp_ns(self.fixes.last), 10.0),
+                        "the localization, which has the landmarks too, does not weigh its particles by them")
+        self.assertNear(self.poses.last, self.true_pose(stamp_ns(self.poses.last)), 0.15)
         self.assertEqual(len(self.starts), count)
         answer = self.send()
         self.assertEqual((answer.success, answer.message), (True, "sent to initialpose"))
@@ -146,10 +149,12 @@ class Landmarks(unittest.TestCase):
         strange.ids = ["A2", "A3", "A4", "Z9"]
         self.publisher.publish(strange)
         self.assertTrue(wait_until(lambda: self.lines.having("bearing ignored: landmark 'Z9' is not in"), 10.0))
+        self.assertTrue(wait_until(lambda: self.lines.having("bearings to landmarks that are not in"), 10.0))
         short = self.see()
         short.angles = short.angles[:2]
         self.publisher.publish(short)
         self.assertTrue(wait_until(lambda: self.lines.having("must be as many, got 4, 4, 2 and 4"), 10.0))
+        self.assertTrue(wait_until(lambda: self.lines.having("bearings not used: ids, stamps"), 10.0))
         elsewhere = self.see()
         elsewhere.header.frame_id = "nowhere"
         self.publisher.publish(elsewhere)
