@@ -362,6 +362,45 @@ def test_a_scan_without_answers_leaves_a_search_where_it_is():
     assert "possible" in seen.reason
 
 
+def test_a_robot_that_was_carried_away_says_so_and_is_found_again():
+    drive = Drive(seed=3, steps=90)
+    mcl = started(at=drive.true[0], seed=3)
+    drive.through(mcl, last=20)
+    moved = se2.compose(drive.odometry[19], se2.inverse(drive.odometry[40]))  # what odometry did not notice
+    estimates = [mcl.update(scan, se2.compose(moved, odom))
+                 for scan, odom in zip(drive.scans[40:], drive.odometry[40:])]
+    way_m, _ = drive.errors(estimates).T
+    left = next(index for index, estimate in enumerate(estimates) if estimate.state != "LOCALIZED")
+    assert left < 8 and way_m[0] > 0.7
+    assert "the scans fit" in estimates[left].reason
+    assert estimates[left].reliability < 0.9
+    assert estimates[-1].state == "LOCALIZED" and way_m[-1] < 0.05
+
+
+def test_a_start_in_the_wrong_place_is_put_right():
+    drive = Drive(seed=4, steps=40)
+    estimates = drive.through(started(at=drive.true[0] + [1.0, 0.8, 2.0], seed=4))
+    assert any(estimate.state in ("UNCERTAIN", "LOST") for estimate in estimates[:6])
+    assert drive.errors(estimates)[-1, 0] < 0.05 and estimates[-1].state == "LOCALIZED"
+
+
+@pytest.mark.parametrize("forced", [False, True], ids=["no update due", "an update with every scan"])
+def test_a_robot_that_stands_for_five_minutes_stays_where_it_is(forced):
+    """A scan a second; odometry trembles by half a millimetre."""
+    rng = np.random.default_rng(5)
+    true = loop_drive(1)[0]
+    mcl = started(at=true, seed=5)
+    told = []
+    for second in range(300):
+        if forced:
+            mcl.request_update()
+        told.append(mcl.update(L_ROOM.scan(true, second * SECOND_NS, rng), rng.normal(0.0, 0.0005, 3)))
+    assert sum(estimate.updated for estimate in told) == (300 if forced else 1)
+    drift_m, _ = np.array([off(estimate.map_from_base, told[10].map_from_base) for estimate in told[10:]]).T
+    assert drift_m.max() < 0.01
+    assert off(told[-1].map_from_base, true)[0] < 0.02
+
+
 # -- what happens between and beside good scans
 
 @pytest.mark.parametrize("seed", range(3))
