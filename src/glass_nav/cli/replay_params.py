@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, List, Tuple
+from typing import Any, Dict, List, Tuple
 
 from glass_nav import amcl_parameters, params
 from glass_nav.localization.glass_mcl_params import GlassMclParams
@@ -18,7 +18,7 @@ from glass_nav.sensing.deskew import Deskew
 # Of localization_node, beside AMCL's: without a meaning for the replay of a log.
 NODE_ONLY = frozenset(["transform_wait_s", "random_seed", "glass_map_period_s", "scan_topics",
                        "publish_tf_before_localized", "start_without_guess", "pose_file", "pose_file_max_age_s",
-                       "pose_file_max_speed_m_s"])
+                       "pose_file_max_speed_m_s", "landmark_file"])
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,17 @@ def load(path: Path) -> "Tuple[ReplayParams, List[str]]":
     Raises:
         ParamError: no such file, no flat yaml, or a parameter that params.load() refuses.
     """
+    mapping = read_mapping(path)
+    ours, unused = amcl_parameters.without_unused(mapping, ReplayParams, NODE_ONLY)
+    return params.load(ReplayParams, amcl_parameters.adapted(ours, ReplayParams), str(path)), unused
+
+
+def read_mapping(path: Path) -> Dict[str, Any]:
+    """Names and values of a yaml file.
+
+    Raises:
+        ParamError: no such file, or no flat yaml.
+    """
     import yaml
 
     try:
@@ -56,5 +67,4 @@ def load(path: Path) -> "Tuple[ReplayParams, List[str]]":
         mapping = {}
     if not isinstance(mapping, dict):
         raise ParamError(f"{path}: must hold names and values, got {type(mapping).__name__}")
-    ours, unused = amcl_parameters.without_unused(mapping, ReplayParams, NODE_ONLY)
-    return params.load(ReplayParams, amcl_parameters.adapted(ours, ReplayParams), str(path)), unused
+    return mapping

@@ -137,6 +137,7 @@ def _bounds(result: ReplayResult) -> Tuple[np.ndarray, np.ndarray]:
 
 
 def draw_map(axes: Any, grid: MapImage, low: np.ndarray, high: np.ndarray) -> None:
+    """The part of a map between two corners (2,) [m], behind everything else."""
     from matplotlib.transforms import Affine2D
 
     corners = np.array([[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])])

@@ -8,14 +8,14 @@ the beams that are understood. GlassMcl.update() reads as the document does.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Dict, Optional, Set, Tuple
+from typing import Dict, List, Optional, Set, Tuple
 
 import numpy as np
 
 from glass_nav.geometry import angles, polygons, se2
-from glass_nav.localization import (beam_cases, beam_weights, glass_map, global_search, motion, pose_estimate,
-                                    pose_quality, preliminary_samples, proposal, reference_ranges, resampling,
-                                    scan_alignment, surface_scan)
+from glass_nav.localization import (beam_cases, beam_weights, bearing_weights, glass_map, global_search, motion,
+                                    pose_estimate, pose_quality, preliminary_samples, proposal, reference_ranges,
+                                    resampling, scan_alignment, surface_scan)
 from glass_nav.localization.beam_cases import BeamCases
 from glass_nav.localization.glass_map import GlassMap
 from glass_nav.localization.glass_mcl_params import GlassMclParams
@@ -26,12 +26,14 @@ from glass_nav.localization.reference_ranges import LEAST_COS, ReferenceRanges
 from glass_nav.localization.scan_alignment import Alignment
 from glass_nav.localization.scan_anchor import ScanAnchor
 from glass_nav.localization.surface_scan import SurfaceScan
+from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan, ScanError
 from glass_nav.sensing.scan_matcher import ScanMatcher
 from glass_nav.sensing.wall_thickness import wall_thickness
 from glass_nav.world.grid_map import GridMap
+from glass_nav.world.landmark_map import LandmarkMap
 
 _WIDEST_PLACE = np.array([1.0, 1.0, 0.7])  # deviations [m, m, rad] that preliminary samples can cover
 _LEAST_ENDS = 20       # of beams of known case that a pose is refined by
@@ -82,6 +84,7 @@ class GlassMcl:
         self._quality = pose_quality.PoseQuality(params.quality)
         self._up_to_date: Set[str] = set()                # lidars that had an update since the robot moved
         self._updates = 0
+        self._bearings: List[Tuple[LandmarkBearings, LandmarkMap, np.ndarray]] = []  # odom_from_base at their stamp
 
     def set_map(self, grid_map: GridMap) -> None:
         """Another map; the particles stay where they are. A search goes on in all of it."""
@@ -169,6 +172,26 @@ class GlassMcl:
         """The next scan of each lidar is used even if the robot did not move (service request_nomotion_update)."""
         self._up_to_date = set()
 
+    def add_bearings(self, bearings: LandmarkBearings, landmarks: LandmarkMap, odom_from_base: np.ndarray) -> None:
+        """Evidence for the next update, which the next scan makes even if the robot does not move.
+
+        Particles are weighed by it, and so are the places of a search once a scan was seen there.
+
+        Args:
+            bearings: to landmarks.
+            landmarks: that they are of.
+            odom_from_base: (3,) odometry's pose at the stamp of the bearings.
+
+        Raises:
+            UnknownLandmark, ValueError: an id that is not on the map, odometry that is not finite; nothing is changed.
+        """
+        landmarks.numbers(bearings.ids)
+        odom_from_base = np.array(odom_from_base, float)
+        if odom_from_base.shape != (3,) or not np.all(np.isfinite(odom_from_base)):
+            raise ValueError(f"odometry of bearings must be finite x, y, yaw, got {odom_from_base}")
+        self._bearings.append((bearings, landmarks, odom_from_base))
+        self.request_update()
+
     def update(self, scan: Scan, odom_from_base: np.ndarray) -> Estimate:
         """One scan and the odometry at its stamp -> pose.
 
@@ -198,7 +221,11 @@ class GlassMcl:
 
     def _track(self, scan: Scan, odom_from_base: np.ndarray) -> BeamCases:
         """The particles follow the robot; if the scans say that it is elsewhere, they go there."""
-        cases = self._place(scan, self._predict(odom_from_base), odom_from_base)
+        predicted = self._predict(odom_from_base)
+        for bearings, landmarks in self._bearings_from(odom_from_base):
+            log_w = bearing_weights.log_weights(predicted, bearings, landmarks, self._params.bearings)
+            self._weights = resampling.tempered(np.log(self._weights) + log_w)
+        cases = self._place(scan, predicted, odom_from_base)
         verdict = self._watch.observe(scan, odom_from_base, self._best.map_from_base)
         self._quality.doubt(verdict)
         if verdict.found is not None:
@@ -215,7 +242,7 @@ class GlassMcl:
     def _seek(self, scan: Scan, odom_from_base: np.ndarray) -> BeamCases:
         """The pose is not known: follow all places where it may be. The particles are those places."""
         assert self._search is not None
-        candidates = self._search.update(scan, odom_from_base)
+        candidates = self._search.update(scan, odom_from_base, self._bearings_from(odom_from_base))
         self._quality.seek(candidates)
         if candidates.found:
             return self._settle(scan, odom_from_base, candidates.poses[0], candidates.fit)
@@ -270,6 +297,12 @@ class GlassMcl:
         off = self._centres() - point
         least = np.eye(2) * self._grid_map.resolution_m**2
         return np.einsum("hwi,ij,hwj->hw", off, np.linalg.inv(covariance + least), off) <= _REACH**2
+
+    def _bearings_from(self, odom_from_base: np.ndarray) -> List[Tuple[LandmarkBearings, LandmarkMap]]:
+        """The bearings added since the last update, carried along by odometry to now; they are used once."""
+        added, self._bearings = self._bearings, []
+        return [(bearings.seen_from(bearings.stamp_ns, se2.compose(se2.inverse(odom_from_base), odom_from_then)),
+                 landmarks) for bearings, landmarks, odom_from_then in added]
 
     def _correct(self, scan: Scan, predicted: np.ndarray, odom_from_base: np.ndarray) -> BeamCases:
         """The scan places and weighs the particles, by the beams whose case is known."""
@@ -421,6 +454,7 @@ class GlassMcl:
         self._odom_from_base = None
         self._stamps_ns = {}
         self._search = None
+        self._bearings = []
         self._anchor = ScanAnchor(self._field)
         self._watch = self._new_watch()
         self._quality = pose_quality.PoseQuality(self._params.quality)

@@ -8,6 +8,7 @@ import numpy as np
 
 from glass_nav.localization.beam_cases import CaseVote
 from glass_nav.localization.beam_weights import BeamMixture
+from glass_nav.localization.bearing_weights import BearingMixture
 from glass_nav.localization.glass_map import GlassEvidence
 from glass_nav.localization.global_search import SearchParams
 from glass_nav.localization.motion import OdometryNoise
@@ -64,3 +65,4 @@ class GlassMclParams:
     mixture: BeamMixture = field(default_factory=BeamMixture)
     quality: QualityLimits = field(default_factory=QualityLimits)
     search: SearchParams = field(default_factory=SearchParams)
+    bearings: BearingMixture = field(default_factory=BearingMixture)

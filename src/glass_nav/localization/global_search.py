@@ -15,15 +15,18 @@ K candidates, B beams.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Optional
+from typing import Dict, Optional, Sequence, Tuple
 
 import numpy as np
 
 from glass_nav.geometry import angles, se2
-from glass_nav.localization import beam_weights, motion, scan_alignment
+from glass_nav.localization import beam_weights, bearing_weights, motion, scan_alignment
+from glass_nav.localization.bearing_weights import BearingMixture
+from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.scan import Scan
 from glass_nav.sensing.scan_matcher import ScanMatcher
+from glass_nav.world.landmark_map import LandmarkMap
 
 _BEAMS = 60
 _LEAST_BEAMS = 10          # fewer tell nothing about where they were taken
@@ -43,6 +46,8 @@ _STEP_NOISE = np.array([[0.03, 0.1, 0.0],   # deviations of odometry: a base, pe
                         [0.02, 0.03, 0.1]])
 _BEAM_VARIANCE = 0.03      # [m2] of a beam of 60 that are worth 20 independent ones of 0.1 m
 _MOST_PENALTY = 1.0        # nats for a step that odometry does not explain: wheels slip
+# Flat: candidates are right to decimetres, and one bearing, 5.4 nats at most, may be a mirror's: it needs a second.
+_BEARINGS = BearingMixture(bearing_wrong_share=0.1, bearing_sigma_floor=0.1)
 
 
 @dataclass(frozen=True)
@@ -95,17 +100,21 @@ class GlobalSearch:
         self._noise = _STEP_NOISE[:, 0]  # (3,) deviations of the last step
         self._looked = False
         self._way_m = 0.0              # since the last look everywhere
+        self._driven_m = 0.0           # since the first scan
+        self._told_at_m: Dict[str, float] = {}  # id of a landmark -> way driven when its bearing last counted
 
     def decide_by(self, params: SearchParams) -> None:
         """Other limits from the next scan on."""
         self._params = params
 
-    def update(self, scan: Scan, odom_from_base: np.ndarray) -> Candidates:
+    def update(self, scan: Scan, odom_from_base: np.ndarray,
+               bearings: Sequence[Tuple[LandmarkBearings, LandmarkMap]] = ()) -> Candidates:
         """One scan more; a scan with too few answers moves the candidates only.
 
         Args:
             scan: a lidar's turn.
             odom_from_base: (3,) odometry at its stamp.
+            bearings: told with regard to where the robot is at the scan, with the landmarks that they are of.
         """
         view = self._move(scan, odom_from_base)
         beams = beam_weights.choose(scan.answered, _BEAMS)
@@ -123,6 +132,9 @@ class GlobalSearch:
                 start = self._evidence.max() - self._params.search_margin
                 self._append(found, start + _NATS_OF_A_FULL_FIT * (fit - fit.max()))
                 self._keep_distinct()
+        if len(self._poses):  # there are none before a scan proposes them
+            for taken, landmarks in bearings:
+                self._weigh_by(taken, landmarks)
         return self._candidates()
 
     def add(self, map_from_base: np.ndarray, head_start: float) -> None:
@@ -137,6 +149,7 @@ class GlobalSearch:
         step = se2.compose(se2.inverse(before), odom_from_base)
         way_m, turn_rad = motion.travelled(step)
         self._way_m += way_m
+        self._driven_m += way_m
         self._noise = _STEP_NOISE @ np.array([1.0, way_m, turn_rad])
         self._poses = se2.compose(self._poses, step)
         # What a turn brings into view is what the lidar does not see already.
@@ -155,6 +168,15 @@ class GlobalSearch:
         self._evidence = self._evidence + view * _NATS_OF_A_FULL_FIT * fit - penalty
         self._fit_sum = self._fit_sum + view * fit
         self._views = self._views + view
+        self._keep_distinct()
+
+    def _weigh_by(self, bearings: LandmarkBearings, landmarks: LandmarkMap) -> None:
+        """Let bearings speak for each candidate, those of one landmark once in a view: a mirror stays where it is."""
+        new = np.array([self._driven_m - self._told_at_m.get(name, -_VIEW_M) >= _VIEW_M for name in bearings.ids],
+                       bool)
+        bearings = bearings.subset(new)
+        self._told_at_m.update(dict.fromkeys(bearings.ids, self._driven_m))
+        self._evidence = self._evidence + bearing_weights.log_weights(self._poses, bearings, landmarks, _BEARINGS)
         self._keep_distinct()
 
     def _best_fits_poorly(self, points: np.ndarray) -> bool:

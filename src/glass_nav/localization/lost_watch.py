@@ -120,11 +120,12 @@ class LostWatch:
             log_w = np.log(candidates.weights)
         elsewhere = log_w[~here].max() if not here.all() else -np.inf
         behind = float(elsewhere - log_w[here].max()) if here.any() else np.inf
+        best_here = behind < -self._params.search_margin or (behind <= 0.0 and self._search_way_m > _SETTLED_M)
         calm = self._calm_m > _CALM_M and behind < self._params.search_margin
-        if behind < -self._params.search_margin or (behind <= 0.0 and not doubted) or calm:
+        if best_here and doubted:  # that is how scans fit here, until they fit better again
+            self._usual, self._learnt_m = self._fit, _KNOWN_M
+        if best_here or calm or (behind <= 0.0 and not doubted):
             self._search = None
-        elif behind <= 0.0 and self._search_way_m > _SETTLED_M:
-            self._search, self._usual = None, self._fit
         found = candidates.poses[0] if candidates.found and not here[0] else None
         return Verdict(self._fit, self._usual, behind, doubted, found, candidates)
 

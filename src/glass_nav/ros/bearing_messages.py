@@ -9,6 +9,8 @@ from glass_nav.ros import conversions
 from glass_nav.ros.conversions import Mounting
 from glass_nav.sensing.bearings import LandmarkBearing
 
+LONGEST_TURN_S = 300.0  # of a sensor: a node that receives bearings remembers odometry for so long
+
 
 def bearings_from_msg(msg: LandmarkBearingsMsg, mounting: Mounting) -> List[LandmarkBearing]:
     """The bearings by ascending stamp, angles as seen from above. ValueError if the message makes no sense.

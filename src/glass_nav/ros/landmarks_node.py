@@ -47,7 +47,6 @@ from glass_nav.world import landmark_file
 from glass_nav.world.landmark_map import LandmarkMap
 
 METHODS = ("least_squares", "document")
-LONGEST_TURN_S = 300.0  # of a sensor: odometry is remembered for so long
 TIME_JUMP_S = 0.5      # a clock that goes back by less is noise between machines
 ERRAND_TIMEOUT_S = 10.0
 
@@ -120,7 +119,7 @@ class LandmarksNode:
         self._sent_ns = self._rescued_ns = 0  # stamps of fixes
         self._now_s = rospy.get_time()
 
-        self._tf = tf2_ros.Buffer(rospy.Duration(LONGEST_TURN_S))
+        self._tf = tf2_ros.Buffer(rospy.Duration(bearing_messages.LONGEST_TURN_S))
         self._poses = rospy.Publisher("~pose", PoseWithCovarianceStamped, queue_size=5)
         self._initial_poses = rospy.Publisher("initialpose", PoseWithCovarianceStamped, queue_size=5)
         self._markers = rospy.Publisher("~markers", MarkerArray, queue_size=1, latch=True)

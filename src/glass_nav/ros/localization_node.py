@@ -4,7 +4,7 @@ Wiring only; the answer comes from GlassMcl. Callbacks store, one loop works: no
 
 Subscribes: scan (LaserScan; or each of ~scan_topics), initialpose (PoseWithCovarianceStamped), map (OccupancyGrid, if
     ~use_map_topic), global_localization_area (PolygonStamped in the map's frame: the robot is searched for in it),
-    tf odom <- base <- laser.
+    landmark_bearings (LandmarkBearings, if ~landmark_file is given), tf odom <- base <- laser.
 Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseArray, latched), tf map -> odom,
     ~status (LocalizationStatus, latched), ~beam_cases (BeamCases), /diagnostics;
     scan_surfaces (LaserScan): the scan for a costmap, with each beam cut at the first surface of the map that it
@@ -41,6 +41,8 @@ from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from glass_nav.localization.glass_mcl import Estimate, GlassMcl
 from glass_nav.ros import conversions, endings, params, reconfigure, starts
+from glass_nav.ros.bearing_input import BearingInput
+from glass_nav.ros.bearing_messages import LONGEST_TURN_S
 from glass_nav.ros.diagnostics import Diagnostics, Situation
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Errand, Mailbox
@@ -51,6 +53,7 @@ from glass_nav.ros.reconfigure import ReconfigureServer
 from glass_nav.ros.scan_input import STALE_SCANS, ScanInput
 from glass_nav.ros.starts import Starts
 from glass_nav.sensing.scan import Scan, ScanError
+from glass_nav.world import landmark_file
 from glass_nav.world.grid_map import GridMap
 
 TIME_JUMP_S = 0.5       # a clock that goes back by less is noise between machines
@@ -79,8 +82,9 @@ class LocalizationNode:
         self._simulated = bool(rospy.get_param("/use_sim_time", False))
         self._next_report_s = 0.0  # by the monotonic clock
 
-        self._tf = tf2_ros.Buffer()
+        self._tf = tf2_ros.Buffer(rospy.Duration(LONGEST_TURN_S) if p.node.landmark_file else None)
         self._scans = ScanInput(p.node, p.deskew, self._tf, self._log)
+        self._bearings = BearingInput(p.node, self._tf, self._log)
         self._maps = MapSource(p.node, self._log, self._use_map)
         self._starts = Starts(p, self._tf)
         self._memory = PoseMemory(p.pose_file, self._log)
@@ -96,6 +100,7 @@ class LocalizationNode:
         # Subscribers last: they may fire at once.
         self._listener = tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
         self._scans.subscribe(lambda msg: self._inbox.put("scans", msg))
+        self._bearings.subscribe(self._command(self._bearings.receive))
         rospy.Subscriber("initialpose", PoseWithCovarianceStamped, self._command(self._take_guess), queue_size=2)
         rospy.Subscriber("global_localization_area", PolygonStamped, self._command(self._take_area), queue_size=2)
         if p.node.use_map_topic:
@@ -254,6 +259,7 @@ class LocalizationNode:
             self._pose_is_news = True
             if self._p.node.force_update_after_initialpose:
                 self._mcl.request_update()
+        self._bearings.give(self._mcl, placed.scan.stamp_ns)
         try:
             estimate = self._mcl.update(placed.scan, placed.odom_from_base)
         except ValueError as err:  # ScanError, and what the filter cannot work out: a robot drives on by odometry
@@ -290,6 +296,7 @@ class LocalizationNode:
     def _restart(self, why: str) -> None:
         """Stamps start over: forget them. In simulated time the robot starts over too, else it stays."""
         self._scans.restart(self._now_s)
+        self._bearings.restart()
         self._tf.clear()
         self._starts.forget()
         self._last_estimate_s = self._now_s
@@ -340,7 +347,7 @@ def _parameter_file() -> Optional[Path]:
 
 
 def main(name: str = "glass_localization") -> None:
-    """Start the node; exit code 2 if a parameter cannot be used."""
+    """Start the node; exit code 2 if a parameter or the landmark file cannot be used."""
     rospy.init_node(name, disable_signals=True)
     if "--run-from-bag" in rospy.myargv():
         rospy.logfatal(f"{rospy.get_name()}: --run-from-bag is the command glass_nav replay here: "
@@ -361,7 +368,12 @@ def main(name: str = "glass_localization") -> None:
         rospy.logfatal(str(err))
         rospy.signal_shutdown("a parameter cannot be used")
         sys.exit(2)
-    node = LocalizationNode(p)
+    try:
+        node = LocalizationNode(p)
+    except landmark_file.LandmarkError as err:
+        rospy.logfatal(f"{rospy.get_name()}: {err}")
+        rospy.signal_shutdown("the landmark file cannot be used")
+        sys.exit(2)
     for line in unknown:
         rospy.logwarn(line)
     if unused:

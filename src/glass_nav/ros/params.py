@@ -45,6 +45,7 @@ class LocalizationNodeParams:
     std_warn_level_x: float = 0.2          # [m]
     std_warn_level_y: float = 0.2          # [m]
     std_warn_level_yaw: float = 0.1        # [rad]
+    landmark_file: str = ""                # landmarks.yaml; "": bearings are not used
     random_seed: int = 0                   # < 0: another one at every start
 
     def __post_init__(self) -> None:

@@ -55,7 +55,7 @@ BEHIND_S = 1.0            # of the wall clock: more is not made up for
 class SimulatorNodeParams:
     """Private parameters of the node. Units by REP 103."""
     building: str = "glass_office"    # yaml file, folder with building.yaml, or name of one in maps/
-    path: str = ""                    # name, file of waypoints, or "first"; empty: cmd_vel only
+    path: str = ""                    # name, file of waypoints, or "first"; "none" or empty: cmd_vel only
     path_speed_m_s: float = 0.6
     repeat_path: bool = False         # back to its start and so on, for ever
     lidar: str = "sensitive"          # sensitive, weak, coated
@@ -293,7 +293,7 @@ def _drive(p: SimulatorNodeParams) -> _Drive:
                             changed_share=p.changed, turn_time_s=p.turn_time_s,
                             scanner=scanner if len(building.tags) else None,
                             base_from_emitter=np.array([p.emitter_x_m, p.emitter_y_m, p.emitter_yaw_rad]))
-    if not p.path:
+    if p.path in ("", "none"):  # roslaunch cannot hand on an empty argument of its command line
         return _Drive(simulation, None)
     return _Drive(simulation, simulation.follower(p.path, FollowerParams(speed_m_s=p.path_speed_m_s)))
 

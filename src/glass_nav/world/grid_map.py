@@ -38,11 +38,21 @@ class GridMap:
             raise ValueError(f"a map needs an origin of x, y, yaw, all finite, got {self.map_from_grid}")
 
     @cached_property
+    def fingerprint(self) -> str:
+        """SHA-256 of cells and place, in hex: equal for the map in a file and for the same one out of a message.
+
+        The resolution counts to a micrometre (messages carry it as float32), the origin to a millimetre.
+        """
+        place = (f"{self.occupancy.shape[0]} {self.occupancy.shape[1]} {self.resolution_m:.6f} "
+                 + " ".join(f"{round(float(value), 3) + 0.0:.3f}" for value in self.map_from_grid))
+        digest = hashlib.sha256(place.encode())
+        digest.update(np.ascontiguousarray(self.occupancy).tobytes())
+        return digest.hexdigest()
+
+    @property
     def digest(self) -> str:
-        """16 hexadecimal digits that another map, or the same one elsewhere, does not have."""
-        place = np.round(np.append(self.map_from_grid, self.resolution_m), 6) + 0.0  # no -0; float32 in messages
-        shape = np.array(self.occupancy.shape, np.int64)
-        return hashlib.sha256(shape.tobytes() + place.tobytes() + self.occupancy.tobytes()).hexdigest()[:16]
+        """The first 16 digits of the fingerprint, for people and small files."""
+        return self.fingerprint[:16]
 
     @property
     def occupied(self) -> np.ndarray:

@@ -12,8 +12,11 @@ from glass_nav import params
 from glass_nav.geometry import angles, se2
 from glass_nav.localization.glass_mcl import GlassMcl
 from glass_nav.localization.glass_mcl_params import GlassMclParams, LaserLimits, Schedule
+from glass_nav.sensing import bearings
 from glass_nav.sensing.scan import Scan, ScanError
+from glass_nav.world import landmark_map
 from glass_nav.world.grid_map import GridMap
+from glass_nav.world.landmark_map import UnknownLandmark
 
 START_COVARIANCE = np.diag([0.05, 0.05, 0.03]) ** 2
 MAPS = {building: building.grid_map() for building in (L_ROOM, GLASS_ROOM)}
@@ -826,3 +829,96 @@ def test_the_same_seed_gives_the_same_answer_to_the_last_bit(drive):
         for one, other in zip(first, drive.through(started(seed=4))):
             np.testing.assert_array_equal(one.particles, other.particles)
             np.testing.assert_array_equal(one.map_from_base, other.map_from_base)
+
+
+# -- bearings to landmarks, where there are some
+
+TAGS = landmark_map.seen_from_all_sides("abcd", np.array([[0.0, 3.0], [6.0, 0.5], [3.0, 4.0], [1.0, 0.0]]), 15.0)
+
+
+def tags_seen(pose, sigma_rad=0.005, base_from_sensor=(0.2, 0.0, 0.5)):
+    sensor = se2.compose(pose, np.array(base_from_sensor))
+    way = TAGS.positions_m - sensor[:2]
+    return bearings.standing(TAGS.ids, angles.wrap(np.arctan2(way[:, 1], way[:, 0]) - sensor[2]), sigma_rad,
+                             base_from_sensor=np.array(base_from_sensor))
+
+
+def blind(scan):
+    """The same scan of a lidar without an answer."""
+    return replace(scan, ranges_m=np.full(len(scan.ranges_m), np.inf))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_bearings_place_a_robot_that_sees_nothing_else(drive, seed):
+    mcl = GlassMcl(parameters(max_particles=3000), MAPS[L_ROOM], np.random.default_rng(seed))
+    mcl.set_pose(drive.true[0] + [0.4, -0.4, 0.2], np.diag([0.5, 0.5, 0.3]) ** 2)
+    spread = np.sqrt(np.trace(mcl.update(blind(drive.scans[0]), drive.odometry[0]).covariance[:2, :2]))
+    for scan, odom, true in list(zip(drive.scans, drive.odometry, drive.true))[1:5]:
+        mcl.add_bearings(tags_seen(true), TAGS, odom)
+        estimate = mcl.update(blind(scan), odom)
+    way_m, turn_rad = off(estimate.map_from_base, true)
+    assert way_m < 0.12 and turn_rad < 0.06
+    assert np.sqrt(np.trace(estimate.covariance[:2, :2])) < 0.4 * spread
+
+
+def test_bearings_are_carried_along_by_odometry_to_the_next_scan():
+    exact = Drive(way_share=0.0)
+    true, odom, step = exact.true[0], exact.odometry[0], np.array([0.8, 0.1, 0.5])
+    later, moved = se2.compose(true, step), se2.compose(odom, step)
+    mcl = GlassMcl(parameters(max_particles=3000), MAPS[L_ROOM], np.random.default_rng(0))
+    mcl.set_pose(later + [0.3, -0.3, 0.1], np.diag([0.4, 0.4, 0.2]) ** 2)
+    mcl.add_bearings(tags_seen(true), TAGS, odom)  # taken before the step
+    estimate = mcl.update(blind(exact.scans[0]), moved)
+    assert off(estimate.map_from_base, later)[0] < 0.2  # 0.42 before, and 0.8 if the step were left out
+
+
+def test_bearings_make_a_standing_robot_update_once(drive):
+    mcl = started()
+    assert mcl.update(drive.scans[0], drive.odometry[0]).updated
+    again = replace(drive.scans[0], stamp_ns=drive.scans[0].stamp_ns + 1)
+    assert not mcl.update(again, drive.odometry[0]).updated
+    mcl.add_bearings(tags_seen(drive.true[0]), TAGS, drive.odometry[0])
+    assert mcl.update(again, drive.odometry[0]).updated
+    assert not mcl.update(again, drive.odometry[0]).updated
+
+
+def test_a_new_start_forgets_the_bearings_before_it(drive):
+    mcl, fresh = started(seed=4), started(seed=4)
+    mcl.add_bearings(tags_seen(drive.true[0] + [1.0, 0.0, 0.0]), TAGS, drive.odometry[0])
+    for each in (mcl, fresh):
+        each.set_pose(drive.true[0], START_COVARIANCE)
+    same(mcl.update(drive.scans[0], drive.odometry[0]), fresh.update(drive.scans[0], drive.odometry[0]))
+
+
+def test_bearings_agree_with_a_drive_and_one_wrong_does_no_harm(drive):
+    mcl = started()
+    for number, (scan, odom, true) in enumerate(zip(drive.scans, drive.odometry, drive.true)):
+        if number % 5 == 4:
+            taken = tags_seen(true)
+            taken.angles_rad[1] += 1.0
+            mcl.add_bearings(taken, TAGS, odom)
+        assert off(mcl.update(scan, odom).map_from_base, true)[0] < 0.06
+
+
+def test_bearings_end_a_search_among_places_that_look_alike():
+    square = Building([(0, 0), (6, 0), (6, 6), (0, 6)])
+    true, rng = np.array([2.0, 1.5, 0.4]), np.random.default_rng(0)
+    mcl = GlassMcl(parameters(), square.grid_map(), np.random.default_rng(0))
+    mcl.scatter()
+    states = []
+    for second in range(4):
+        if second == 2:
+            mcl.add_bearings(tags_seen(true), TAGS, np.zeros(3))
+        estimate = mcl.update(square.scan(true, second * SECOND_NS, rng), np.zeros(3))
+        states.append(estimate.state)
+    assert states[:2] == ["GLOBAL_SEARCH"] * 2 and "GLOBAL_SEARCH" not in states[2:]
+    assert off(estimate.map_from_base, true)[0] < 0.1
+
+
+def test_bearings_that_cannot_be_used_are_refused_and_change_nothing(drive):
+    mcl, other = started(seed=2), started(seed=2)
+    with pytest.raises(UnknownLandmark, match="^landmark 'z' is not on the map"):
+        mcl.add_bearings(bearings.standing(["z"], np.zeros(1), 0.1), TAGS, np.zeros(3))
+    with pytest.raises(ValueError, match="^odometry of bearings must be finite x, y, yaw, got "):
+        mcl.add_bearings(tags_seen(drive.true[0]), TAGS, np.array([0.0, np.nan, 0.0]))
+    same(mcl.update(drive.scans[0], drive.odometry[0]), other.update(drive.scans[0], drive.odometry[0]))

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from buildings import L_ROOM, SECOND_NS, Building, loop_drive, odometry, off
-from glass_nav.geometry import se2
+from glass_nav.geometry import angles, se2
 from glass_nav.localization.global_search import GlobalSearch, SearchParams, same_place
+from glass_nav.sensing import bearings
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.scan_matcher import ScanMatcher
+from glass_nav.world import landmark_map
 
 # A corridor with a niche at one end only: in the middle its two directions look alike.
 CORRIDOR = Building([(0, 0), (12, 0), (12, 2), (10, 2), (10, 4), (8, 4), (8, 2), (0, 2)])
@@ -49,13 +51,13 @@ def test_places_that_scans_cannot_tell_apart_stay_until_one_sees_a_difference():
     """To a lidar that sees 3 m the plain part of the corridor looks the same in both directions; the niche does not."""
     poses = along(np.arange(3.6, 11.0, 0.2))
     rng = np.random.default_rng(0)
-    search = search_in(CORRIDOR)
+    search = search_in(CORRIDOR, search_margin=2.0)
     told = [search.update(CORRIDOR.scan(pose, index * SECOND_NS, rng).limited(-1.0, 3.0), moved)
             for index, (pose, moved) in enumerate(zip(poses, odometry(poses, rng)))]
-    plain = [candidates for candidates, pose in zip(told, poses) if pose[0] < 4.8]
+    plain = [candidates for candidates, pose in zip(told, poses) if pose[0] < 4.8]  # the niche is 3 m ahead
     assert plain and not any(candidates.found for candidates in plain)
     assert all(len(candidates.poses) > 10 for candidates in plain)
-    assert told[-1].found and off(told[-1].poses[0], poses[-1])[0] < 0.15
+    assert told[-1].found and same_place(told[-1].poses[:1], poses[-1])[0]
 
 
 def test_a_square_room_is_never_solved():
@@ -152,3 +154,50 @@ def test_wrong_limits_are_refused_in_one_line(values, text):
     with pytest.raises(ValueError) as err:
         SearchParams(**values)
     assert str(err.value) == text
+
+
+# -- bearings to landmarks, where there are some
+
+SQUARE = Building([(0, 0), (6, 0), (6, 6), (0, 6)])  # four places look alike to a lidar
+TAGS = landmark_map.seen_from_all_sides("abcd", np.array([[0.0, 2.0], [6.0, 1.0], [3.0, 6.0], [1.5, 0.0]]), 15.0)
+IN_SQUARE = np.array([2.0, 1.5, 0.4])
+
+
+def tags_seen(pose, ids="abcd"):
+    way = TAGS.positions_m[TAGS.numbers(tuple(ids))] - pose[:2]
+    return bearings.standing(tuple(ids), angles.wrap(np.arctan2(way[:, 1], way[:, 0]) - pose[2]), 0.005)
+
+
+def square_seen(search, *turns):
+    """What the search says to a standing robot after each turn of its sensor of bearings."""
+    rng = np.random.default_rng(0)
+    return [search.update(SQUARE.scan(IN_SQUARE, index * SECOND_NS, rng), np.zeros(3), [(seen, TAGS)] if seen else ())
+            for index, seen in enumerate(turns)]
+
+
+def test_bearings_tell_places_apart_that_look_alike_to_the_lidar():
+    without, told = square_seen(search_in(SQUARE), None, tags_seen(IN_SQUARE))
+    assert not without.found and told.found
+    assert off(told.poses[0], IN_SQUARE)[0] < 0.1
+
+
+def test_one_bearing_finds_no_place_however_often_it_is_repeated_to_a_robot_that_stands():
+    told = square_seen(search_in(SQUARE), *[tags_seen(IN_SQUARE, "a")] * 20)
+    assert not any(candidates.found for candidates in told)
+    assert same_place(told[-1].poses[:1], IN_SQUARE)[0]  # it is ahead all the same
+    assert 3.0 < told[-1].lead < 6.0
+
+
+def test_a_landmark_counts_again_after_a_way():
+    search = search_in(SQUARE, search_margin=1000.0)
+    told, rng = [], np.random.default_rng(0)
+    for index, x_m in enumerate([1.0, 2.0, 3.1, 4.2]):
+        pose = np.array([x_m, 1.5, 0.0])
+        told.append(search.update(SQUARE.scan(pose, index * SECOND_NS, rng), pose, [(tags_seen(pose, "c"), TAGS)]))
+    leads = [candidates.lead for candidates in told]
+    assert leads[1] < leads[0] + 2.0 and leads[2] > leads[0] + 3.0
+
+
+def test_bearings_without_any_place_say_nothing():
+    blind = replace(SQUARE.scan(IN_SQUARE), ranges_m=np.full(len(SQUARE.scan(IN_SQUARE).ranges_m), np.inf))
+    assert not len(search_in(SQUARE).update(blind, np.zeros(3), [(tags_seen(IN_SQUARE), TAGS)]).poses)

@@ -9,7 +9,7 @@ from typing import Any, Iterator
 
 import yaml
 
-from glass_nav.ros import beam_displays, landmarks_node, localization_node, wall_display
+from glass_nav.ros import beam_displays, landmarks_node, localization_node, topology_displays, wall_display
 
 REPO = Path(__file__).parents[3]
 CONFIG = yaml.safe_load((REPO / "rviz" / "glass_nav.rviz").read_text(encoding="utf-8"))
@@ -49,10 +49,10 @@ def test_every_case_and_the_status_have_a_checkbox():
     assert named("Glass map")["Namespaces"] == dict.fromkeys(wall_display.WALL_NAMES, True)
 
 
-def test_the_topology_waits_switched_off():
+def test_the_topology_is_switched_off_and_has_a_checkbox_for_each_thing():
     group = named("Topology")
     assert group["Class"] == "rviz/Group" and group["Enabled"] is False
-    assert {display["Name"] for display in group["Displays"]} == {"Candidates", "Atlas"}
+    assert named("Atlas and search")["Namespaces"] == dict.fromkeys(topology_displays.NAMESPACES, True)
 
 
 def test_the_topics_of_the_node_are_those_it_tells_of():
@@ -71,8 +71,9 @@ def test_every_topic_below_a_node_can_be_remapped_to_another_name():
     assert {topic for topic in remaps if topic.count("/") == 2} == below
     for origin in below:
         _, node, topic = origin.split("/")
-        argument = {"glass_localization": "name", "topology_node": "topology_name", "landmarks": "landmarks_name"}[node]
+        argument = {"glass_localization": "name", "glass_topology": "topology_name",
+                    "landmarks": "landmarks_name"}[node]
         assert remaps[origin] == f"/$(arg {argument})/{topic}"
     defaults = {arg.get("name"): arg.get("default") for arg in launch.iter("arg")}
-    assert (defaults["name"], defaults["topology_name"]) == ("glass_localization", "topology_node")
+    assert (defaults["name"], defaults["topology_name"]) == ("glass_localization", "glass_topology")
     assert defaults["landmarks_name"] == "landmarks"

@@ -68,3 +68,4 @@ def test_a_path_and_a_lidar_are_those_asked_for():
     assert (drive.simulation.lidar_model.beams, drive.simulation.lidar_model.echo) == (33, "last")
     assert drive.simulation.base_from_laser.tolist() == [0.3, 0.0, 0.0]
     assert simulator_node._drive(SimulatorNodeParams()).follower is None
+    assert simulator_node._drive(SimulatorNodeParams(path="none")).follower is None

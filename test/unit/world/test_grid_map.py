@@ -97,3 +97,14 @@ def test_what_is_no_map_is_refused_in_one_line(occupancy, resolution_m, origin, 
     with pytest.raises(ValueError) as err:
         GridMap(occupancy, resolution_m, origin)
     assert str(err.value) == text
+
+
+def test_a_fingerprint_is_of_cells_and_place_and_outlives_a_message():
+    cells = [[0, 100, -1], [0, 0, 0]]
+    here = grid(cells, (1.5, -2.0, 0.1), 0.05)
+    assert here.fingerprint == grid(cells, (1.5, -2.0, 0.1 + 1e-9), float(np.float32(0.05))).fingerprint
+    others = [grid([[0, 100, -1], [0, 0, 1]], (1.5, -2.0, 0.1), 0.05), grid(cells, (1.5, -2.0, 0.2), 0.05),
+              grid(cells, (1.6, -2.0, 0.1), 0.05), grid(cells, (1.5, -2.0, 0.1), 0.1),
+              grid(np.reshape(cells, (3, 2)), (1.5, -2.0, 0.1), 0.05)]
+    assert len({each.fingerprint for each in [here, *others]}) == 6
+    assert grid(cells, (-0.0, 0.0, 0.0)).fingerprint == grid(cells, (0.0, 0.0, 0.0)).fingerprint

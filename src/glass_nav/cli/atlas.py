@@ -1,0 +1,33 @@
+"""glass_nav atlas: what can be done with an atlas without a robot, a module for each."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any, Dict, Optional
+
+from glass_nav.cli import atlas_build, atlas_check, atlas_explain, atlas_show, atlas_wake_up
+
+HELP = "build, check and try out an atlas"
+DESCRIPTION = "The hierarchical atlas of a floor, and what a robot that wakes up can make of it. Needs no roscore."
+
+MODULES: Dict[str, Any] = {"build": atlas_build, "show": atlas_show, "check": atlas_check, "explain": atlas_explain,
+                           "wake-up": atlas_wake_up}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """A subcommand for each module."""
+    commands = parser.add_subparsers(dest="atlas_command", metavar="COMMAND")
+    commands.required = True
+    for name, module in MODULES.items():
+        module.add_arguments(commands.add_parser(name, help=module.HELP, description=module.DESCRIPTION))
+
+
+def usage_error(arguments: argparse.Namespace) -> Optional[str]:
+    """What is wrong with the options of the subcommand."""
+    wrong: Optional[str] = MODULES[arguments.atlas_command].usage_error(arguments)
+    return wrong and f"{arguments.atlas_command}: {wrong}"
+
+
+def main(arguments: argparse.Namespace) -> None:
+    """Run the subcommand."""
+    MODULES[arguments.atlas_command].main(arguments)

@@ -1,0 +1,91 @@
+"""Points in their order along walls -> line segments, by split and merge with total least squares.
+
+Split: Ramer (1972), Douglas and Peucker (1973). Merge and fit: Pavlidis and Horowitz (1974). A segment is a row
+x1 y1 x2 y2 that runs as its points do. N points, S segments; one unit of length throughout.
+"""
+
+from __future__ import annotations
+
+from typing import List, Tuple
+
+import numpy as np
+
+NO_SEGMENT = -1
+
+
+def corners(points: np.ndarray, tolerance: float) -> np.ndarray:
+    """Indices (K,) of the points (N, 2) of a line that has all others within the tolerance; first and last included."""
+    kept = [0, len(points) - 1]
+    pieces = [(0, len(points) - 1)]
+    while pieces:
+        first, last = pieces.pop()
+        if last - first < 2:
+            continue
+        away = _away_from_chord(points[first:last + 1])
+        furthest = int(away.argmax())
+        if away[furthest] > tolerance:
+            kept.append(first + furthest)
+            pieces += [(first, first + furthest), (first + furthest, last)]
+    return np.unique(kept)
+
+
+def split_and_merge(points: np.ndarray, tolerance: float, least_length: float) -> Tuple[np.ndarray, np.ndarray]:
+    """Line segments along a chain of points.
+
+    Args:
+        points: (N, 2) in their order along the wall.
+        tolerance: no point of a segment lies further from its line.
+        least_length: shorter segments are left out.
+
+    Returns:
+        segments (S, 4) in the order of the points, and (N,) the segment of each point, NO_SEGMENT for none.
+    """
+    label = np.full(len(points), NO_SEGMENT)
+    if len(points) < 2:
+        return np.zeros((0, 4)), label
+    ends = corners(points, tolerance).tolist()
+    runs: List[Tuple[int, int]] = []
+    for first, last in zip(ends[:-1], ends[1:]):
+        if runs and _away_from_line(points[runs[-1][0]:last + 1]).max() <= tolerance:
+            first = runs.pop()[0]
+        runs.append((first, last))
+    segments: List[np.ndarray] = []
+    for first, last in runs:
+        segment = fit(points[first:last + 1])
+        if np.hypot(*(segment[2:] - segment[:2])) >= least_length:
+            label[first:last + 1] = len(segments)
+            segments.append(segment)
+    return np.array(segments).reshape(-1, 4), label
+
+
+def fit(points: np.ndarray) -> np.ndarray:
+    """(4,) the segment that points (N, 2) lie along: of their line by total least squares, from end to end."""
+    centre, direction = _line(points)
+    along = (points - centre) @ direction
+    return np.concatenate([centre + along.min() * direction, centre + along.max() * direction])
+
+
+def _line(points: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """A point (2,) and the direction (2,) of the line through points, from the first to the last."""
+    centre = points.mean(axis=0)
+    x, y = (points - centre).T
+    angle = 0.5 * np.arctan2(2.0 * (x @ y), x @ x - y @ y)
+    direction = np.array([np.cos(angle), np.sin(angle)])
+    return centre, direction if (points[-1] - points[0]) @ direction >= 0.0 else -direction
+
+
+def _away_from_line(points: np.ndarray) -> np.ndarray:
+    centre, direction = _line(points)
+    x, y = (points - centre).T
+    return np.abs(x * direction[1] - y * direction[0])
+
+
+def _away_from_chord(points: np.ndarray) -> np.ndarray:
+    """(N,) distance of points from the segment between the first and the last of them."""
+    chord = points[-1] - points[0]
+    offset = points - points[0]
+    length_squared = float(chord @ chord)
+    if length_squared == 0.0:
+        return np.hypot(offset[:, 0], offset[:, 1])
+    share = np.maximum(np.minimum(offset @ chord / length_squared, 1.0), 0.0)  # np.clip is slow on the many short ones
+    return np.hypot(offset[:, 0] - share * chord[0], offset[:, 1] - share * chord[1])

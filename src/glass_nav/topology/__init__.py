@@ -1,0 +1,1 @@
+"""Where in the atlas?  MEETPOINT -> FOREST -> VOTE -> TURN."""

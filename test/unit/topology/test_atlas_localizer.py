@@ -1,0 +1,213 @@
+"""Whole searches: the worked example of the document, confirmation, ambiguity, LOST."""
+
+from __future__ import annotations
+
+from typing import Any, Dict
+
+import made_atlases
+import numpy as np
+import pytest
+
+from glass_nav.topology import atlas_file, shipped_atlases, wake_up
+from glass_nav.topology.atlas import Atlas
+from glass_nav.topology.atlas_localizer import (AMBIGUOUS, CONFIRMED, LOST, SEARCHING, TENTATIVE, AtlasLocalizer,
+                                                SearchParams, poses_at)
+from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
+
+DOCUMENT = SearchParams(vote_mode="seed", confirm_edges=0)
+
+
+def example() -> Atlas:
+    return atlas_file.load(shipped_atlases.find("document_example"))
+
+
+def nodes(localizer: AtlasLocalizer) -> "list[int]":
+    assert localizer.estimate is not None
+    return sorted(set(localizer.atlas.darts.node[localizer.estimate.dart].tolist()))
+
+
+def test_the_worked_example_of_the_document_is_solved_at_depth_2() -> None:
+    """global_localization_procedure.txt, "A Simple Illustrative Example"."""
+    localizer = AtlasLocalizer(example(), DOCUMENT)
+    # Depth 0: "Nodes 0 and 1 are indistinguishable, as are nodes 2 and 3. The robot drives to node 0 ..."
+    assert localizer.start(Meetpoint(3, 1.5)).state == SEARCHING
+    assert nodes(localizer) == [0, 1]
+    # "... drives out on edge 0 of node 0." Depth 1: "The robot arrives at edge 0 of node 1." Of the search nodes 2 and
+    # 3 go by node matching, one of 0 and one of 1 by edge matching; "the result is to turn right".
+    estimate = localizer.update(Traversal(0, 8.0, 8.0), Meetpoint(3, 1.5))
+    assert estimate.state == SEARCHING and nodes(localizer) == [0, 1] and len(estimate.dart) == 2
+    assert estimate.choice is not None and estimate.choice.name == "RIGHT"
+    # Depth 2: "Since only one active candidate remains at depth 2, the robot is located at that candidate node (in
+    # this case 0). The robot now has the knowledge of the true nodes and edges that it has traversed."
+    estimate = localizer.update(Traversal(estimate.choice.rank, 11.2, 8.0), Meetpoint(3, 1.5))
+    assert (estimate.state, estimate.depth, nodes(localizer)) == (CONFIRMED, 2, [0])
+    path = localizer.path(int(estimate.dart[0]))
+    assert localizer.atlas.darts.node[path].tolist() == [0, 1, 0]
+    assert (path >> 1).tolist()[1:] == [0, 1]
+
+
+def test_the_way_that_was_found_goes_into_the_statistics() -> None:
+    atlas = example()
+    localizer = AtlasLocalizer(atlas, DOCUMENT)
+    localizer.start(Meetpoint(3, 1.48))
+    localizer.update(Traversal(0, 8.1, 8.0), Meetpoint(3, 1.5))
+    localizer.update(Traversal(2, 11.2, 8.0), Meetpoint(3, 1.52))
+    localizer.count_visits(atlas.visits)
+    assert atlas.visits.node_count.tolist() == [2, 1, 0, 0]
+    assert atlas.visits.node_r_mean_m[0] == pytest.approx(1.5)
+    assert atlas.visits.edge_count.tolist() == [1, 1, 0, 0]
+    assert atlas.visits.edge_length_mean_m[0] == pytest.approx(8.1)
+
+
+def test_what_the_detector_erred_about_does_not_go_into_the_statistics() -> None:
+    atlas = made_atlases.corridors([(0, 0), (6, 0), (14, 0), (26, 0), (6, 4)], [0.9, 1.3, 1.7, 0.5, 1.4],
+                                   [(0, 1), (1, 2), (2, 3), (1, 4)])
+    localizer = AtlasLocalizer(atlas, SearchParams(confirm_edges=0))
+    localizer.start(Meetpoint(1, 0.5))
+    localizer.update(Traversal(0, 12.0, 12.0), Meetpoint(2, 1.7))
+    estimate = localizer.update(Traversal(1, 14.0, 14.0), Meetpoint(1, 0.9))  # past 1
+    assert estimate.errors.tolist() == [1]
+    localizer.count_visits(atlas.visits)
+    assert atlas.visits.node_count.tolist() == [1, 0, 1, 1, 0] and atlas.visits.edge_count.tolist() == [0, 0, 1, 0]
+
+
+def test_one_candidate_is_only_tentative_until_new_edges_confirm_it() -> None:
+    atlas = made_atlases.voronoi(60, 4)
+    robot = wake_up.AtlasRobot(wake_up.Surroundings.of(atlas), wake_up.TrialParams(noise_limit=0.0),
+                               np.random.default_rng(0))
+    localizer = AtlasLocalizer(atlas, SearchParams(confirm_edges=3))
+    estimate = localizer.start(robot.wake_up(0))
+    states, driven = [estimate.state], []
+    while estimate.choice is not None:
+        traversal, meetpoint = robot.drive(estimate.choice.rank)
+        estimate = localizer.update(traversal, meetpoint)
+        states.append(estimate.state)
+        driven.append(robot.dart >> 1)
+    assert states[-1] == CONFIRMED and estimate.dart.tolist() == [robot.dart]
+    first = states.index(TENTATIVE)
+    assert len(states) - 1 - first >= 3 and set(states[first:-1]) == {TENTATIVE}
+    assert len(set(driven[first:]) - set(driven[:first])) >= 3
+
+
+def test_a_building_driven_all_over_has_nothing_left_to_confirm() -> None:
+    atlas = made_atlases.corridors([(0, 0), (6, 0), (10, 0)], [0.9, 1.3, 0.4], [(0, 1), (1, 2)])
+    localizer = AtlasLocalizer(atlas, SearchParams(confirm_edges=5))
+    assert localizer.start(Meetpoint(1, 0.9)).state == TENTATIVE
+    assert localizer.update(Traversal(0, 6.0, 6.0), Meetpoint(2, 1.3)).state == TENTATIVE
+    estimate = localizer.update(Traversal(1, 4.0, 4.0), Meetpoint(1, 0.4))
+    assert (estimate.state, estimate.choice) == (CONFIRMED, None)
+
+
+def test_a_claim_waits_where_the_next_meetpoint_is_near() -> None:
+    # 1 and 2 are 0.5 m apart and of equal r: who came 8 m along edge 0 may have missed 1 and stand at 2.
+    atlas = made_atlases.corridors([(0, 0), (8, 0), (8.5, 0), (16.5, 0), (8, 7), (8.5, -9)],
+                                   [0.9, 1.3, 1.3, 0.5, 1.4, 1.9], [(0, 1), (1, 2), (2, 3), (1, 4), (2, 5)])
+    localizer = AtlasLocalizer(atlas, SearchParams(confirm_edges=1, use_edge_angles=False))
+    assert localizer.start(Meetpoint(1, 0.9)).state == TENTATIVE
+    estimate = localizer.update(Traversal(0, 8.1, 8.1), Meetpoint(3, 1.3))
+    assert estimate.state == TENTATIVE and "if a meetpoint was missed just now it is the next" in estimate.reason
+    assert estimate.choice is not None
+    estimate = localizer.update(Traversal(1, 7.0, 7.0), Meetpoint(1, 1.4))  # up the side corridor of 1
+    assert estimate.state == CONFIRMED and nodes(localizer) == [4]
+
+
+def quarters() -> Atlas:
+    """Four equal wings around a hall: a quarter turn changes nothing. Each wing has a side corridor to one side."""
+    xy, r, ends = [(0.0, 0.0)], [2.0], []
+    for k in range(4):
+        cos, sin = [(1, 0), (0, 1), (-1, 0), (0, -1)][k]
+        at = len(xy)
+        xy += [(8 * cos, 8 * sin), (13 * cos, 13 * sin), (8 * cos - 4 * sin, 8 * sin + 4 * cos)]
+        r += [1.2, 0.8, 0.6]
+        ends += [(0, at), (at, at + 1), (at, at + 2)]
+    return made_atlases.corridors(xy, r, ends)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_symmetric_floor_is_ambiguous_with_exactly_its_four_places(seed: int) -> None:
+    atlas = quarters()
+    trial = next(iter(wake_up.trials(atlas, SearchParams(), wake_up.TrialParams(noise_limit=2.0), 1, seed)))
+    assert trial.outcome == AMBIGUOUS and trial.truth_lost_at is None
+    poses = poses_at(atlas, trial.estimate.dart, Meetpoint(1, 1.0))
+    assert len(poses) == 4
+    turned = np.sort(np.mod(poses[:, 2] - poses[0, 2], 2 * np.pi))
+    np.testing.assert_allclose(turned, np.arange(4) * np.pi / 2, atol=1e-9)  # a quarter turn each
+    radius = np.hypot(*poses[:, :2].T)
+    np.testing.assert_allclose(radius, radius[0], atol=1e-9)
+
+
+def test_places_whose_difference_is_far_away_are_told_apart_by_driving_there() -> None:
+    count = 6
+    xy = [(5.0 * i, y) for y in (0.0, 100.0) for i in range(count)]
+    r = [1.0] * count + [1.0] * (count - 1) + [2.0]
+    ends = [(row + i, row + i + 1) for row in (0, count) for i in range(count - 1)]
+    atlas = made_atlases.corridors(xy, r, ends)
+    trials = list(wake_up.trials(atlas, SearchParams(), wake_up.TrialParams(noise_limit=1.0), 30, 0))
+    rows = [set((atlas.darts.node[trial.estimate.dart] >= count).tolist()) for trial in trials]
+    # The first row alone is the same after half a turn.
+    assert [trial.outcome for trial in trials] == [CONFIRMED if row == {True} else AMBIGUOUS for row in rows]
+    assert {True} in rows and {False} in rows
+    assert max(trial.edges for trial in trials) <= 14
+
+
+def test_the_search_over_pairs_says_how_far_the_difference_is() -> None:
+    count = 6
+    xy = [(5.0 * i, y) for y in (0.0, 100.0) for i in range(count)]
+    r = [0.5] + [1.0] * (count - 1) + [0.5] + [1.0] * (count - 2) + [2.0]
+    ends = [(row + i, row + i + 1) for row in (0, count) for i in range(count - 1)]
+    localizer = AtlasLocalizer(made_atlases.corridors(xy, r, ends), SearchParams())
+    localizer.start(Meetpoint(1, 0.5))
+    estimate = localizer.update(Traversal(0, 5.0, 5.0), Meetpoint(2, 1.0))
+    assert (estimate.state, estimate.reason) == (SEARCHING, "2 candidates, the next difference is 4 edges away")
+    assert estimate.choice is not None and estimate.choice.name == "FORWARD"
+
+
+def test_a_robot_that_fits_nowhere_is_lost_and_not_before_errors_were_considered() -> None:
+    localizer = AtlasLocalizer(example(), SearchParams())
+    assert localizer.start(Meetpoint(4, 3.0)).state == SEARCHING  # it may be none
+    estimate = localizer.update(Traversal(2, 30.0, 30.0), Meetpoint(4, 3.0))
+    while estimate.state == SEARCHING and estimate.choice is not None:
+        estimate = localizer.update(Traversal(estimate.choice.rank, 30.0, 30.0), Meetpoint(4, 3.0))
+    assert (estimate.state, estimate.choice, len(estimate.dart)) == (LOST, None, 0)
+    assert estimate.reason == "no place of the atlas fits what was seen, not even with 2 errors of the detector"
+    assert AtlasLocalizer(example(), DOCUMENT).start(Meetpoint(4, 3.0)).state == LOST
+
+
+def test_at_what_may_be_no_meetpoint_the_robot_goes_straight_on() -> None:
+    localizer = AtlasLocalizer(example(), SearchParams())
+    behind_left_on = Meetpoint(3, 3.0, bearings_rad=np.array([np.pi, np.pi / 2, 0.1]))
+    estimate = localizer.start(behind_left_on)
+    assert estimate.choice is not None and estimate.choice.rank == 2
+    estimate = localizer.start(Meetpoint(4, 3.0))
+    assert estimate.choice is not None and estimate.choice.rank == 2
+
+
+def test_a_turn_that_no_dart_has_is_refused_and_the_search_goes_on() -> None:
+    localizer = AtlasLocalizer(example(), SearchParams())
+    before = localizer.start(Meetpoint(3, 1.5))
+    with pytest.raises(ObservationError, match="turn of rank 7: the meetpoint it left has degree 3, allowed 0 to 2"):
+        localizer.update(Traversal(7, 8.0, 8.0), Meetpoint(3, 1.5))
+    assert localizer.estimate is before
+    assert localizer.update(Traversal(0, 8.0, 8.0), Meetpoint(3, 1.5)).depth == 1
+
+
+def test_the_pose_is_where_the_robot_says_it_stands_at_the_meetpoint() -> None:
+    atlas = example()
+    # Worked by hand: come along dart 1 (node 1 at (8, 0), looking west), so it travels east; 0.2 m short of the
+    # meetpoint, which is 0.2 m ahead and 0.1 m to its left, and it looks 0.3 rad to the left of its way.
+    at = Meetpoint(3, 1.5, bearings_rad=np.array([np.pi - 0.3, 1.0, -1.0]), centre_m=np.array([0.2, 0.1]))
+    (pose,) = poses_at(atlas, np.array([1]), at)
+    cos, sin = np.cos(0.3), np.sin(0.3)
+    np.testing.assert_allclose(pose, [8.0 - (0.2 * cos - 0.1 * sin), -(0.2 * sin + 0.1 * cos), 0.3], atol=1e-5)
+    (bare,) = poses_at(atlas, np.array([1]), Meetpoint(3, 1.5))
+    np.testing.assert_allclose(bare, [8.0, 0.0, 0.0], atol=1e-5)
+
+
+@pytest.mark.parametrize("fields, line", [
+    ({"vote_mode": "majority"}, "~vote_mode must be best or seed, got 'majority'"),
+    ({"confirm_edges": -1}, "~confirm_edges must be >= 0, got -1"),
+    ({"max_detection_errors": 3}, "~max_detection_errors must be 0, 1 or 2, got 3")])
+def test_parameters_that_mean_nothing_are_refused(fields: Dict[str, Any], line: str) -> None:
+    with pytest.raises(ValueError) as refused:
+        SearchParams(**fields)
+    assert str(refused.value) == line
