@@ -60,6 +60,20 @@ class Estimate:
     reliability: float          # chance that the pose is right, 0..1
 
 
+class _MadeOnce:
+    """The matcher over a whole map, made when it is needed first. Knows no filter, so that a filter that is given up
+    leaves the memory at once and not with some later collection of cycles."""
+
+    def __init__(self, grid_map: GridMap, field: DistanceField) -> None:
+        self._grid_map, self._field = grid_map, field
+        self._matcher: Optional[ScanMatcher] = None
+
+    def __call__(self) -> ScanMatcher:
+        if self._matcher is None:
+            self._matcher = ScanMatcher(self._grid_map, self._field)
+        return self._matcher
+
+
 class GlassMcl:
     """Monte Carlo localization that decides beam by beam what the beam met."""
 
@@ -93,7 +107,7 @@ class GlassMcl:
         self._field = DistanceField(grid_map)
         self._thickness_m = wall_thickness(grid_map)
         self._anchor = ScanAnchor(self._field)
-        self._matcher: Optional[ScanMatcher] = None
+        self._everywhere = _MadeOnce(grid_map, self._field)
         self._watch = self._new_watch()
         if self._search is not None:
             self._search = self._new_search() if grid_map.free.any() else None
@@ -274,11 +288,6 @@ class GlassMcl:
     def _new_watch(self, usual_fit: Optional[float] = None) -> LostWatch:
         matcher = self._everywhere if self._grid_map.free.any() else None
         return LostWatch(self._field, matcher, self._params.search, usual_fit)
-
-    def _everywhere(self) -> ScanMatcher:
-        if self._matcher is None:
-            self._matcher = ScanMatcher(self._grid_map, self._field)
-        return self._matcher
 
     def _within(self, area: np.ndarray) -> np.ndarray:
         """(H, W) bool: cells with their centres in a polygon (N, 2)."""

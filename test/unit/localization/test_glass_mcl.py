@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -797,6 +799,20 @@ def test_a_robot_on_a_map_without_room_goes_on_by_odometry(drive, cell, start):
     estimates = drive.through(mcl, last=20)
     assert all(np.all(np.isfinite(estimate.map_from_base)) for estimate in estimates)
     assert not any(estimate.state == "LOCALIZED" for estimate in estimates[5:])
+
+
+def test_a_filter_that_is_given_up_leaves_the_memory_at_once(drive):
+    mcl = started()
+    drive.through(mcl, last=3)
+    mcl.scatter()
+    drive.through(mcl, last=3)
+    gone = weakref.ref(mcl)
+    gc.disable()  # a cycle of references would wait for it, with all that hangs on it
+    try:
+        del mcl
+        assert gone() is None
+    finally:
+        gc.enable()
 
 
 def test_a_search_goes_on_in_another_map():
