@@ -1,4 +1,4 @@
-// Writes a track and its map as MRPT files, for pf_localization.py, which compiles it and says what the arrays are.
+// Writes a track and its map as MRPT files, for pf_localization.py, which compiles it.
 //
 //   mrpt_track_writer FOLDER    reads FOLDER/{map.bin,track.bin,config.ini}, writes FOLDER/{map.gridmap.gz,track.rawlog}
 #include <mrpt/config/CConfigFile.h>
@@ -26,7 +26,8 @@ class Numbers {
   bool more() { return file_.peek() != std::ifstream::traits_type::eof(); }
   double next() {
     double value = 0.0;
-    if (!file_.read(reinterpret_cast<char*>(&value), sizeof value)) throw std::runtime_error(name_ + ": ends too early");
+    if (!file_.read(reinterpret_cast<char*>(&value), sizeof value))
+      throw std::runtime_error(name_ + ": ends too early");
     return value;
   }
   poses::CPose2D pose() {
@@ -47,8 +48,9 @@ void write_map(const std::string& folder) {
   maps::COccupancyGridMap2D grid(0.0f, static_cast<float>(columns * resolution_m), 0.0f,
                                  static_cast<float>(rows * resolution_m), static_cast<float>(resolution_m));
   if (static_cast<int>(grid.getSizeX()) != columns || static_cast<int>(grid.getSizeY()) != rows)
-    throw std::runtime_error("the grid of " + std::to_string(columns) + " x " + std::to_string(rows) + " cells became " +
-                             std::to_string(grid.getSizeX()) + " x " + std::to_string(grid.getSizeY()));
+    throw std::runtime_error("the grid of " + std::to_string(columns) + " x " + std::to_string(rows) +
+                             " cells became " + std::to_string(grid.getSizeX()) + " x " +
+                             std::to_string(grid.getSizeY()));
   for (int row = 0; row < rows; ++row)
     for (int column = 0; column < columns; ++column) grid.setCell(column, row, static_cast<float>(numbers.next()));
   // a grid map carries likelihood options, which replace those of the program that loads it

@@ -131,9 +131,10 @@ def scan_numbers(scan: Scan, odom_from_base: np.ndarray) -> np.ndarray:
     if not np.allclose(np.diff(bearings_rad, 2), 0.0, atol=1e-4):
         raise ValueError(f"scan at {scan.stamp_ns * 1e-9:.3f} s: MRPT wants evenly spaced beams")
     aperture_rad = bearings_rad[-1] - bearings_rad[0]
-    middle = se2.compose(scan.base_from_laser, [0.0, 0.0, 0.5 * (bearings_rad[0] + bearings_rad[-1])])
+    middle_rad = 0.5 * (bearings_rad[0] + bearings_rad[-1])
+    base_from_middle = se2.compose(scan.base_from_laser, np.array([0.0, 0.0, middle_rad]))
     ranges_m = np.where(scan.answered, scan.ranges_m, np.nan)
-    return np.concatenate([[scan.stamp_ns * 1e-9], odom_from_base, middle,
+    return np.concatenate([[scan.stamp_ns * 1e-9], odom_from_base, base_from_middle,
                            [abs(aperture_rad), aperture_rad > 0.0, scan.range_max_m, len(scan)], ranges_m])
 
 
@@ -223,7 +224,8 @@ def run(job: Job) -> Dict[str, Any]:
         config = write(Path(folder), track.grid_map, steps, settings_with(changes))
         answer = localize(config, most_s)
     if len(answer.grid_from_base) != len(steps) and not answer.out_of_time:
-        raise RuntimeError(f"{name}: pf-localization got {len(steps)} scans and told {len(answer.grid_from_base)} poses")
+        raise RuntimeError(f"{name}: pf-localization got {len(steps)} scans and told "
+                           f"{len(answer.grid_from_base)} poses")
     map_from_base = se2.compose(track.grid_map.map_from_grid, answer.grid_from_base)
     way_m = np.array([step.way_m for step in steps[:len(map_from_base)]])
     right = np.array([tracks.is_right(pose, step.moment.map_from_base)
