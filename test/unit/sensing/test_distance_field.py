@@ -87,13 +87,16 @@ def test_the_slope_is_what_a_small_step_changes(seed):
     np.testing.assert_allclose(along_y, by_y, atol=1e-3)
 
 
-def test_outside_the_grid_the_borders_value_holds():
+def test_outside_the_grid_walls_are_as_far_as_the_way_to_it_adds():
+    """A beam that ends off the map fits nothing, even where a wall is drawn at the map's edge."""
     occupied = np.zeros((10, 10), bool)
-    occupied[5, 2] = True
-    field = DistanceField(grid_map(occupied))
-    border = field.at(np.array([0.95, 0.55]), np.array([0.55, 0.05]))[0]
-    outside = field.at(np.array([40.0, 0.55]), np.array([0.55, -40.0]))[0]
-    np.testing.assert_allclose(outside, border, atol=1e-6)
+    occupied[5, 9] = True
+    field = DistanceField(grid_map(occupied), max_distance_m=3.0)
+    x, y = np.array([1.45, 1.45, 2.15, 40.0, -40.0]), np.array([0.55, 1.45, 0.55, 0.55, 0.55])
+    expected = np.minimum(np.hypot(x - 0.95, np.maximum(y - 0.95, 0.0) + np.array([0.0, 0.4, 0.0, 0.0, 0.0])), 3.0)
+    np.testing.assert_allclose(field.distance(x, y), field.at(x, y)[0], atol=1e-6)
+    assert np.all(np.abs(field.distance(x, y) - expected) < 0.2)  # half a cell, and up to the border across it
+    assert np.all(field.distance(x[:3], y[:3]) > 0.4)
 
 
 def test_a_beam_does_not_end_deep_inside_what_is_drawn_solid():
