@@ -113,7 +113,7 @@ def test_scans_that_fit_here_as_they_used_to_are_not_called_elsewhere():
 def test_scans_that_fit_far_worse_than_they_used_to_make_a_pose_uncertain():
     state, reason = judged([0.9], fit=0.5, usual=0.9, doubted=True)
     assert state == "UNCERTAIN" and reason.startswith("the scans fit by 50%, where they used to fit by 90%; ")
-    assert judged([0.9], fit=0.7, usual=0.9, doubted=True)[0] == "LOCALIZED"
+    assert judged([0.9], fit=0.87, usual=0.9, doubted=True)[0] == "LOCALIZED"
 
 
 def test_a_search_says_how_many_places_are_possible():
@@ -130,7 +130,8 @@ def test_a_search_says_how_many_places_are_possible():
     assert quality.judge(best()).reason == "no scan has told anything yet"
 
 
-@pytest.mark.parametrize("worse", [dict(fit=0.6), dict(doubted=True, behind=3.0)], ids=["fit", "behind"])
+@pytest.mark.parametrize("worse", [dict(fit=0.6), dict(doubted=True, behind=3.0, candidates=candidates())],
+                         ids=["fit", "behind"])
 def test_each_sign_of_a_wrong_pose_makes_it_less_reliable(worse):
     assert judgement([0.95], **worse).reliability < judgement([0.95], fit=0.95).reliability - 0.1
 
@@ -139,7 +140,16 @@ def test_reliability_is_a_chance_and_falls_with_what_the_map_explains_and_with_o
     values = [judgement([used], best(share=share), fit=0.95).reliability for used, share in
               [(1.0, 1.0), (0.7, 1.0), (0.3, 1.0), (0.3, 0.5), (0.0, 0.5)]]
     assert all(0.0 <= value <= 1.0 for value in values) and values == sorted(values, reverse=True)
-    assert values[0] > 0.97 and judgement([]).reliability == 0.0
+    assert values[0] > 0.9 and judgement([]).reliability == 0.0
+
+
+def test_a_pose_that_is_more_likely_wrong_is_not_called_localized():
+    """No sign alone is bad enough."""
+    told = judgement([0.6], fit=0.85, usual=0.95, doubted=True)
+    assert 0.0 < told.reliability < 0.4 and told.state == "UNCERTAIN"
+    assert told.reason.startswith(f"all signs together make it right by {told.reliability:.0%} only; the map explains ")
+    assert judgement([0.6], fit=0.95, usual=0.95).state == "LOCALIZED"  # scans fit as they always did here
+    assert judgement([0.9], fit=0.93, usual=0.95, doubted=True).state == "LOCALIZED"
 
 
 @pytest.mark.parametrize("values, text", [
@@ -149,7 +159,8 @@ def test_reliability_is_a_chance_and_falls_with_what_the_map_explains_and_with_o
      "~lost_used_share and ~uncertain_used_share must ascend in [0, 1], got 0.5 and 0.4"),
     (dict(uncertain_used_share=1.1),
      "~lost_used_share and ~uncertain_used_share must ascend in [0, 1], got 0.2 and 1.1"),
-    (dict(localized_min_cluster_share=1.5), "~localized_min_cluster_share must be in [0, 1], got 1.5")])
+    (dict(localized_min_cluster_share=1.5), "~localized_min_cluster_share must be in [0, 1], got 1.5"),
+    (dict(localized_min_reliability=-0.1), "~localized_min_reliability must be in [0, 1], got -0.1")])
 def test_wrong_limits_are_refused_in_one_line(values, text):
     with pytest.raises(ValueError) as err:
         QualityLimits(**values)
