@@ -243,7 +243,7 @@ class GlassMcl:
         verdict = self._watch.observe(scan, odom_from_base, self._best.map_from_base)
         self._quality.doubt(verdict)
         if verdict.found is not None:
-            return self._settle(scan, odom_from_base, verdict.found, verdict.fit)
+            return self._settle(scan, odom_from_base, verdict.found, verdict.fit_there)
         return cases
 
     def _place(self, scan: Scan, predicted: np.ndarray, odom_from_base: np.ndarray) -> BeamCases:

@@ -48,6 +48,11 @@ class Verdict:
     candidates: Optional[Candidates]  # while it is looked for
 
     @property
+    def fit_there(self) -> float:
+        """Of the best of the candidates, 0..1; NaN: there is none."""
+        return float("nan") if self.candidates is None else self.candidates.fit
+
+    @property
     def poor(self) -> bool:
         """The scans fit much worse than they used to."""
         return self.fit < _POOR * self.usual

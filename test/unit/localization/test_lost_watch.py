@@ -56,7 +56,7 @@ def test_a_right_pose_is_never_doubted_and_costs_no_search():
     watched = Watched()
     verdicts = watched.drive(loop_drive(60))
     assert not any(verdict.doubted or verdict.poor or verdict.contested for verdict in verdicts)
-    assert watched.matchers == 0
+    assert watched.matchers == 0 and np.isnan(verdicts[-1].fit_there)
     assert verdicts[-1].usual == pytest.approx(verdicts[-1].fit, abs=0.05)  # it has learnt how scans fit
 
 
@@ -68,6 +68,7 @@ def test_a_wrong_pose_is_doubted_within_a_metre_and_the_right_one_is_found():
     assert any(verdict.contested for verdict in verdicts[:6])
     found = next(index for index, verdict in enumerate(verdicts) if verdict.found is not None)
     assert off(verdicts[found].found, true[found])[0] < 0.1
+    assert verdicts[found].fit_there > 0.8 > verdicts[found].fit
     assert watched.matchers == 1
 
 
