@@ -83,6 +83,7 @@ class LostWatch:
         self._recent_m = 0.0
         self._search: Optional[GlobalSearch] = None
         self._search_way_m = self._calm_m = 0.0
+        self._search_fit_m = 0.0  # sum of fit times way during the search
         self._odom_from_base: Optional[np.ndarray] = None
         self._verdict = Verdict(float("nan"), self._usual, -np.inf, False, None, None)
 
@@ -104,7 +105,7 @@ class LostWatch:
         doubted = self._usual - self._fit > max(_DOUBT[0], _DOUBT[1] * self._spread)
         if self._search is None and doubted and self._params.recover_when_lost and self._matcher is not None:
             self._search = GlobalSearch(self._matcher(), self._field, self._params)
-            self._search_way_m = self._calm_m = 0.0
+            self._search_way_m = self._calm_m = self._search_fit_m = 0.0
             self._search.add(map_from_base, _HEAD_START)
             self._recent.clear()
             self._recent_m = 0.0
@@ -114,6 +115,7 @@ class LostWatch:
             self._verdict = Verdict(self._fit, self._usual, -np.inf, doubted, None, None)
         else:
             self._search_way_m += way_m
+            self._search_fit_m += way_m * fit
             self._calm_m = 0.0 if doubted else self._calm_m + way_m
             self._verdict = self._compare(self._search.update(scan, odom_from_base), map_from_base, doubted)
         return self._verdict
@@ -125,10 +127,13 @@ class LostWatch:
             log_w = np.log(candidates.weights)
         elsewhere = log_w[~here].max() if not here.all() else -np.inf
         behind = float(elsewhere - log_w[here].max()) if here.any() else np.inf
-        best_here = behind < -self._params.search_margin or (behind <= 0.0 and self._search_way_m > _SETTLED_M)
+        fit_meanwhile = self._search_fit_m / self._search_way_m
+        steady = self._fit > fit_meanwhile - _DOUBT[0]
+        best_here = steady and (behind < -self._params.search_margin
+                                or (behind <= 0.0 and self._search_way_m > _SETTLED_M))
         calm = self._calm_m > _CALM_M and behind < self._params.search_margin
         if best_here and doubted:  # that is how scans fit here, until they fit better again
-            self._usual, self._learnt_m = self._fit, _KNOWN_M
+            self._usual, self._learnt_m = fit_meanwhile, _KNOWN_M
         if best_here or calm or (behind <= 0.0 and not doubted):
             self._search = None
         found = candidates.poses[0] if candidates.found and not here[0] else None
