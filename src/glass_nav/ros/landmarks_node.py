@@ -20,7 +20,6 @@ Parameters: LandmarksNodeParams, TriangulationLimits, OdometryDrift, read once; 
 from __future__ import annotations
 
 import math
-import sys
 import threading
 from dataclasses import dataclass, field
 from typing import Any, Dict, List, Optional, Tuple
@@ -286,10 +285,7 @@ def main() -> None:
     try:
         node = LandmarksNode(params.load(LandmarksNodeParams, given, rospy.get_name()))
     except ValueError as err:  # ParamError and LandmarkError too
-        text = str(err)
-        rospy.logfatal(text if text.startswith(rospy.get_name()) else f"{rospy.get_name()}: {text}")
-        rospy.signal_shutdown("a parameter cannot be used")
-        sys.exit(2)
+        endings.refuse_to_start(err)
     try:
         node.run(ending)
     finally:

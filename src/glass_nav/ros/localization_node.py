@@ -365,15 +365,11 @@ def main(name: str = "glass_localization") -> None:
     try:
         p, unused = params.localization_params(given, rospy.get_name())
     except params.ParamError as err:
-        rospy.logfatal(str(err))
-        rospy.signal_shutdown("a parameter cannot be used")
-        sys.exit(2)
+        endings.refuse_to_start(err)
     try:
         node = LocalizationNode(p)
     except landmark_file.LandmarkError as err:
-        rospy.logfatal(f"{rospy.get_name()}: {err}")
-        rospy.signal_shutdown("the landmark file cannot be used")
-        sys.exit(2)
+        endings.refuse_to_start(err)
     for line in unknown:
         rospy.logwarn(line)
     if unused:

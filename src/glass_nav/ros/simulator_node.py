@@ -16,7 +16,6 @@ Parameters: SimulatorNodeParams, read once; explained in config/simulator.yaml.
 from __future__ import annotations
 
 import math
-import sys
 import threading
 import time
 from dataclasses import dataclass, replace
@@ -306,10 +305,7 @@ def main() -> None:
     try:
         node = SimulatorNode(params.load(SimulatorNodeParams, given, rospy.get_name()))
     except ValueError as err:  # ParamError, BuildingError, PathError and the others
-        text = " ".join(str(err).split())
-        rospy.logfatal(text if text.startswith(rospy.get_name()) else f"{rospy.get_name()}: {text}")
-        rospy.signal_shutdown("a parameter cannot be used")
-        sys.exit(2)
+        endings.refuse_to_start(err)
     try:
         node.run(ending)
     finally:

@@ -17,7 +17,6 @@ Parameters: TopologyNodeParams and SearchParams, read once; explained in config/
 
 from __future__ import annotations
 
-import sys
 import threading
 from dataclasses import replace
 from typing import Any, Callable, Dict, Optional
@@ -355,10 +354,7 @@ def main() -> None:
     try:
         node = TopologyNode(params.load(TopologyParams, given, rospy.get_name()))
     except (ValueError, OSError) as err:  # ParamError, AtlasError
-        text = " ".join(str(err).split())
-        rospy.logfatal(text if text.startswith(rospy.get_name()) else f"{rospy.get_name()}: {text}")
-        rospy.signal_shutdown("cannot start")
-        sys.exit(3 if isinstance(err, (AtlasError, OSError)) else 2)
+        endings.refuse_to_start(err, 3 if isinstance(err, (AtlasError, OSError)) else 2)
     try:
         node.run(ending)
     finally:
