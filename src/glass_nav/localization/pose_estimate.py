@@ -47,7 +47,8 @@ def moments(poses: np.ndarray, weights: np.ndarray) -> "tuple[np.ndarray, np.nda
     """Mean (3,) and covariance (3, 3) of weighted poses (P, 3), yaw on the circle."""
     total = weights.sum()
     w = weights / total if total > 0.0 else np.full(len(weights), 1.0 / len(weights))
-    mean = np.append(w @ poses[:, :2], angles.mean(poses[:, 2], w))
+    # summed, not w @ poses: BLAS adds strided columns in an order that goes with where they lie in memory
+    mean = np.append(np.sum(w[:, None] * poses[:, :2], axis=0), angles.mean(poses[:, 2], w))
     off = poses - mean
     off[:, 2] = angles.wrap(off[:, 2])
     return mean, (off * w[:, None]).T @ off
