@@ -117,9 +117,8 @@ class GlobalSearch:
             bearings: told with regard to where the robot is at the scan, with the landmarks that they are of.
         """
         view = self._move(scan, odom_from_base)
-        beams = beam_weights.choose(scan.answered, _BEAMS)
-        if len(beams) >= _LEAST_BEAMS:
-            points = scan.points_in_base()[beams]
+        points = telling_points(scan)
+        if points is not None:
             if not self._looked:
                 found = self._look_everywhere(points)
                 self._append(found, np.zeros(len(found)))
@@ -128,9 +127,9 @@ class GlobalSearch:
             if self._way_m >= _SEARCH_AGAIN_M or self._best_fits_poorly(points):
                 found = self._look_everywhere(points)
                 # This scan alone proposes them: they start behind what was followed so far, by how well each fits.
-                fit = scan_alignment.fit(self._field, points, found, _EVIDENCE_SCALE_M)
+                fits = fit(self._field, points, found)
                 start = self._evidence.max() - self._params.search_margin
-                self._append(found, start + _NATS_OF_A_FULL_FIT * (fit - fit.max()))
+                self._append(found, start + _NATS_OF_A_FULL_FIT * (fits - fits.max()))
                 self._keep_distinct()
         if len(self._poses):  # there are none before a scan proposes them
             for taken, landmarks in bearings:
@@ -164,9 +163,9 @@ class GlobalSearch:
         off[:, 2] = angles.wrap(moved[:, 2] - self._poses[:, 2]) / self._noise[2]
         penalty = np.minimum(0.125 * np.sum(off**2, axis=1), _MOST_PENALTY)
         self._poses = moved
-        fit = scan_alignment.fit(self._field, points, moved, _EVIDENCE_SCALE_M)
-        self._evidence = self._evidence + view * _NATS_OF_A_FULL_FIT * fit - penalty
-        self._fit_sum = self._fit_sum + view * fit
+        fits = fit(self._field, points, moved)
+        self._evidence = self._evidence + view * _NATS_OF_A_FULL_FIT * fits - penalty
+        self._fit_sum = self._fit_sum + view * fits
         self._views = self._views + view
         self._keep_distinct()
 
@@ -181,8 +180,8 @@ class GlobalSearch:
 
     def _best_fits_poorly(self, points: np.ndarray) -> bool:
         best = int(np.argmax(self._evidence))
-        fit = scan_alignment.fit(self._field, points, self._poses[best:best + 1], _EVIDENCE_SCALE_M)[0]
-        return bool(fit < _POOR_FIT * self._fit_sum[best] / max(self._views[best], 1e-9))
+        fit_now = fit(self._field, points, self._poses[best:best + 1])[0]
+        return bool(fit_now < _POOR_FIT * self._fit_sum[best] / max(self._views[best], 1e-9))
 
     def _look_everywhere(self, points: np.ndarray) -> np.ndarray:
         """(K, 3) places where this scan fits, the best first, each only once."""
@@ -217,6 +216,17 @@ class GlobalSearch:
         fit = float(self._fit_sum[0] / self._views[0]) if self._views[0] > 0.0 else float("nan")
         found = lead > self._params.search_margin and fit >= self._params.search_least_fit
         return Candidates(self._poses, weights / weights.sum(), fit, lead, bool(found))
+
+
+def telling_points(scan: Scan) -> Optional[np.ndarray]:
+    """(B, 2) end points [m] in the robot's frame of the beams that places are judged by; None: too few answered."""
+    beams = beam_weights.choose(scan.answered, _BEAMS)
+    return scan.points_in_base()[beams] if len(beams) >= _LEAST_BEAMS else None
+
+
+def fit(field: DistanceField, points_m: np.ndarray, poses: np.ndarray) -> np.ndarray:
+    """(K,) how well such points fit at poses (K, 3), 0..1."""
+    return scan_alignment.fit(field, points_m, poses, _EVIDENCE_SCALE_M)
 
 
 def same_place(poses: np.ndarray, pose: np.ndarray) -> np.ndarray:

@@ -15,14 +15,12 @@ from typing import Callable, Deque, Optional, Tuple
 import numpy as np
 
 from glass_nav.geometry import se2
-from glass_nav.localization import beam_weights, global_search, motion, scan_alignment
+from glass_nav.localization import global_search, motion
 from glass_nav.localization.global_search import Candidates, GlobalSearch, SearchParams
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.scan import Scan
 from glass_nav.sensing.scan_matcher import ScanMatcher
 
-_BEAMS, _LEAST_BEAMS = 60, 10
-_SCALE_M = 0.2          # of the fit: as for the candidates
 _USUAL_FIT = 0.9        # of a right pose, until it is known
 _USUAL_SPREAD = 0.02    # around that
 _KNOWN_M = 1.0          # of way that these two are worth
@@ -96,11 +94,10 @@ class LostWatch:
     def observe(self, scan: Scan, odom_from_base: np.ndarray, map_from_base: np.ndarray) -> Verdict:
         """One scan more and the pose that is believed after it; with too few answers the verdict stays."""
         way_m = self._way(odom_from_base)
-        beams = beam_weights.choose(scan.answered, _BEAMS)
-        if len(beams) < _LEAST_BEAMS:
+        points = global_search.telling_points(scan)
+        if points is None:
             return self._verdict
-        points = scan.points_in_base()[beams]
-        fit = float(scan_alignment.fit(self._field, points, map_from_base[None], _SCALE_M)[0])
+        fit = float(global_search.fit(self._field, points, map_from_base[None])[0])
         self._fit = fit if np.isnan(self._fit) else self._fit + (fit - self._fit) * -np.expm1(-way_m / _FORGET_M)
         doubted = self._usual - self._fit > max(_DOUBT[0], _DOUBT[1] * self._spread)
         if self._search is None and doubted and self._params.recover_when_lost and self._matcher is not None:
