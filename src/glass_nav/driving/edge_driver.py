@@ -12,10 +12,12 @@ here both go along a line of the local graph instead of a gradient of the distan
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import List, Optional, Tuple
 
 import numpy as np
+from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from glass_nav.driving import braking, edge_report, pursuit
 from glass_nav.driving.base_limits import BaseLimits
@@ -55,6 +57,7 @@ _BEHIND_M = 1.0          # a node that shows only once the robot is past it
 _DOUBT_M = 0.15          # an obstacle that is further from any wall: look around first
 _BLOCKED_S = 4.0
 _LOST_LINE_S = 3.0       # driven on along the last line, without a graph that has it
+_SEEN_M = 0.12          # a wall of the map beside a point of the scan is the same
 _NEAR_M = 2.0            # obstacles further away are not braked for
 
 
@@ -107,6 +110,7 @@ class EdgeDriver:
         self._velocity = np.zeros(3)
         self._node: Optional[Node] = None   # where it stands, or began
         self._arrival: Optional[Arrival] = None
+        self._halted: Optional[Tuple[str, Optional[Trace], int, np.ndarray]] = None
         self._begin(IDLE, "nothing to do")
 
     # -- what to do
@@ -145,10 +149,20 @@ class EdgeDriver:
         self._way = way
 
     def stop(self) -> None:
-        """Stand, whatever was asked for. seek() goes on from there, go_back() returns."""
-        trace = self._trace
-        self._begin(IDLE, "stopped")
-        self._trace = trace
+        """Stand, whatever was asked for. resume() goes on with it, seek() begins anew, go_back() returns."""
+        self._halt(IDLE, "stopped")
+
+    def resume(self) -> None:
+        """Go on with the edge, or the search for a meetpoint, that stop() or a failure ended.
+
+        Raises:
+            ValueError: there is none.
+        """
+        if self._phase not in (IDLE, FAILED) or self._halted is None:
+            raise ValueError(f"nothing was stopped that it could go on with: it is {self._phase}")
+        phase, trace, rank, way = self._halted
+        self._begin(phase, "going on")
+        self._trace, self._rank, self._way = trace, rank, way
 
     # -- what it sees
 
@@ -157,8 +171,7 @@ class EdgeDriver:
         self._pose, self._stamp_ns = self._at.correct(scan, odom_from_base), scan.stamp_ns
         self._map.add(scan, self._pose)
         self._scans += 1
-        points = scan.points_in_base()
-        self._points_m = se2.transform_points(self._pose, points[np.isfinite(points).all(axis=1)])
+        self._points_m = _steady_points(scan, self._pose)
         every = self._phase == HOMING and self._standing
         if self._phase in _DRIVING and self._sweep_rad <= 0.0 and (
                 every or self._stamp_ns - self._graph_ns >= _GRAPH_PERIOD_NS or self._graph is None):
@@ -206,9 +219,11 @@ class EdgeDriver:
         return self._obstacles_at(self._at.now(odom_from_base))
 
     def _obstacles_at(self, pose: np.ndarray) -> np.ndarray:
-        points = np.concatenate([self._points_m, self._walls_m])
-        points = points[np.abs(points - pose[:2]).max(axis=1) < _NEAR_M] if len(points) else points
-        return se2.transform_points(se2.inverse(pose), points)
+        points, walls = (among[np.abs(among - pose[:2]).max(axis=1) < _NEAR_M]
+                         for among in (self._points_m, self._walls_m))
+        if len(points) and len(walls):  # what the scan shows now it shows better than the cells do
+            walls = walls[cKDTree(points).query(walls, distance_upper_bound=_SEEN_M)[0] > _SEEN_M]
+        return se2.transform_points(se2.inverse(pose), np.concatenate([points, walls]))
 
     # -- commands
 
@@ -472,6 +487,22 @@ class EdgeDriver:
         self._lost_since_ns = 0
 
     def _fail(self, failure: str, reason: str) -> None:
+        self._halt(FAILED, reason)
+        self._failure = failure
+
+    def _halt(self, phase: str, reason: str) -> None:
+        """Stand, and remember what it did; what it remembers already stays if it did nothing."""
+        if self._phase in _DRIVING and self._phase != RETURNING:
+            seeking = self._trace is None
+            self._halted = (
+                SEEKING if seeking else FOLLOWING, self._trace, self._rank, self._way)
         trace = self._trace
-        self._begin(FAILED, reason)
-        self._failure, self._trace = failure, trace
+        self._begin(phase, reason)
+        self._trace = trace
+
+
+def _steady_points(scan: Scan, local_from_base: np.ndarray) -> np.ndarray:
+    """(K, 2) end points of the beams, without single ones that stick out."""
+    ranges_m = np.where(scan.answered, scan.ranges_m, np.inf)
+    points = replace(scan, ranges_m=ndimage.median_filter(ranges_m, 3, mode="nearest")).points_in_base()
+    return se2.transform_points(local_from_base, points[np.isfinite(points).all(axis=1)])
