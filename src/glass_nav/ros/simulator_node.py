@@ -55,7 +55,7 @@ class SimulatorNodeParams:
     """Private parameters of the node. Units by REP 103."""
     building: str = "glass_office"    # yaml file, folder with building.yaml, or name of one in maps/
     opaque: bool = False              # the same building with film on all glass; the map is the same
-    start: str = ""                   # "x y yaw" in the map, or "random" by the seed; empty: of the path or the building
+    start: str = ""                   # "x y yaw" in the map, or "random" by the seed; empty: the path's
     path: str = ""                    # name, file of waypoints, or "first"; "none" or empty: cmd_vel only
     path_speed_m_s: float = 0.6
     repeat_path: bool = False         # back to its start and so on, for ever
