@@ -27,7 +27,7 @@ from glass_nav.world.grid_map import UNKNOWN, GridMap
 
 FREE, OCCUPIED = 0, 100
 _FORGET_AT = 60    # beams counted in a cell from one direction: halved, so that what is new counts
-_BEFORE_M = 0.08   # so near in front of where a beam ended it proves nothing: noise, and the cell's own size
+_BEFORE_M = 0.05   # so near in front of where a beam ended it proves nothing: noise, and the cell's own size
 _LEAST_PIECE = 4   # cells of a pane that give a line
 
 

@@ -181,8 +181,8 @@ class Building:
 
     def opaque(self) -> "Building":
         """The same building with film on all glass and mirrors; the map of it is the same."""
-        return replace(self, panes=tuple(Pane(sheet.line_m, film=True) for sheet in (*self.panes, *self.mirrors)),
-                       mirrors=())
+        lines = [pane.line_m for pane in self.panes] + [mirror.line_m for mirror in self.mirrors]
+        return replace(self, panes=tuple(Pane(line_m, film=True) for line_m in lines), mirrors=())
 
     def changed(self, share: float, rng: np.random.Generator) -> "Building":
         """The same building after somebody moved furniture: the map does not know.
