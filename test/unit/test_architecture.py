@@ -17,7 +17,7 @@ MAY_IMPORT = {
     "sensing": "geometry world",
     "localization": "geometry world sensing",
     "topology": "geometry world sensing",
-    "driving": "geometry world sensing topology",
+    "driving": "geometry world sensing localization topology",
     "recording": "geometry world sensing",
     "simulation": "geometry world sensing",
     "evaluation": "geometry",
