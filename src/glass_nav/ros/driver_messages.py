@@ -58,8 +58,8 @@ def rank_from_words(edge: str, degree: int) -> int:
         rank = 1 if word == LEFT else degree - 1
     elif word == FORWARD:
         if degree != 2:
-            raise ObservationError(f"edge {FORWARD}: the meetpoint has degree {degree}, {FORWARD} is the only way on of "
-                                   "degree 2")
+            raise ObservationError(f"edge {FORWARD}: the meetpoint has degree {degree}, {FORWARD} is the only way on "
+                                   "of degree 2")
         rank = 1
     else:
         raise ObservationError(f"edge must be {LEFT}, {RIGHT}, {U_TURN}, {FORWARD}, or a rank such as RANK_2 or 2, "

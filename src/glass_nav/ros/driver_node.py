@@ -101,6 +101,7 @@ class DriverNode:
         self._job: Optional[_Job] = None
         self._arrival: Optional[Arrival] = None       # where it stands
         self._arrival_stamp_ns = 0
+        self._arrived_at = np.zeros(3)                # odom_from_base there
         self._reported_s = -math.inf
         self._sought = self._gave_up = False          # by itself
         self._topology: Optional[TopologyStatus] = None
@@ -110,6 +111,7 @@ class DriverNode:
         self._velocity = np.zeros(3)
         self._quiet_from_s = -math.inf
         self._odom_from_base: Optional[np.ndarray] = None
+        self._odometry_pose: Optional[np.ndarray] = None  # at the control step before
         self._odometry_ns = self._seen_ns = 0
         self._status_pace, self._markers_pace = Pace(), Pace()
         self._next_report_s = 0.0                     # of diagnostics, by the monotonic clock
@@ -205,8 +207,8 @@ class DriverNode:
         elif not self._stands_at_meetpoint:
             self._log.warn(f"{words} not used: the robot stands at no meetpoint")
         elif stamp_ns not in (0, self._arrival_stamp_ns):
-            self._log.warn(f"{words} not used: it answers the meetpoint of {stamp_ns * 1e-9:.3f} s, the robot stands at "
-                           f"that of {self._arrival_stamp_ns * 1e-9:.3f} s")
+            self._log.warn(f"{words} not used: it answers the meetpoint of {stamp_ns * 1e-9:.3f} s, the robot stands "
+                           f"at that of {self._arrival_stamp_ns * 1e-9:.3f} s")
         else:
             try:
                 task = EdgeTask(self._driver, self._p.recovery, self._p.edge.limits, msg.rank, may_choose=True)
@@ -226,8 +228,8 @@ class DriverNode:
             rank: Optional[int] = None
             if goal.edge.strip():
                 if not self._stands_at_meetpoint:
-                    self._refuse(self._edge_server, NOT_AT_MEETPOINT, "the robot stands at no meetpoint: a goal without "
-                                 "edge drives to one", name)
+                    self._refuse(self._edge_server, NOT_AT_MEETPOINT,
+                                 "the robot stands at no meetpoint: a goal without edge drives to one", name)
                     return
                 assert self._arrival is not None
                 rank = driver_messages.rank_from_words(goal.edge, self._arrival.meetpoint.degree)
@@ -335,7 +337,8 @@ class DriverNode:
         job = self._job
         assert job is not None
         self._job = None
-        job.task.cancel() if outcome.code not in (SUCCEEDED,) else None
+        if outcome.code != SUCCEEDED:
+            job.task.cancel()
         self._stand()
         arrival = job.task.arrival if isinstance(job.task, EdgeTask) else None
         if arrival is not None:
@@ -358,6 +361,8 @@ class DriverNode:
     def _arrive(self, arrival: Arrival) -> None:
         """Report a meetpoint, and the edge to it."""
         self._arrival, self._arrival_stamp_ns, self._gave_up = arrival, arrival.stamp_ns, False
+        if self._odom_from_base is not None:
+            self._arrived_at = self._odom_from_base
         traversal = driver_messages.traversal_msg(arrival, self._node.base_frame_id)
         if traversal is not None:
             self._traversals.publish(traversal)
@@ -391,7 +396,7 @@ class DriverNode:
         """Nothing is on: does a search wait for the robot?"""
         waits = self._topology is not None and self._topology.state == TopologyStatus.WAITING
         if self._arrival is not None and self._odom_from_base is not None and float(np.hypot(
-                *(self._odom_from_base - self._arrival.odom_from_base)[:2])) > MOVED_M:
+                *(self._odom_from_base - self._arrived_at)[:2])) > MOVED_M:
             self._driver.stop()
             self._arrival = None
             self._tell(IDLE, "the robot was moved away from its meetpoint")
@@ -495,8 +500,6 @@ class DriverNode:
         if self._job is not None and before is not None:
             self._job.travelled_m += float(np.hypot(*(self._odom_from_base - before)[:2]))
         self._odometry_ns, self._odometry_pose = stamp_ns, self._odom_from_base
-
-    _odometry_pose: Optional[np.ndarray] = None
 
     def _map_from_base(self) -> Optional[np.ndarray]:
         """(3,) now; None without a transform."""

@@ -99,4 +99,5 @@ class MoveBaseTask:
 
 
 _STATUS = {getattr(GoalStatus, name): name for name in (
-    "PENDING", "ACTIVE", "PREEMPTED", "SUCCEEDED", "ABORTED", "REJECTED", "PREEMPTING", "RECALLING", "RECALLED", "LOST")}
+    "PENDING", "ACTIVE", "PREEMPTED", "SUCCEEDED", "ABORTED", "REJECTED", "PREEMPTING", "RECALLING", "RECALLED",
+    "LOST")}
