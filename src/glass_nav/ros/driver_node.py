@@ -245,7 +245,7 @@ class DriverNode:
         goal: GotoNodeGoal = self._accept(self._goto_server)
         name = f"goto_node {goal.node}" if goal.node >= 0 else "goto_node pose"
         unknown = self._pose_unknown()
-        if unknown:
+        if unknown and not self._localization_is_silent:  # one that fell silent is waited for
             self._refuse(self._goto_server, NOT_LOCALIZED, f"the goal needs a pose in the map: {unknown}", name)
             return
         try:
@@ -476,13 +476,16 @@ class DriverNode:
                     + (f" for {age_s:.1f} s" if self._odometry_ns else ""))
         return None
 
+    @property
+    def _localization_is_silent(self) -> bool:
+        return bool(self._localization) and self._now_s - self._localization_s > self._node.status_timeout_s
+
     def _pose_unknown(self) -> Optional[str]:
         """Why there is no pose in the map; None if there is one."""
         if not self._localization:
             return f"no word on {rospy.resolve_name('localization_status')}"
-        age_s = self._now_s - self._localization_s
-        if age_s > self._node.status_timeout_s:
-            return f"the localization is silent for {age_s:.1f} s"
+        if self._localization_is_silent:
+            return f"the localization is silent for {self._now_s - self._localization_s:.1f} s"
         if self._localization not in POSE_STATES:
             return f"the localization is {self._localization}"
         if self._map_from_base() is None:
