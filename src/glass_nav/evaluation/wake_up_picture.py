@@ -90,10 +90,10 @@ def _ground(axes: Any, grid: MapImage, low: np.ndarray, high: np.ndarray) -> Non
 
 def _draw_way(axes: Any, grid: MapImage, story: WakeUpStory, low: np.ndarray, high: np.ndarray) -> None:
     _ground(axes, grid, low, high)
-    for way, colour, label in ((story.search_m, SEARCH_COLOUR, "true way of the search"),
-                               (story.tour_m, TOUR_COLOUR, "true way of the tour")):
+    for way, colour, width, label in ((story.tour_m, TOUR_COLOUR, 3.2, "true way of the tour"),
+                                      (story.search_m, SEARCH_COLOUR, 1.8, "true way of the search")):
         if len(way):
-            axes.plot(way[:, 0], way[:, 1], color=colour, linewidth=1.8, label=label, zorder=3)
+            axes.plot(way[:, 0], way[:, 1], color=colour, linewidth=width, label=label, zorder=3)
             axes.plot(*way[0], "o", color=colour, markersize=5, zorder=4)
     for number, depth in enumerate(story.depths):
         if depth.truth is not None:

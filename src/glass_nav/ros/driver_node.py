@@ -547,6 +547,8 @@ class DriverNode:
 
     def _clock_jumped_back(self) -> bool:
         before_s, self._now_s = self._now_s, rospy.get_time()
+        if before_s == 0.0:  # the first /clock
+            self._scans.last_arrival_s = self._surfaces.last_arrival_s = self._controlled_s = self._now_s
         if self._now_s >= before_s - TIME_JUMP_S:
             return False
         self._reset(f"time jumped back by {before_s - self._now_s:.3f} s")

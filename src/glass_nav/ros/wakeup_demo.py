@@ -139,8 +139,8 @@ class WakeupDemo:
         off_rad = abs(float(angles.wrap(said[2] - true[2])))
         right = off_m < RIGHT_M and off_rad < RIGHT_RAD
         self._print(f"CONFIRMED behind {status.depth} edges, {'right' if right else 'WRONG'}: hands over "
-                    f"x {said[0]:.2f} m, y {said[1]:.2f} m, {off_m:.3f} m and {math.degrees(off_rad):.1f} degrees off the "
-                    "truth")
+                    f"x {said[0]:.2f} m, y {said[1]:.2f} m, {off_m:.3f} m and {math.degrees(off_rad):.1f} degrees off "
+                    "the truth")
         return right
 
     def _tell_depth(self, status: TopologyStatus) -> None:
