@@ -15,7 +15,7 @@ import numpy as np
 from glass_nav.driving import braking, edge_driver, recovery, velocity
 from glass_nav.driving.base_limits import BaseLimits
 from glass_nav.driving.edge_driver import Arrival, EdgeDriver
-from glass_nav.driving.recovery import Recovery, RecoveryParams
+from glass_nav.driving.recovery import Recovery, RecoveryParams, Stall
 from glass_nav.driving.route import Route, RouteError, RoutePlanner
 from glass_nav.driving.route_follower import FollowerParams, RouteFollower
 from glass_nav.topology.observations import turn_name
@@ -26,6 +26,7 @@ SUCCEEDED, BLOCKED, NO_GRAPH, NO_WAY = "SUCCEEDED", "BLOCKED", "NO_GRAPH", "NO_W
 # states, besides those of EdgeDriver
 GOING, RECOVERING = "GOING", "RECOVERING"
 
+HELD = "the robot makes no way, something that the lidar does not see may hold it"
 BLOCKED_S = 3.0        # braked to a standstill for so long
 OFF_ROUTE_M = 0.6      # then there is another route
 STANDSTILL_M_S = 0.03
@@ -92,7 +93,7 @@ class EdgeTask:
             ValueError: the robot stands at none.
         """
         self._driver, self._limits = driver, limits
-        self._recovery = Recovery(p, limits)
+        self._recovery, self._stall = Recovery(p, limits), Stall()
         self._rank, self._may_choose = rank, may_choose
         self._tried: Set[int] = set() if rank is None else {rank}
         self._returning = False
@@ -127,6 +128,10 @@ class EdgeTask:
             return np.zeros(3)
         if self._recovery.is_on:
             return self._recover(now)
+        if self._stall.is_on(now.last_command, now.odom_from_base, now.dt_s):
+            self._driver.stop()
+            self._recovery.begin(HELD, now.odom_from_base)
+            return self._recover(now)
         command = self._driver.command(now.odom_from_base, now.dt_s)
         progress = self._driver.progress
         if progress.phase == edge_driver.FAILED:
@@ -154,6 +159,7 @@ class EdgeTask:
             self.outcome = Outcome(BLOCKED, f"edge {name} is blocked; it went back to the meetpoint")
 
     def _recover(self, now: Moment) -> np.ndarray:
+        self._stall.clear()
         step = self._recovery.step(now.odom_from_base, now.dt_s)
         self._recovery_reason = step.reason
         if step.name in recovery.MOVES:
@@ -190,7 +196,7 @@ class GoTask:
             final_yaw_rad: to stand with; None: as it comes.
         """
         self._planner, self._driver, self._follower_params, self._limits = planner, driver, follower, limits
-        self._recovery = Recovery(p, limits)
+        self._recovery, self._stall = Recovery(p, limits), Stall()
         self._goal, self._final_yaw_rad = goal, final_yaw_rad
         self._avoided: Set[int] = set()
         self._follower: Optional[RouteFollower] = None
@@ -229,6 +235,9 @@ class GoTask:
             self._plan(now.map_from_base)
             if self._follower is None:
                 return np.zeros(3)
+        if self._stall.is_on(now.last_command, now.odom_from_base, now.dt_s):
+            self._recovery.begin(HELD, now.odom_from_base)
+            return self._recover(now, obstacles_m)
         wanted = self._follower.command(now.map_from_base)
         if self._follower.done:
             self.outcome = Outcome(SUCCEEDED, "it stands at the goal")
@@ -261,6 +270,7 @@ class GoTask:
                                        self._final_yaw_rad)
 
     def _recover(self, now: Moment, obstacles_m: np.ndarray) -> np.ndarray:
+        self._stall.clear()
         step = self._recovery.step(now.odom_from_base, now.dt_s)
         self._recovery_reason = step.reason
         if step.name in recovery.MOVES:
