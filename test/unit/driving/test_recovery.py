@@ -9,7 +9,8 @@ import pytest
 
 from glass_nav.driving import recovery
 from glass_nav.driving.base_limits import BaseLimits
-from glass_nav.driving.recovery import ABORT, BACK_OFF, NEXT_CHOICE, NONE, RETRY, TURN, WAIT, Recovery, RecoveryParams, Stall
+from glass_nav.driving.recovery import (ABORT, BACK_OFF, NEXT_CHOICE, NONE, RETRY, TURN, WAIT, Recovery,
+                                        RecoveryParams, Stall)
 from glass_nav.simulation.robot import Obstacles, Robot, RobotParams
 
 CONTROL_S = 0.05
@@ -103,7 +104,8 @@ def test_a_base_that_makes_no_way_though_it_is_told_to_is_noticed():
     stall, forward = Stall(), np.array([0.4, 0.0, 0.0])
     for step in range(200):  # it drives
         assert not stall.is_on(forward, np.array([0.02 * step, 0.0, 0.0]), CONTROL_S)
-    told_s = next(step * CONTROL_S for step in range(200) if stall.is_on(forward, np.array([3.98, 0.0, 0.0]), CONTROL_S))
+    held_at = np.array([3.98, 0.0, 0.0])
+    told_s = next(step * CONTROL_S for step in range(200) if stall.is_on(forward, held_at, CONTROL_S))
     assert 0.5 < told_s < 2.0
     stall.clear()
     assert not any(stall.is_on(np.array([0.0, 0.0, 1.0]), np.zeros(3), CONTROL_S) for _ in range(200))  # it turns
