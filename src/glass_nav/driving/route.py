@@ -87,7 +87,8 @@ class RoutePlanner:
         def away_m(edge: int) -> float:
             line = self._lines[edge]
             return float(np.hypot(*(line.at(line.nearest(point_m)) - point_m)))
-        return min({dart >> 1 for dart in darts}, key=away_m, default=None)
+        edges = {dart >> 1 for dart in darts}
+        return min(edges, key=away_m) if edges else None
 
     # -- the graph
 

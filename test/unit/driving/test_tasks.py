@@ -217,12 +217,6 @@ def test_an_edge_that_was_asked_for_and_cannot_be_driven_is_told_back_at_its_mee
     assert drive.driver.progress.phase == edge_driver.ARRIVED
 
 
-def test_a_search_for_a_meetpoint_goes_on_where_there_is_one():
-    drive = Drive(corridor(), (9.5, 1.0, 0.0), ledge_x=9.6)
-    assert drive.run(EdgeTask(drive.driver, QUICK, LIMITS)).code == tasks.SUCCEEDED  # westwards there is no ledge
-    assert not drive.touched
-
-
 def test_a_search_that_is_held_everywhere_is_given_up():
     drive = Drive(corridor(), (5.0, 4.0, 0.0))
     drive.simulation.move = lambda dt_s, command, move=drive.simulation.move: move(dt_s, command * [0.0, 0.0, 1.0])
