@@ -238,11 +238,11 @@ class WakeupDemo:
     def _wait(self, condition: Callable[[], bool], simulated_s: float = math.inf, wall_s: float = math.inf,
               nested: bool = False) -> bool:
         """Take in what comes until the condition holds, or too much time has passed."""
-        began_s, wall_began_s = rospy.get_time(), time.monotonic()
+        began_s, wall_began_s = self._simulated_s(), time.monotonic()
         while not (rospy.is_shutdown() or self._ending.is_set()):
             if condition():
                 return True
-            if rospy.get_time() - began_s > simulated_s or time.monotonic() - wall_began_s > wall_s:
+            if self._simulated_s() - began_s > simulated_s or time.monotonic() - wall_began_s > wall_s:
                 return False
             rows: List[TopologyStatus] = []
             for topic, msg in self._inbox.take(timeout_s=0.05)["events"]:
@@ -288,6 +288,10 @@ class WakeupDemo:
 
     def _newest_truth(self) -> np.ndarray:
         return self._truth[max(self._truth)]
+
+    def _simulated_s(self) -> float:
+        """Time of the newest truth: that of rospy may come later than what is heard."""
+        return max(self._truth, default=0) * 1e-9
 
     def _way(self, from_ns: int, to_ns: float = math.inf) -> np.ndarray:
         """(N, 2) true way between two stamps."""
