@@ -44,7 +44,7 @@ from glass_nav.geometry import se2
 from glass_nav.msg import (DriverStatus, EdgeTraversal, GotoNodeAction, GotoNodeFeedback, GotoNodeGoal, GotoNodeResult,
                            LocalizationStatus, Meetpoint, TopologyStatus, TraverseEdgeAction, TraverseEdgeFeedback,
                            TraverseEdgeGoal, TraverseEdgeResult, TurnChoice)
-from glass_nav.ros import conversions, driver_displays, driver_messages, endings
+from glass_nav.ros import action_status, conversions, driver_displays, driver_messages, endings
 from glass_nav.ros.driver_params import MOVE_BASE, DriverParams
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Mailbox
@@ -105,7 +105,7 @@ class DriverNode:
         self._reported_s = -math.inf
         self._sought = self._gave_up = False          # by itself
         self._topology: Optional[TopologyStatus] = None
-        self._localization = ""
+        self._localization = self._localization_reason = ""
         self._localization_s = -math.inf              # when it was heard
         self._said = IDLE, "nothing is asked for", ""
         self._velocity = np.zeros(3)
@@ -133,7 +133,7 @@ class DriverNode:
         self._goto_server = self._action("goto_node", GotoNodeAction, self._accept_goto)
         self._send_status()
         for server in (self._edge_server, self._goto_server):
-            server.start()
+            action_status.start(server)
         # Subscribers last: they may fire at once.
         self._listener = tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
         self._scans.subscribe(lambda msg: self._inbox.put("scans", msg))
@@ -181,6 +181,7 @@ class DriverNode:
 
     def _take_localization(self, msg: LocalizationStatus) -> None:
         self._localization, self._localization_s = msg.state_name, self._now_s
+        self._localization_reason = msg.reason
 
     def _take_map(self, msg: OccupancyGrid) -> None:
         """A map came: is the atlas one of it?"""
@@ -487,7 +488,8 @@ class DriverNode:
         if self._localization_is_silent:
             return f"the localization is silent for {self._now_s - self._localization_s:.1f} s"
         if self._localization not in POSE_STATES:
-            return f"the localization is {self._localization}"
+            return f"the localization is {self._localization}" + (
+                f": {self._localization_reason}" if self._localization_reason else "")
         if self._map_from_base() is None:
             return f"no transform {self._node.global_frame_id} <- {self._node.odom_frame_id}"
         return None
