@@ -146,6 +146,7 @@ class EdgeDriver:
         """
         if self._node is None or self._trace is None:
             raise ValueError("it left no meetpoint that it could return to")
+        self._trace.cut_back(self._pose[:2])
         way = np.concatenate([self._pose[None, :2], self._trace.way_m[::-1]])
         self._begin(RETURNING, "back to the meetpoint that it left")
         self._way = way
