@@ -1,8 +1,9 @@
 """One scan, rough pose -> corrected pose, by the beams that ended at walls: segments and cases take turns.
 
 What a beam met is told at a pose (beam_cases.py), and the pose is corrected by beams whose case is known
-(segment_correction.py), so each needs the other. First all beams pull; then only those of case 1, 3 and 4, told anew
-at each pose that this leads to. A mirrored beam (2) or one that is not understood (0) ends nowhere on the map and must
+(segment_correction.py), so each needs the other. First all beams pull, from the rough pose and others around it, and
+the end where most points lie near walls counts; then only those of case 1, 3 and 4 pull, told anew at each pose that
+this leads to. A mirrored beam (2) or one that is not understood (0) ends nowhere on the map and must
 not pull; one that passed panes pulls on the wall behind. Unlike the particle filter this remembers no glass. B beams.
 """
 
@@ -25,6 +26,7 @@ from glass_nav.sensing.wall_thickness import wall_thickness
 from glass_nav.world import wall_segments
 from glass_nav.world.grid_map import GridMap
 
+_AROUND_M, _AROUND_RAD, _AROUND = 0.3, np.radians(4.0), 8  # starts beside the rough pose
 _ROUNDS = 3           # of cases, then correction
 _AGAIN = 0.5          # of the first neighbourhood: the pose is nearly right by then
 _MIDDLE = 0.5         # of a wall, where a beam ends in it
@@ -62,7 +64,9 @@ class SegmentLocator:
         rough = np.array(map_from_base, float)
         points = scan.points_in_base()
         used = scan.answered
-        found = self._first.correct(points[used], rough)
+        starts = _starts(rough) if used.any() else rough[None]
+        found = max((self._first.correct(points[used], start) for start in starts),
+                    key=lambda each: each.after.classification_factor)
         case = self._cases(scan, found.map_from_base)
         for _ in range(_ROUNDS):
             known = beam_weights.known_ends(case)
@@ -82,3 +86,11 @@ class SegmentLocator:
                                          vote.normal_min_linearity)
         glass = self._glass_map.chances(references.cell[[0, 2], 0])
         return beam_cases.classify(scan.ranges_m, references, self._residuals, vote, glass, scan.range_max_m).case
+
+
+def _starts(rough: np.ndarray) -> np.ndarray:
+    """(S, 3) the rough pose and a ring around it, turned to either side in turn; the rough one is the first."""
+    bearing = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
+    turn = np.where(np.arange(_AROUND) % 2, -_AROUND_RAD, _AROUND_RAD)
+    ring = rough + np.column_stack([_AROUND_M * np.cos(bearing), _AROUND_M * np.sin(bearing), turn])
+    return np.vstack([rough, ring])
