@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from glass_nav.geometry import angles
 from glass_nav.localization import beam_cases, beam_weights, preliminary_samples, reference_ranges
 from glass_nav.localization.beam_cases import CaseVote
 from glass_nav.localization.beam_weights import BeamMixture
@@ -67,6 +68,7 @@ class SegmentLocator:
         starts = _starts(rough) if used.any() else rough[None]
         found = max((self._first.correct(points[used], start) for start in starts),
                     key=lambda each: each.after.classification_factor)
+        found = replace(found, map_from_base=_kept_where_free(found, rough))
         case = self._cases(scan, found.map_from_base)
         for _ in range(_ROUNDS):
             known = beam_weights.known_ends(case)
@@ -77,7 +79,9 @@ class SegmentLocator:
             case = self._cases(scan, found.map_from_base)
             if np.all(np.abs(found.map_from_base - pose) < _SAME):
                 break
-        return Located(replace(found, before=self._again.quality(points[used], rough)), case, used)
+        pose = _kept_where_free(found, rough)
+        before, after = (self._again.quality(points[used], each) for each in (rough, pose))
+        return Located(replace(found, map_from_base=pose, before=before, after=after), case, used)
 
     def _cases(self, scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
         vote = CaseVote()
@@ -86,6 +90,18 @@ class SegmentLocator:
                                          vote.normal_min_linearity)
         glass = self._glass_map.chances(references.cell[[0, 2], 0])
         return beam_cases.classify(scan.ranges_m, references, self._residuals, vote, glass, scan.range_max_m).case
+
+
+def _kept_where_free(found: SegmentCorrection, rough: np.ndarray) -> np.ndarray:
+    """(3,) the corrected pose, along directions that no segment constrains at the rough one, wherever it started."""
+    if not len(found.free) or not found.lever_m:
+        return found.map_from_base
+    lever = np.array([1.0, 1.0, found.lever_m])
+    moved = found.map_from_base - rough
+    moved[2] = angles.wrap(moved[2])
+    pose = found.map_from_base - (found.free.T @ (found.free @ (moved * lever))) / lever
+    pose[2] = angles.wrap(pose[2])
+    return pose
 
 
 def _starts(rough: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from buildings import GLASS_ROOM, L_ROOM, off
+from buildings import CORRIDOR, GLASS_ROOM, L_ROOM, off
 
 from glass_nav.geometry import se2
 from glass_nav.localization.segment_locator import SegmentLocator
@@ -70,3 +70,14 @@ def test_few_beams_pull_all_together_whatever_they_met(room):
     located = room.locate(scan, HERE + [0.1, 0.0, 0.0])
     assert located.used.sum() == 16
     assert off(located.correction.map_from_base, HERE)[0] < 0.03
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_along_a_hallway_the_rough_pose_is_kept(seed):
+    true = np.array([30.0, 1.1, 0.1])
+    scan = CORRIDOR.scan(true, rng=np.random.default_rng(seed))
+    scan = replace(scan, ranges_m=np.where(scan.ranges_m < 10.0, scan.ranges_m, np.inf))  # sees neither end
+    found = SegmentLocator(CORRIDOR.grid_map()).locate(scan, true + [0.2, -0.3, 0.08]).correction
+    assert found.map_from_base[0] == pytest.approx(30.2, abs=2e-3)
+    assert found.map_from_base[1:] == pytest.approx(true[1:], abs=0.01)
+    assert len(found.free) == 1 and abs(np.sin(found.free_heading_rad)) < 0.01
