@@ -17,11 +17,12 @@ MAY_IMPORT = {
     "sensing": "geometry world",
     "localization": "geometry world sensing",
     "topology": "geometry world sensing",
+    "driving": "geometry world sensing localization topology",
     "recording": "geometry world sensing",
     "simulation": "geometry world sensing",
     "evaluation": "geometry",
-    "cli": "geometry world sensing localization topology recording simulation evaluation",
-    "ros": "geometry world sensing localization topology recording simulation evaluation",
+    "cli": "geometry world sensing localization topology driving recording simulation evaluation",
+    "ros": "geometry world sensing localization topology driving recording simulation evaluation",
 }
 FOR_ALL = {"amcl_parameters", "params"}  # modules of no room
 ONLY_BY = {  # compiled modules, each behind its face; and what is heavy, where it is needed

@@ -38,7 +38,7 @@ from glass_nav.ros.frame_messages import FrameNames
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Mailbox
 from glass_nav.ros.served_map import ServedMap
-from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings
+from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings, start_place
 from glass_nav.simulation.landmark_scanner import ScannerModel
 from glass_nav.simulation.path_follower import FollowerParams, PathFollower
 from glass_nav.simulation.robot import RobotParams
@@ -54,6 +54,8 @@ BEHIND_S = 1.0            # of the wall clock: more is not made up for
 class SimulatorNodeParams:
     """Private parameters of the node. Units by REP 103."""
     building: str = "glass_office"    # yaml file, folder with building.yaml, or name of one in maps/
+    opaque: bool = False              # the same building with film on all glass; the map is the same
+    start: str = ""                   # "x y yaw" in the map, or "random" by the seed; empty: the path's
     path: str = ""                    # name, file of waypoints, or "first"; "none" or empty: cmd_vel only
     path_speed_m_s: float = 0.6
     repeat_path: bool = False         # back to its start and so on, for ever
@@ -61,6 +63,7 @@ class SimulatorNodeParams:
     beams: int = 0                    # 0: the lidar's own
     echo: str = ""                    # first, strongest, last; empty: the lidar's own
     robot: str = "diff"               # diff, omni
+    braking_factor: float = 1.0       # it slows down so many times as hard as it accelerates
     seed: int = 0
     changed: float = 0.0              # share of the movable furniture that moved since the map was drawn
     scan_rate_hz: float = 10.0
@@ -286,8 +289,11 @@ def _drive(p: SimulatorNodeParams) -> _Drive:
     if p.echo:
         model = replace(model, echo=p.echo)
     building = building_file.load(shipped_buildings.find(p.building))
+    if p.opaque:
+        building = building.opaque()
     scanner = ScannerModel(reading_rad=math.radians(p.landmark_reading_deg), move_s=p.landmark_move_s)
-    simulation = Simulation(building, model, RobotParams(p.robot), seed=p.seed, scan_rate_hz=p.scan_rate_hz,
+    simulation = Simulation(building, model, RobotParams(p.robot, braking_factor=p.braking_factor), seed=p.seed,
+                            scan_rate_hz=p.scan_rate_hz, start=start_place.start(p.start, building, p.seed),
                             base_from_laser=np.array([p.laser_x_m, p.laser_y_m, p.laser_yaw_rad]),
                             changed_share=p.changed, turn_time_s=p.turn_time_s,
                             scanner=scanner if len(building.tags) else None,

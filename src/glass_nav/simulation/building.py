@@ -46,6 +46,7 @@ class Pane:
     glazing: str = "single"    # or "double"
     gap_m: float = 0.016       # between the sheets of a double glazing
     dirt: float = 0.004        # share of the light that dust and prints scatter, rho_d
+    film: bool = False         # pasted over: beams see a wall
 
     def __post_init__(self) -> None:
         check_line("pane", self.line_m, most=2)
@@ -165,6 +166,9 @@ class Building:
             rows += outline_rows(thing.outline_m, thing.mapped, thing.present, thing.reflectance)
         for number, pane in enumerate(self.panes):
             a, b = np.asarray(pane.line_m, float)
+            if pane.film:
+                rows.append(_opaque_row(a, b, True, True, MATERIALS["plaster"]))
+                continue
             normal = np.array([a[1] - b[1], b[0] - a[0]]) / np.hypot(*(b - a))
             offsets = [0.0] if pane.glazing == "single" else [-pane.gap_m / 2.0, pane.gap_m / 2.0]
             for offset in offsets:
@@ -174,6 +178,11 @@ class Building:
             rows.append((*mirror.line_m[0], *mirror.line_m[1], MIRROR, True, True, mirror.reflectance, 0.0, 1.0, 0.004,
                          len(self.panes) + number, 1))
         return surfaces_from_rows(rows)
+
+    def opaque(self) -> "Building":
+        """The same building with film on all glass and mirrors; the map of it is the same."""
+        lines = [pane.line_m for pane in self.panes] + [mirror.line_m for mirror in self.mirrors]
+        return replace(self, panes=tuple(Pane(line_m, film=True) for line_m in lines), mirrors=())
 
     def changed(self, share: float, rng: np.random.Generator) -> "Building":
         """The same building after somebody moved furniture: the map does not know.
@@ -276,8 +285,11 @@ def _strip(a: np.ndarray, b: np.ndarray, width_m: float) -> np.ndarray:
 
 def outline_rows(outline_m: np.ndarray, mapped: bool, present: bool, reflectance: float) -> List[Tuple[float, ...]]:
     """Rows for surfaces_from_rows(): the closed outline (N, 2) of something opaque."""
-    return [(*a, *b, OPAQUE, mapped, present, reflectance, 0.0, 1.0, 0.0, -1, 1)
-            for a, b in zip(outline_m, np.roll(outline_m, -1, axis=0))]
+    return [_opaque_row(a, b, mapped, present, reflectance) for a, b in zip(outline_m, np.roll(outline_m, -1, axis=0))]
+
+
+def _opaque_row(a: np.ndarray, b: np.ndarray, mapped: bool, present: bool, reflectance: float) -> Tuple[float, ...]:
+    return (*a, *b, OPAQUE, mapped, present, reflectance, 0.0, 1.0, 0.0, -1, 1)
 
 
 def check_line(noun: str, line_m: np.ndarray, least: int = 2, most: int = 0) -> None:

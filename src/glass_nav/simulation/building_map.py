@@ -81,7 +81,8 @@ def _mapped_lines(building: Building) -> Tuple[np.ndarray, np.ndarray]:
     """Ends (L, 2), (L, 2) of what is drawn; a glazing is one line."""
     surfaces = building.surfaces
     opaque = surfaces.mapped & (surfaces.kind == OPAQUE)
-    lines: List[np.ndarray] = [pane.line_m for pane in building.panes] + [each.line_m for each in building.mirrors]
+    lines: List[np.ndarray] = [pane.line_m for pane in building.panes if not pane.film]
+    lines += [mirror.line_m for mirror in building.mirrors]
     glass = np.array(lines, float).reshape(-1, 2, 2)
     return (np.concatenate([surfaces.from_m[opaque], glass[:, 0]]),
             np.concatenate([surfaces.to_m[opaque], glass[:, 1]]))

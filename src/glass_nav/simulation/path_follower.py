@@ -15,6 +15,8 @@ from typing import Any, List, Tuple
 
 import numpy as np
 
+from glass_nav.geometry import polyline
+from glass_nav.geometry.polyline import Polyline
 from glass_nav.simulation.building import Building
 from glass_nav.simulation.robot import RobotParams
 
@@ -52,34 +54,31 @@ class PathFollower:
         Raises:
             PathError: fewer than two different points, or one that is not finite.
         """
-        points = _distinct(waypoints_m)
         self._p, self._robot = p, robot
-        self._points = points
-        self._lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        self._directions = np.diff(points, axis=0) / self._lengths[:, None]
-        self._starts = np.concatenate([[0.0], np.cumsum(self._lengths)])  # way [m] from the first point to each
-        self.length_m = float(self._starts[-1])
+        self._line = Polyline(_distinct(waypoints_m))
+        self.length_m = self._line.length
         self.progress_m = 0.0
         self.done = False
 
     @property
     def start(self) -> np.ndarray:
         """(3,) pose on the first point, with a view to the second."""
-        x, y = self._directions[0]
-        return np.array([self._points[0, 0], self._points[0, 1], math.atan2(y, x)])
+        x, y = self._line.direction(0.0)
+        return np.array([*self._line.points[0], math.atan2(y, x)])
 
     def back(self) -> "PathFollower":
         """For the way back along the same path."""
-        return PathFollower(self._points[::-1], self._robot, self._p)
+        return PathFollower(self._line.points[::-1], self._robot, self._p)
 
     def command(self, map_from_base: np.ndarray) -> np.ndarray:
         """(3,) velocity that brings a base at that pose on along the path; zero at its end."""
-        self.progress_m = self._advanced(np.asarray(map_from_base[:2], float))
+        self.progress_m = self._line.nearest(np.asarray(map_from_base[:2], float), self.progress_m,
+                                             2.0 * self._p.lookahead_m)
         remaining_m = self.length_m - self.progress_m
         self.done = self.done or remaining_m < 0.01
         if self.done:
             return np.zeros(3)
-        to_point = self._at(self.progress_m + self._p.lookahead_m) - map_from_base[:2]
+        to_point = self._line.at(self.progress_m + self._p.lookahead_m) - map_from_base[:2]
         distance_m = max(float(np.linalg.norm(to_point)), 1e-6)
         bearing = math.remainder(math.atan2(to_point[1], to_point[0]) - float(map_from_base[2]), 2.0 * math.pi)
         braking = math.sqrt(2.0 * 0.7 * self._robot.max_acceleration_m_s2 * remaining_m) + CREEP_M_S
@@ -100,8 +99,8 @@ class PathFollower:
 
     def _sliding(self, bearing: float, speed: float) -> np.ndarray:
         """Straight to the point, turning towards it meanwhile."""
-        x, y = self._direction(self.progress_m)
-        ahead = self._direction(self.progress_m + self._p.lookahead_m)
+        x, y = self._line.direction(self.progress_m)
+        ahead = self._line.direction(self.progress_m + self._p.lookahead_m)
         speed *= max(0.3, float(x * ahead[0] + y * ahead[1]))  # slower before a corner
         return np.array([speed * math.cos(bearing), speed * math.sin(bearing), 0.5 * self._turn(bearing)])
 
@@ -109,28 +108,6 @@ class PathFollower:
         """Turn rate that can still be braked within the angle."""
         rate = math.sqrt(0.7 * 2.0 * self._robot.max_turn_acceleration_rad_s2 * abs(bearing))
         return math.copysign(min(rate, self._robot.max_turn_rad_s), bearing)
-
-    def _advanced(self, point_m: np.ndarray) -> float:
-        """Way to the nearest point of the path that is not behind, nor far ahead: a path may cross itself."""
-        window_m = 2.0 * self._p.lookahead_m
-        first, last = self._segment(self.progress_m), self._segment(self.progress_m + window_m)
-        parts = slice(first, last + 1)
-        along = ((point_m - self._points[:-1][parts]) * self._directions[parts]).sum(axis=1)
-        low = np.maximum(self.progress_m - self._starts[:-1][parts], 0.0)
-        along = np.minimum(np.maximum(along, low), np.maximum(self._lengths[parts], low))
-        nearest = self._points[:-1][parts] + along[:, None] * self._directions[parts]
-        best = int(np.argmin(((nearest - point_m) ** 2).sum(axis=1)))
-        return min(float(self._starts[first + best] + along[best]), self.length_m)
-
-    def _segment(self, way_m: float) -> int:
-        return min(max(int(np.searchsorted(self._starts, way_m, side="right")) - 1, 0), len(self._lengths) - 1)
-
-    def _at(self, way_m: float) -> np.ndarray:
-        index = self._segment(way_m)
-        return self._points[index] + (way_m - self._starts[index]) * self._directions[index]
-
-    def _direction(self, way_m: float) -> np.ndarray:
-        return self._directions[self._segment(way_m)]
 
 
 def find(wanted: str, building: Building) -> np.ndarray:
@@ -205,8 +182,7 @@ def _distinct(waypoints_m: np.ndarray) -> np.ndarray:
     if not np.all(np.isfinite(points)):
         bad = int(np.nonzero(~np.isfinite(points).all(axis=1))[0][0])
         raise PathError(f"waypoint {bad + 1} of the path is not finite: {points[bad].tolist()}")
-    keep = np.ones(len(points), bool)
-    keep[1:] = np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-6
-    if keep.sum() < 2:
-        raise PathError(f"a path needs 2 different waypoints, got {int(keep.sum())}")
-    return points[keep]
+    points = polyline.distinct(points)
+    if len(points) < 2:
+        raise PathError(f"a path needs 2 different waypoints, got {len(points)}")
+    return points

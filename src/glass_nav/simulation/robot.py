@@ -26,12 +26,13 @@ class RobotParams:
     max_turn_rad_s: float = 1.5
     max_acceleration_m_s2: float = 0.8
     max_turn_acceleration_rad_s2: float = 3.0
+    braking_factor: float = 1.0                  # it slows down so many times as hard as it accelerates
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise ValueError(f"robot must be {' or '.join(KINDS)}, got {self.kind!r}")
         for name in ("radius_m", "max_speed_m_s", "max_turn_rad_s", "max_acceleration_m_s2",
-                     "max_turn_acceleration_rad_s2"):
+                     "max_turn_acceleration_rad_s2", "braking_factor"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ValueError(f"{name} of the robot must be > 0 and finite, got {getattr(self, name)}")
 
@@ -136,8 +137,11 @@ class Robot:
         wanted[:2] *= min(1.0, p.max_speed_m_s / max(math.hypot(wanted[0], wanted[1]), 1e-12))
         wanted[2] = min(max(wanted[2], -p.max_turn_rad_s), p.max_turn_rad_s)
         change = wanted - self.velocity
-        ramps_s = np.array([math.hypot(change[0], change[1]) / p.max_acceleration_m_s2] * 2
-                           + [abs(change[2]) / p.max_turn_acceleration_rad_s2])
+        slower = (math.hypot(wanted[0], wanted[1]) < math.hypot(self.velocity[0], self.velocity[1]),
+                  abs(wanted[2]) < abs(self.velocity[2]))
+        brakes = [p.braking_factor if each else 1.0 for each in slower]
+        ramps_s = np.array([math.hypot(change[0], change[1]) / (brakes[0] * p.max_acceleration_m_s2)] * 2
+                           + [abs(change[2]) / (brakes[1] * p.max_turn_acceleration_rad_s2)])
         share = np.minimum(dt_s / np.maximum(ramps_s, 1e-12), 1.0)  # of the change that is reached
         end = np.where(share < 1.0, self.velocity + share * change, wanted)
         mean = end - 0.5 * share * change * np.minimum(ramps_s / dt_s, 1.0)

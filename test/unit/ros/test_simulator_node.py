@@ -52,6 +52,8 @@ def test_parameters_that_cannot_be_used_are_refused(given, text):
     ({"landmark_reading_deg": 0.1}, "a landmark scanner needs 0 < motor step <= reading step <= "),
     ({"landmark_move_s": 0.0}, "a move of a landmark scanner must take > 0 s, got 0.0"),
     ({"emitter_x_m": float("nan")}, "the emitter's pose on the robot must be finite x, y, yaw, got "),
+    ({"start": "here"}, "start must be x y yaw in m and rad, or random, got 'here'"),
+    ({"braking_factor": 0.0}, "braking_factor of the robot must be > 0 and finite, got 0.0"),
     ({"path": "nowhere"}, "glass_office: no path 'nowhere', it has "),
     ({"path": "first", "path_speed_m_s": 0.0}, "speed_m_s of the path follower must be > 0 m/s and finite, got 0.0")])
 def test_what_cannot_be_simulated_is_a_line(given, text):
@@ -69,3 +71,10 @@ def test_a_path_and_a_lidar_are_those_asked_for():
     assert drive.simulation.base_from_laser.tolist() == [0.3, 0.0, 0.0]
     assert simulator_node._drive(SimulatorNodeParams()).follower is None
     assert simulator_node._drive(SimulatorNodeParams(path="none")).follower is None
+
+
+def test_a_robot_may_start_anywhere_of_a_building_with_film_on_its_glass():
+    drive = simulator_node._drive(SimulatorNodeParams(opaque=True, start="random", seed=3))
+    assert (drive.simulation.building.surfaces.kind == 0).all()
+    again = simulator_node._drive(SimulatorNodeParams(start="random", seed=3, path="first"))
+    assert (again.simulation.map_from_base == drive.simulation.map_from_base).all()

@@ -126,3 +126,15 @@ def test_what_finds_no_place_has_left_the_building():
     closet = Building((Wall(SQUARE / 8.0),), things=(Thing(box(0.5, 0.5, 0.7, 0.7), movable=True),))
     things = closet.changed(1.0, np.random.default_rng(0)).things
     assert len(things) == 1 and not things[0].present
+
+
+def test_in_an_opaque_building_film_is_on_every_pane_and_mirror():
+    glass = Building((Wall(LINE + 4.0),), panes=(Pane(LINE), Pane(LINE + 1.0, glazing="double")),
+                     mirrors=(Mirror(LINE + 2.0),), name="shop")
+    opaque = glass.opaque()
+    assert (opaque.surfaces.kind == OPAQUE).all() and opaque.name == "shop"
+    assert len(opaque.surfaces.kind) == 4 + 3
+    np.testing.assert_array_equal(opaque.surfaces.from_m[-3:], [[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]])
+    assert opaque.surfaces.present.all() and opaque.surfaces.mapped.all()
+    assert (opaque.surfaces.glazing == -1).all()
+    assert len(glass.panes) == 2 and not glass.panes[0].film

@@ -164,3 +164,9 @@ def test_rays_on_the_map_meet_what_rays_in_the_building_meet(name):
     assert np.median(np.abs(late)) < 0.05
     assert (np.abs(late) < 0.1).mean() > 0.85  # flat beams meet the stairs of a slanted wall early
     assert (np.abs(late) < 0.6).mean() > 0.97
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_film_on_the_glass_does_not_change_the_map(name):
+    building = building_file.load(MAPS / name)
+    np.testing.assert_array_equal(building_map.draw(building.opaque()).occupancy, building_map.draw(building).occupancy)

@@ -64,6 +64,15 @@ def test_it_accelerates_at_its_limit_and_rolls_out_at_it(dt_s):
     assert robot.map_from_base[0] - before == pytest.approx(0.36, abs=1e-9)
 
 
+def test_with_brakes_it_stands_sooner_than_it_got_under_way():
+    p = RobotParams(max_acceleration_m_s2=0.5, max_speed_m_s=0.5, max_turn_acceleration_rad_s2=2.0, braking_factor=4.0)
+    robot = driven(Robot(p, np.zeros(3), NOTHING), [0.5, 0.0, 1.0], 3.0)
+    driven(robot, [0.0, 0.0, 0.0], 0.24)
+    assert robot.velocity[2] == 0.0 and robot.velocity[0] == pytest.approx(0.02)  # 0.5 m/s less 0.24 s of 2 m/s^2
+    driven(robot, [-0.5, 0.0, 0.0], 0.2)
+    assert robot.velocity[0] > -0.1  # to go back it accelerates
+
+
 def test_turning_has_its_own_limits():
     robot = Robot(RobotParams(max_turn_rad_s=1.0, max_turn_acceleration_rad_s2=2.0), np.zeros(3), NOTHING)
     driven(robot, [0.0, 0.0, -9.0], 1.0)

@@ -1,0 +1,508 @@
+"""Scans, odometry -> commands along the edges of the Voronoi graph, and what the robot reports of them.
+
+No pose in a map is needed: the graph is that of a small map around the robot, see local_map.py, made by the same code
+as the atlas, so that both see the same meetpoints. What lies ahead may turn out otherwise (a pane that was not seen
+yet, a corner that hid something), so a meetpoint counts only once the robot stands there and has looked again. All
+poses are odom_from_base (3,).
+
+Choset, Burdick, Sensor-based exploration: the hierarchical generalized Voronoi graph (IJRR 2000): tracing and homing;
+here both go along a line of the local graph instead of a gradient of the distances.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import List, Optional, Tuple
+
+import numpy as np
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from glass_nav.driving import braking, edge_report, pursuit
+from glass_nav.driving.base_limits import BaseLimits
+from glass_nav.driving.edge_report import Node, Trace
+from glass_nav.driving.local_graph import LocalGraph
+from glass_nav.driving.local_pose import LocalPose
+from glass_nav.driving.local_map import LocalMap, LocalMapParams
+from glass_nav.geometry import angles, se2
+from glass_nav.sensing.scan import Scan
+from glass_nav.topology.observations import Meetpoint, Traversal, refuse_rank
+from glass_nav.topology.voronoi_graph import VoronoiParams
+from glass_nav.world.grid_map import GridMap
+
+# phases
+IDLE = "IDLE"            # stands, nothing asked for
+SEEKING = "SEEKING"      # on its way to the graph and along it to any meetpoint
+FOLLOWING = "FOLLOWING"  # along an edge
+HOMING = "HOMING"        # the last way to a meetpoint, and a look around there
+RETURNING = "RETURNING"  # back along an edge to the meetpoint where it began
+ARRIVED = "ARRIVED"      # stands at a meetpoint
+FAILED = "FAILED"        # stands: cannot go on
+_DRIVING = (SEEKING, FOLLOWING, HOMING, RETURNING)
+
+# why it FAILED
+NO_GRAPH, BLOCKED = "NO_GRAPH", "BLOCKED"
+
+_GRAPH_PERIOD_NS = 300_000_000  # between two graphs while driving
+_LOOKS = 3               # scans before the first graph; graphs that must agree on a meetpoint
+_MOST_LOOKS = 7          # then it is none
+_AHEAD_M = 0.4            # of the robot, where its edge is told from others
+_FOOT_M = 0.4            # the line moves by no more from one graph to the next
+_TO_GRAPH_M = 4.0        # the graph may be so far away at the beginning
+_AT_NODE_M = 0.08        # the robot stands at a node
+_ALMOST_M = 0.45         # ... or as near as it gets, if something stands in the way
+_SAME_NODE_M = 0.3       # a node moves by no more from one graph to the next
+_BEHIND_M = 1.0          # a node that shows only once the robot is past it
+_DOUBT_M = 0.15          # an obstacle that is further from any wall: look around first
+_BLOCKED_S = 4.0
+_LOST_LINE_S = 3.0       # driven on along the last line, without a graph that has it
+_SEEN_M = 0.12          # a wall of the map beside a point of the scan is the same
+_NEAR_M = 2.0            # obstacles further away are not braked for
+
+
+@dataclass(frozen=True)
+class EdgeDriverParams:
+    """How edges are followed and meetpoints found."""
+    limits: BaseLimits = field(default_factory=BaseLimits)
+    graph: VoronoiParams = field(default_factory=VoronoiParams)  # as the atlas was built with
+    local_map: LocalMapParams = field(default_factory=LocalMapParams)
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """What is reported at a meetpoint."""
+    stamp_ns: int                   # of the scan that showed it
+    odom_from_base: np.ndarray      # (3,) then
+    meetpoint: Meetpoint
+    traversal: Optional[Traversal]  # None: it was sought, not reached along an edge that began at a meetpoint
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where the driver is."""
+    phase: str
+    reason: str          # one sentence
+    travelled_m: float   # since the last meetpoint
+    failure: str = ""    # NO_GRAPH or BLOCKED if FAILED
+
+
+class EdgeDriver:
+    """see() every scan, ask for a command() at every control step; seek(), leave(), go_back() and stop() say what."""
+
+    def __init__(self, p: EdgeDriverParams = EdgeDriverParams()) -> None:
+        self._p = p
+        self._map, self._at = LocalMap(p.local_map), LocalPose()
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all: odometry began anew, or the robot was carried."""
+        self._map.clear()
+        self._at.clear()
+        self._grid: Optional[GridMap] = None
+        self._graph: Optional[LocalGraph] = None
+        self._graph_ns = 0
+        self._scans = 0
+        self._points_m = np.zeros((0, 2))   # of the last scan, in odom
+        self._walls_m = np.zeros((0, 2))    # of the local map near the robot, in odom
+        self._pose = np.zeros(3)
+        self._stamp_ns = 0
+        self._velocity = np.zeros(3)
+        self._node: Optional[Node] = None   # where it stands, or began
+        self._arrival: Optional[Arrival] = None
+        self._halted: Optional[Tuple[str, Optional[Trace], int, np.ndarray]] = None
+        self._begin(IDLE, "nothing to do")
+
+    # -- what to do
+
+    def seek(self) -> None:
+        """Drive to a meetpoint, having looked around."""
+        self._node, self._trace = None, None
+        self._begin(SEEKING, "looking around")
+        self._sweep_rad = 2.0 * math.pi
+
+    def leave(self, rank: int) -> None:
+        """Follow the edge of that rank from the meetpoint where the robot stands.
+
+        Raises:
+            ValueError: it stands at none.
+            ObservationError: that has no such edge; nothing is changed.
+        """
+        if self._node is None or self._phase != ARRIVED:
+            raise ValueError(f"it stands at no meetpoint that it could leave: it is {self._phase}")
+        refuse_rank(rank, self._node.degree)
+        self._begin(FOLLOWING, f"along edge {rank} of {self._node.degree}")
+        self._rank = rank
+        self._way = self._node.branches[rank].way_m
+        self._trace = Trace(self._node.position_m)
+
+    def go_back(self) -> None:
+        """Return to the meetpoint that the robot left last.
+
+        Raises:
+            ValueError: it left none.
+        """
+        if self._node is None or self._trace is None:
+            raise ValueError("it left no meetpoint that it could return to")
+        way = np.concatenate([self._pose[None, :2], self._trace.way_m[::-1]])
+        self._begin(RETURNING, "back to the meetpoint that it left")
+        self._way = way
+
+    def stop(self) -> None:
+        """Stand, whatever was asked for. resume() goes on with it, seek() begins anew, go_back() returns."""
+        self._halt(IDLE, "stopped")
+
+    def resume(self) -> None:
+        """Go on with the edge, or the search for a meetpoint, that stop() or a failure ended.
+
+        Raises:
+            ValueError: there is none.
+        """
+        if self._phase not in (IDLE, FAILED) or self._halted is None:
+            raise ValueError(f"nothing was stopped that it could go on with: it is {self._phase}")
+        phase, trace, rank, way = self._halted
+        self._begin(phase, "going on")
+        self._trace, self._rank, self._way = trace, rank, way
+
+    # -- what it sees
+
+    def see(self, scan: Scan, odom_from_base: np.ndarray) -> None:
+        """Take in a scan, with odometry's pose (3,) at its stamp; in any phase."""
+        self._pose, self._stamp_ns = self._at.correct(scan, odom_from_base), scan.stamp_ns
+        self._map.add(scan, self._pose)
+        self._scans += 1
+        self._points_m = _steady_points(scan, self._pose)
+        every = self._phase == HOMING and self._standing
+        if self._phase in _DRIVING and self._sweep_rad <= 0.0 and (
+                every or self._stamp_ns - self._graph_ns >= _GRAPH_PERIOD_NS or self._graph is None):
+            self._look()
+            self._think()
+        elif self._stamp_ns - self._graph_ns >= _GRAPH_PERIOD_NS:
+            self._graph_ns = self._stamp_ns
+            walls = self._map.walls()
+            self._at.know(walls)
+            self._near_walls(walls.occupied)
+
+    def take_arrival(self) -> Optional[Arrival]:
+        """The report of a meetpoint, once."""
+        arrival, self._arrival = self._arrival, None
+        return arrival
+
+    @property
+    def progress(self) -> Progress:
+        travelled = 0.0 if self._trace is None else self._trace.length_m
+        return Progress(self._phase, self._reason, travelled, self._failure)
+
+    @property
+    def local_grid(self) -> Optional[GridMap]:
+        """The last map around the robot, in odom; None before the first."""
+        return self._grid
+
+    @property
+    def local_graph(self) -> Optional[LocalGraph]:
+        """The last graph, in odom; None before the first."""
+        return self._graph
+
+    @property
+    def node(self) -> Optional[Node]:
+        """The meetpoint where the robot stands, or which it left last, in odom."""
+        return self._node
+
+    @property
+    def way_m(self) -> np.ndarray:
+        """(n, 2) that it drives along, in odom; n = 0: none."""
+        return self._way
+
+    def obstacles_m(self, odom_from_base: np.ndarray) -> np.ndarray:
+        """(K, 2) what stands near the robot at that pose (3,), in its frame: the last scan, the walls of the local map.
+        """
+        return self._obstacles_at(self._at.now(odom_from_base))
+
+    def _obstacles_at(self, pose: np.ndarray) -> np.ndarray:
+        points, walls = (among[np.abs(among - pose[:2]).max(axis=1) < _NEAR_M]
+                         for among in (self._points_m, self._walls_m))
+        if len(points) and len(walls):  # what the scan shows now it shows better than the cells do
+            walls = walls[cKDTree(points).query(walls, distance_upper_bound=_SEEN_M)[0] > _SEEN_M]
+        return se2.transform_points(se2.inverse(pose), np.concatenate([points, walls]))
+
+    # -- commands
+
+    def command(self, odom_from_base: np.ndarray, dt_s: float) -> np.ndarray:
+        """(3,) velocity forward, left [m/s], turn [rad/s] for the next control step.
+
+        Args:
+            odom_from_base: (3,) the newest.
+            dt_s: since the last command.
+        """
+        pose = self._at.now(odom_from_base)
+        turned = abs(float(angles.wrap(pose[2] - self._yaw)))
+        self._yaw = float(pose[2])
+        wanted = np.zeros(3)
+        if self._phase in _DRIVING:
+            if self._sweep_rad > 0.0:
+                self._sweep_rad -= turned
+                if self._scans >= _LOOKS:
+                    wanted[2] = self._p.limits.max_turn_rad_s
+            elif len(self._way) and not self._looking:
+                wanted = self._along_way(pose)
+                safe = braking.allowed(wanted, self._obstacles_at(pose), self._p.limits)
+                self._note_blocked(wanted, safe, dt_s)
+                wanted = safe
+        self._velocity = pursuit.accelerated(self._velocity, wanted, dt_s, self._p.limits)
+        if wanted[0] < self._velocity[0]:  # brakes harder than it speeds up
+            self._velocity[0] = max(wanted[0], self._velocity[0] - self._p.limits.max_acceleration_m_s2 * dt_s)
+        return self._velocity.copy()
+
+    def _along_way(self, pose: np.ndarray) -> np.ndarray:
+        foot = pursuit.foot(self._way, pose[:2])
+        if self._phase == HOMING and float(np.hypot(*(pose[:2] - self._target))) < _AT_NODE_M:
+            self._begin_looking()
+            return np.zeros(3)
+        if foot.remaining_m < 0.02:
+            if self._phase == HOMING:
+                self._begin_looking()
+            elif self._phase == RETURNING:
+                self._begin(ARRIVED, "back at the meetpoint that it left")
+            return np.zeros(3)
+        return pursuit.velocity(self._way, foot.passed_m, pose, self._p.limits)
+
+    def _note_blocked(self, wanted: np.ndarray, safe: np.ndarray, dt_s: float) -> None:
+        stuck = wanted[0] > 0.02 and safe[0] < 0.03
+        self._blocked_s = self._blocked_s + dt_s if stuck else 0.0
+        if self._phase == HOMING and self._blocked_s > 1.0 and float(
+                np.hypot(*(self._pose[:2] - self._target))) < _ALMOST_M:
+            self._begin_looking()
+        elif self._blocked_s > _BLOCKED_S:
+            ahead = pursuit.foot(self._way, self._pose[:2])
+            if self._phase == FOLLOWING and ahead.remaining_m < _ALMOST_M:
+                self._home(self._way[-1])
+                self._begin_looking()
+            else:
+                self._fail(BLOCKED, f"something stands in the way, {ahead.remaining_m:.1f} m before the end of what is "
+                                    "seen of the edge")
+
+    # -- thinking, once for each graph
+
+    def _look(self) -> None:
+        self._grid = self._map.grid()
+        self._graph = LocalGraph(self._grid, self._p.graph)
+        self._graph_ns = self._stamp_ns
+        self._at.know(self._map.walls())
+        self._near_walls(self._grid.occupied)
+
+    def _near_walls(self, occupied: np.ndarray) -> None:
+        grid = self._map.frame()
+        reach = int(_NEAR_M / grid.resolution_m)
+        row, column = (int(index) for index in grid.cells(self._pose[:2]))
+        top, left = max(row - reach, 0), max(column - reach, 0)
+        rows, columns = np.nonzero(occupied[top:row + reach, left:column + reach])
+        self._walls_m = grid.centres(rows + top, columns + left)
+
+    def _think(self) -> None:
+        if self._looking:
+            self._look_again()
+        elif self._phase == HOMING:
+            self._correct_target()
+        elif self._phase in (SEEKING, FOLLOWING):
+            self._follow()
+
+    def _follow(self) -> None:
+        graph, here = self._graph, self._pose[:2]
+        assert graph is not None
+        if not len(self._way):
+            if not self._join_graph(graph, here):
+                self._without_line("no edge is near that can be reached straight on")
+            return
+        found = self._line_now(graph, here)
+        if found is None:
+            self._without_line("the edge is no longer seen")
+            return
+        self._lost_since_ns = 0
+        way, node, behind = found
+        on_way = pursuit.foot(way, here)
+        position = graph.graph.position_m
+        if on_way.passed_m < _BEHIND_M and self._counts(graph)[behind] and not self._is_start(graph, behind):
+            if self._trace is not None:
+                self._trace.cut_back(position[behind])
+            self._home(position[behind], pursuit.part(way, 0.0, on_way.passed_m)[::-1])
+            return
+        if self._trace is not None and on_way.passed_m > 0.0:
+            self._trace.add(on_way.at_m)
+        self._way = way
+        if on_way.remaining_m < 2.0 * pursuit.LOOKAHEAD_M and not self._is_start(graph, node):
+            self._home(position[node], pursuit.part(way, on_way.passed_m, math.inf))
+
+    def _line_now(self, graph: LocalGraph, here: np.ndarray) -> Optional[Tuple[np.ndarray, int, int]]:
+        """The edge that the robot follows as the graph has it now: its line, the node ahead and the one behind.
+
+        Looked up a little ahead of the robot: beside a node all its edges are near.
+        """
+        passed = pursuit.foot(self._way, here)
+        at = passed.passed_m + min(_AHEAD_M, 0.5 * passed.remaining_m)
+        there = pursuit.foot(self._way, pursuit.point_at(self._way, at), at, 0.0)
+        foot = graph.foot(there.at_m, _FOOT_M, there.along)
+        if foot is None:
+            return None
+        ahead = graph.ahead(foot, there.along)
+        way, node = graph.walk(ahead, self._counts(graph))
+        return np.concatenate([ahead.back_m[:0:-1], way]), node, ahead.back_node
+
+    def _join_graph(self, graph: LocalGraph, here: np.ndarray) -> bool:
+        foot = graph.foot(here, _TO_GRAPH_M)
+        if foot is None:
+            return False
+        heading = np.array([math.cos(self._pose[2]), math.sin(self._pose[2])])
+        ways = []
+        for along in (heading, -heading):
+            way, node = graph.walk(graph.ahead(foot, along), self._counts(graph))
+            doubtful = graph.graph.doubt_m[node] > _DOUBT_M
+            ways.append((doubtful, float(np.hypot(*np.diff(way, axis=0).T).sum()) if len(way) > 1 else 0.0, way))
+        _, _, way = min(ways, key=lambda found: found[:2])
+        self._way = np.concatenate([here[None], way])
+        self._reason = "to the nearest meetpoint"
+        return True
+
+    def _counts(self, graph: LocalGraph) -> np.ndarray:
+        """(N,) bool: nodes that may be meetpoints; those that turned out to be none on this edge are not."""
+        counts = graph.degree != 2
+        for none in self._dismissed:
+            counts &= np.hypot(*(graph.graph.position_m - none).T) > _SAME_NODE_M
+        return counts
+
+    def _is_start(self, graph: LocalGraph, node: int) -> bool:
+        """Whether the node is the one that the edge began at, with little way behind the robot."""
+        if self._trace is None or self._node is None:
+            return False
+        there = graph.graph.position_m[node] - self._node.position_m
+        return float(np.hypot(*there)) < _SAME_NODE_M and self._trace.length_m < 2.0 * _BEHIND_M
+
+    def _without_line(self, why: str) -> None:
+        if not self._lost_since_ns:
+            self._lost_since_ns = self._stamp_ns
+        elif self._stamp_ns - self._lost_since_ns > _LOST_LINE_S * 1e9:
+            if self._swept:
+                self._fail(NO_GRAPH, f"{why}, also after looking around")
+            else:
+                self._swept, self._sweep_rad, self._lost_since_ns = True, 2.0 * math.pi, 0
+
+    # -- homing
+
+    def _home(self, target_m: np.ndarray, way_m: Optional[np.ndarray] = None) -> None:
+        self._phase, self._reason = HOMING, "to the meetpoint"
+        self._target = np.array(target_m, float)
+        self._way = np.stack([self._pose[:2], target_m]) if way_m is None or len(way_m) < 2 else way_m
+        self._blocked_s = 0.0
+        self._looking, self._looks, self._nodes = False, 0, []
+
+    def _begin_looking(self) -> None:
+        self._looking, self._looks, self._nodes = True, 0, []
+        self._reason = "looking whether this is a meetpoint"
+
+    @property
+    def _standing(self) -> bool:
+        return self._looking and float(np.abs(self._velocity).max()) < 0.02
+
+    def _correct_target(self) -> None:
+        graph = self._graph
+        assert graph is not None
+        node = graph.node_near(self._target, _SAME_NODE_M)
+        if node is None or not self._counts(graph)[node]:
+            self._looks += 1
+            if self._looks > _LOOKS:
+                self._dismiss()
+            return
+        self._looks = 0
+        self._target = graph.graph.position_m[node]
+        found = self._line_now(graph, self._pose[:2])
+        if found is not None and found[1] == node:
+            self._way = found[0]
+        else:
+            self._way = np.concatenate([self._way[:-1], self._target[None]])
+        if self._trace is not None:
+            self._trace.add(pursuit.foot(self._way, self._pose[:2]).at_m)
+
+    def _look_again(self) -> None:
+        if not self._standing:
+            return
+        graph = self._graph
+        assert graph is not None
+        self._looks += 1
+        node = graph.node_near(self._target, _SAME_NODE_M)
+        if node is not None:
+            self._nodes.append(self._node_of(graph, node))
+            latest = [found for found in self._nodes if found.degree == self._nodes[-1].degree]
+            if len(latest) >= _LOOKS:
+                if graph.graph.doubt_m[node] > _DOUBT_M and not self._swept:
+                    self._swept, self._sweep_rad = True, 2.0 * math.pi
+                    self._begin_looking()
+                    return
+                self._arrive(latest[-1])
+                return
+        if self._looks >= _MOST_LOOKS:
+            self._dismiss()
+
+    def _dismiss(self) -> None:
+        self._dismissed.append(self._target)
+        self._phase = FOLLOWING if self._trace is not None else SEEKING
+        self._looking, self._reason = False, "what looked like a meetpoint is none"
+
+    def _node_of(self, graph: LocalGraph, node: int) -> Node:
+        found = graph.graph
+        branches = graph.branches(node)
+        position = found.position_m[node]
+        if self._trace is not None:
+            back = self._trace.line_m(position)
+            past = edge_report.bearing_back(back)
+        else:
+            past = float(self._pose[2]) + math.pi
+        return Node(position, float(found.r_m[node]), edge_report.sigma_r_m(float(found.spread_m[node]),
+                                                                           float(found.doubt_m[node])),
+                    edge_report.ranked(branches, past))
+
+    def _arrive(self, node: Node) -> None:
+        assert self._grid is not None
+        driven = None
+        if self._trace is not None:
+            driven = edge_report.traversal(self._trace.line_m(node.position_m), self._rank, self._grid)
+        self._arrival = Arrival(self._stamp_ns, self._pose, edge_report.meetpoint(node, self._pose, self._stamp_ns),
+                                driven)
+        self._node = node
+        self._begin(ARRIVED, f"at a meetpoint of degree {node.degree}, {node.r_m:.2f} m from its obstacles")
+
+    # -- phases
+
+    def _begin(self, phase: str, reason: str) -> None:
+        self._phase, self._reason, self._failure = phase, reason, ""
+        self._way = np.zeros((0, 2))
+        self._trace: Optional[Trace] = None
+        self._rank = 0
+        self._target = np.zeros(2)
+        self._looking, self._looks = False, 0
+        self._nodes: List[Node] = []
+        self._dismissed: List[np.ndarray] = []
+        self._swept = False
+        self._sweep_rad = 0.0
+        self._yaw = float(self._pose[2])
+        self._blocked_s = 0.0
+        self._lost_since_ns = 0
+
+    def _fail(self, failure: str, reason: str) -> None:
+        self._halt(FAILED, reason)
+        self._failure = failure
+
+    def _halt(self, phase: str, reason: str) -> None:
+        """Stand, and remember what it did; what it remembers already stays if it did nothing."""
+        if self._phase in _DRIVING and self._phase != RETURNING:
+            seeking = self._trace is None
+            self._halted = (
+                SEEKING if seeking else FOLLOWING, self._trace, self._rank, self._way)
+        trace = self._trace
+        self._begin(phase, reason)
+        self._trace = trace
+
+
+def _steady_points(scan: Scan, local_from_base: np.ndarray) -> np.ndarray:
+    """(K, 2) end points of the beams, without single ones that stick out."""
+    ranges_m = np.where(scan.answered, scan.ranges_m, np.inf)
+    points = replace(scan, ranges_m=ndimage.median_filter(ranges_m, 3, mode="nearest")).points_in_base()
+    return se2.transform_points(local_from_base, points[np.isfinite(points).all(axis=1)])

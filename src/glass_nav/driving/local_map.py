@@ -1,0 +1,251 @@
+"""Scans, odometry -> a small grid of what is around the robot, in which glass stands.
+
+A single scan shows a pane only where beams meet it almost at right angles, and what lies behind everywhere else. So
+each cell counts by the direction of the beams how many ended in it and how many passed it, and stands if they end there
+from any one direction: beams that pass a pane at a flat angle do not contradict those that came back from it, beams
+from where others came back do (somebody who walked on). As a robot drives along a pane it sees every piece of it that
+way, and the piece next to it always: the nearest point of a plane is met at right angles.
+
+Between and beside such pieces there is more of the pane, most likely: they are extended along their line until
+something stands there, or beams have passed there about as directly as they would have to to be sent back.
+
+The window is bound to the robot and moves in whole cells; poses are odom_from_base (3,). n x n cells, D directions.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import List, Tuple
+
+import numpy as np
+from scipy import ndimage
+
+from glass_nav.geometry import angles, se2
+from glass_nav.sensing.scan import Scan
+from glass_nav.world.grid_map import UNKNOWN, GridMap
+
+FREE, OCCUPIED = 0, 100
+_FORGET_AT = 60    # beams counted in a cell from one direction: halved, so that what is new counts
+_BEFORE_M = 0.05   # so near in front of where a beam ended it proves nothing: noise, and the cell's own size
+_LEAST_PIECE = 4   # cells of a pane that give a line
+
+
+@dataclass(frozen=True)
+class LocalMapParams:
+    """Lengths in metres."""
+    window_m: float = 12.0           # edge of the square around the robot
+    resolution_m: float = 0.05       # edge of a cell; that of the atlas' map
+    directions: int = 16             # of beams, told apart
+    least_ends: int = 2              # beams that must have ended in a cell from one direction ...
+    least_share: float = 0.2         # ... and at least this share of those that came that way
+    unanswered_m: float = 4.0        # a beam that did not come back proves free space so far at most
+    extend_glass_m: float = 0.6      # how far beyond what was seen of it a pane is taken to go on; 0: not
+    robot_radius_m: float = 0.22     # where the robot stands there is room for it
+
+    def __post_init__(self) -> None:
+        for name in ("window_m", "resolution_m", "robot_radius_m", "unanswered_m"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise ValueError(f"~{name} must be > 0 m and finite, got {getattr(self, name)}")
+        if self.window_m < 10.0 * self.resolution_m:
+            raise ValueError(f"~window_m must be at least ten cells, got {self.window_m} m of {self.resolution_m} m")
+        if not 4 <= self.directions <= 64:
+            raise ValueError(f"~directions must be 4 to 64, got {self.directions}")
+        if self.least_ends < 1:
+            raise ValueError(f"~least_ends must be >= 1, got {self.least_ends}")
+        if not 0.0 < self.least_share <= 1.0:
+            raise ValueError(f"~least_share must be in (0, 1], got {self.least_share}")
+        if not 0.0 <= self.extend_glass_m < math.inf:
+            raise ValueError(f"~extend_glass_m must be >= 0 m and finite, got {self.extend_glass_m}")
+
+
+class LocalMap:
+    """A window of cells in the frame odom that goes with the robot."""
+
+    def __init__(self, p: LocalMapParams = LocalMapParams()) -> None:
+        self._p = p
+        self._size = int(round(p.window_m / p.resolution_m))
+        self._first = np.zeros(2, np.int64)  # column and row in odom of cell [0, 0]
+        self._seen = False
+        shape = (p.directions, self._size, self._size)
+        self._ended, self._passed = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
+        self._stood = np.zeros(shape[1:], bool)  # the robot's outline was here
+
+    @property
+    def params(self) -> LocalMapParams:
+        return self._p
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._ended[:], self._passed[:], self._stood[:], self._seen = 0, 0, False, False
+
+    def add(self, scan: Scan, odom_from_base: np.ndarray) -> None:
+        """Take in a scan.
+
+        Args:
+            scan: in which beams begin at the laser; origins of deskewed ones are not looked at.
+            odom_from_base: (3,) at its stamp.
+        """
+        self._follow(odom_from_base)
+        laser = se2.compose(odom_from_base, scan.base_from_laser)
+        cell_m = self._p.resolution_m
+        edges = (np.arange(self._size) + 0.5) * cell_m
+        x = self._first[0] * cell_m + edges[None, :] - laser[0]
+        y = self._first[1] * cell_m + edges[:, None] - laser[1]
+        ended = self._ends(scan, laser)
+        passed = self._passes(scan, laser, x, y)
+        passed[ended[1]] = False
+        self._count(self._ended, *ended)
+        cells = np.flatnonzero(passed)
+        direction = np.arctan2(y[cells // self._size, 0], x[0, cells % self._size])
+        self._count(self._passed, self._direction(direction), cells)
+        body = (x + laser[0] - odom_from_base[0]) ** 2 + (y + laser[1] - odom_from_base[1]) ** 2
+        self._stood |= body <= self._p.robot_radius_m ** 2
+
+    # -- what stands where
+
+    def occupied(self) -> np.ndarray:
+        """(n, n) bool: something stands there, glass included, as far as it was seen itself."""
+        stands = (self._ended >= self._p.least_ends) & (
+            self._ended >= self._p.least_share * (self._ended.astype(np.float32) + self._passed))
+        return stands.any(axis=0) & ~self._stood
+
+    def glass(self) -> np.ndarray:
+        """(n, n) bool: of what stands there, what beams passed from elsewhere."""
+        ended, passed = self._ended > 0, self._passed > self._ended
+        return self.occupied() & (passed & ~ended).any(axis=0)
+
+    def frame(self) -> GridMap:
+        """The window with nothing in it: which cell is where."""
+        return self._as_map(np.zeros((self._size, self._size), np.int8))
+
+    def walls(self) -> GridMap:
+        """The window as a map with what stands there; all else is free."""
+        return self._as_map(np.where(self.occupied(), np.int8(OCCUPIED), np.int8(FREE)))
+
+    def grid(self) -> GridMap:
+        """The window as a map in the frame odom, with panes extended."""
+        occupied = self.occupied()
+        free = (self._passed.any(axis=0) | self._stood) & ~occupied
+        if self._p.extend_glass_m > 0.0:
+            occupied |= self._extended(occupied)
+        occupancy = np.where(occupied & ~self._stood, OCCUPIED, np.where(free, FREE, UNKNOWN)).astype(np.int8)
+        return self._as_map(occupancy)
+
+    def _as_map(self, occupancy: np.ndarray) -> GridMap:
+        return GridMap(occupancy, self._p.resolution_m, np.append(self._first * self._p.resolution_m, 0.0))
+
+    # -- counting
+
+    def _follow(self, odom_from_base: np.ndarray) -> None:
+        """Keep the robot in the middle quarter of the window."""
+        cell_m = self._p.resolution_m
+        wanted = np.floor(odom_from_base[:2] / cell_m).astype(np.int64) - self._size // 2
+        shift = wanted - self._first
+        if not self._seen:
+            self._first, self._seen = wanted, True
+            return
+        if np.abs(shift).max() <= self._size // 16:
+            return
+        self._first = wanted
+        for cells in (self._ended, self._passed, self._stood):
+            moved = np.zeros_like(cells)
+            kept = self._size - np.abs(shift)
+            if (kept > 0).all():
+                (to_x, from_x), (to_y, from_y) = (_overlap(int(step), self._size) for step in shift)
+                moved[..., to_y, to_x] = cells[..., from_y, from_x]
+            cells[...] = moved
+
+    def _direction(self, angle_rad: np.ndarray) -> np.ndarray:
+        """(...) which of the directions an angle in odom belongs to."""
+        turn = self._p.directions / (2.0 * np.pi)
+        return np.floor(np.mod(angle_rad * turn + 0.5, self._p.directions)).astype(np.int64) % self._p.directions
+
+    def _ends(self, scan: Scan, laser: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Direction (K,) and cell (K,) in the window of all beams that came back."""
+        answered = scan.answered
+        bearing = scan.angles_rad[answered] + laser[2]
+        ranges_m = scan.ranges_m[answered]
+        points = laser[:2] + ranges_m[:, None] * np.column_stack([np.cos(bearing), np.sin(bearing)])
+        column_row = np.floor(points / self._p.resolution_m).astype(np.int64) - self._first
+        inside = ((column_row >= 0) & (column_row < self._size)).all(axis=1)
+        cell = column_row[inside, 1] * self._size + column_row[inside, 0]
+        return self._direction(bearing[inside]), cell
+
+    def _passes(self, scan: Scan, laser: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """(n * n,) bool: a beam passed this cell."""
+        count = len(scan)
+        step = float(scan.angles_rad[1] - scan.angles_rad[0]) if count > 1 else 2.0 * np.pi
+        ranges_m = np.where(np.isposinf(scan.ranges_m), min(self._p.unanswered_m, scan.range_max_m), scan.ranges_m)
+        ranges_m = np.where(np.isfinite(ranges_m), ranges_m, 0.0) - _BEFORE_M
+        around = ndimage.minimum_filter1d(ranges_m, 3, mode="nearest")  # a beam beside it tells as well
+        away = np.hypot(x, y)
+        relative = np.arctan2(y, x) - laser[2] - scan.angles_rad[0]
+        middle = 0.5 * step * (count - 1)
+        beam = np.rint((angles.wrap(relative - middle) + middle) / step).astype(np.int64)
+        looked = (beam >= 0) & (beam < count)
+        return (looked & (away < around[np.where(looked, beam, 0)])).ravel()
+
+    def _count(self, counts: np.ndarray, direction: np.ndarray, cell: np.ndarray) -> None:
+        """One more for each pair of direction and cell, once; both counts are halved where there are many."""
+        flat = np.unique(direction * self._size ** 2 + cell)
+        counts = counts.reshape(-1)
+        counts[flat] += 1
+        many = flat[counts[flat] >= _FORGET_AT]
+        if len(many):
+            for of_all in (self._ended, self._passed):
+                of_all.reshape(-1)[many] >>= 1
+
+    # -- panes
+
+    def _extended(self, occupied: np.ndarray) -> np.ndarray:
+        """(n, n) bool: cells on the lines of pieces of glass, next to them."""
+        more = np.zeros_like(occupied)
+        glass = self.glass()
+        if not glass.any():
+            return more
+        beside = np.ones((3, 3), bool)
+        ended = self._ended >= self._p.least_ends
+        for direction in np.flatnonzero((ended & glass).any(axis=(1, 2))).tolist():
+            near = [(direction + off) % self._p.directions for off in (-1, 0, 1)]
+            passed_there = self._passed[near].sum(axis=0, dtype=np.int64) > 1
+            label, count = ndimage.label(ended[direction] & glass, beside)
+            for number, window in enumerate(ndimage.find_objects(label), start=1):
+                rows, columns = np.nonzero(label[window] == number)
+                if len(rows) < _LEAST_PIECE:
+                    continue
+                points = np.column_stack([columns + window[1].start, rows + window[0].start]).astype(float)
+                for cells in self._beyond(points, direction):
+                    self._stand(cells, more, occupied, passed_there)
+        return more
+
+    def _beyond(self, points: np.ndarray, direction: int) -> List[np.ndarray]:
+        """Rows of column and row (k, 2) along the line of a piece (m, 2) of a pane, from either end outwards; none if
+        it is no line across that direction."""
+        centre = points.mean(axis=0)
+        values, vectors = np.linalg.eigh(np.cov((points - centre).T))
+        along = vectors[:, 1]
+        beam = 2.0 * math.pi * direction / self._p.directions
+        flat = abs(float(along @ [math.cos(beam), math.sin(beam)]))
+        if values[1] < 4.0 * max(values[0], 0.1) or flat > math.sin(1.5 * math.pi / self._p.directions):
+            return []
+        at = (points - centre) @ along
+        reach = self._p.extend_glass_m / self._p.resolution_m
+        steps = np.arange(0.5, reach, 0.5)
+        return [np.rint(centre + (end + sign * steps)[:, None] * along).astype(np.int64)
+                for end, sign in ((at.max(), 1.0), (at.min(), -1.0))]
+
+    def _stand(self, cells: np.ndarray, more: np.ndarray, occupied: np.ndarray, passed: np.ndarray) -> None:
+        """Mark cells in their order, until something stands there or beams passed."""
+        for column, row in cells.tolist():
+            if not (0 <= column < self._size and 0 <= row < self._size) or passed[row, column]:
+                return
+            if not occupied[row, column]:
+                more[row, column] = True
+
+
+def _overlap(shift: int, size: int) -> Tuple[slice, slice]:
+    """Where what is kept goes to, and where it comes from, along one axis."""
+    if shift >= 0:
+        return slice(0, size - shift), slice(shift, size)
+    return slice(-shift, size), slice(0, size + shift)

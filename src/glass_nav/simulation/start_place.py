@@ -1,0 +1,59 @@
+"""Where a robot wakes up: a random place of a building, or one that is given in words."""
+
+from __future__ import annotations
+
+import math
+from typing import Optional
+
+import numpy as np
+from scipy import ndimage
+
+from glass_nav.simulation import building_map
+from glass_nav.simulation.building import Building, distances
+
+RANDOM = "random"
+ROOM_M = 0.45      # to the nearest surface: it can turn, and drive off in any direction
+_STREAM = 0x57A27  # of the seed: no other part of a simulation draws from it
+_TRIES = 1000
+
+
+def start(words: str, building: Building, seed: int) -> Optional[np.ndarray]:
+    """(3,) map_from_base; None for "": the building's own.
+
+    Args:
+        words: "x y yaw" [m, m, rad], or "random".
+        building: as it is now, furniture moved.
+        seed: of the random place.
+
+    Raises:
+        ValueError: neither, or no room anywhere.
+    """
+    if not words.strip():
+        return None
+    if words.strip() == RANDOM:
+        return random_place(building, np.random.default_rng([seed, _STREAM]))
+    try:
+        pose = np.array([float(word) for word in words.replace(",", " ").split()])
+    except ValueError:
+        pose = np.zeros(0)
+    if pose.shape != (3,) or not np.isfinite(pose).all():
+        raise ValueError(f"start must be x y yaw in m and rad, or {RANDOM}, got {words!r}")
+    return pose
+
+
+def random_place(building: Building, rng: np.random.Generator) -> np.ndarray:
+    """(3,) map_from_base with room to every surface, in the part of the building that its own start is in."""
+    grid = building_map.draw(building)
+    room_m = ndimage.distance_transform_edt(np.pad(grid.free, 1))[1:-1, 1:-1] * grid.resolution_m
+    parts, _ = ndimage.label(grid.free)
+    row, column = grid.cells(building.start[:2])
+    rows, columns = np.nonzero((parts == parts[row, column]) & (room_m >= ROOM_M))
+    surfaces = building.surfaces
+    from_m, to_m = surfaces.from_m[surfaces.present], surfaces.to_m[surfaces.present]
+    for _ in range(_TRIES if len(rows) else 0):
+        pick = int(rng.integers(len(rows)))
+        point_m = grid.centres(rows[pick], columns[pick])
+        yaw = float(rng.uniform(-math.pi, math.pi))
+        if distances(point_m[None], from_m, to_m).min() >= ROOM_M:  # what the map does not know, too
+            return np.array([*point_m, yaw])
+    raise ValueError(f"{building.name}: no place with {ROOM_M:g} m of room around it")
