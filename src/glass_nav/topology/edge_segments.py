@@ -34,7 +34,7 @@ _LEAST_M = 1.0              # of wall in free space, else it is furniture
 class SegmentTest:
     """Whether the walls seen along an edge are evidence."""
     match_segments: bool = True             # not with vote_mode seed
-    segments_max_contradiction: float = 0.5  # share of the walls seen that may stand where a candidate has free space
+    segments_max_contradiction: float = 0.6  # share of the walls seen that may stand where a candidate has free space
 
     def __post_init__(self) -> None:
         if not 0.0 < self.segments_max_contradiction <= 1.0:
