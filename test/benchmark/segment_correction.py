@@ -11,7 +11,8 @@ third of the beams ending at people. basin: share of random starts within 0.5 m 
 0.3 degrees of the truth; where the walls leave a direction free (a hallway), apart from that. By beams whose true case
 is 1, 3 or 4, by all beams, and as `glass_nav locate` does it, which has to find the cases out; beside it the
 document's method, and point-to-point ICP on the wall cells by scipy's KD-tree. speed: CPU time of a correction of 541
-points against 500 segments. filter: the particle filter on real logs with polished poses and without.
+points against 500 segments. filter: the particle filter on real logs with polished poses and without. judge: do the
+measures tell right poses from wrong ones that a scan was aligned to, better than the fit that `~status` goes by?
 
 Exit 1 if a best value is not at the truth, if fewer than 95 % of the starts in rooms get there by known cases, or a
 correction takes more than 3 ms of CPU time.
@@ -36,18 +37,20 @@ sys.path.append(str(Path(__file__).resolve().parent))
 
 import drives
 import replay_logs
+import tracks
 from glass_nav.geometry import angles, se2
-from glass_nav.localization import beam_weights
+from glass_nav.localization import beam_weights, scan_alignment
 from glass_nav.localization.glass_mcl import GlassMcl
 from glass_nav.localization.glass_mcl_params import GlassMclParams
 from glass_nav.localization.segment_correction import SegmentCorrectionParams, SegmentCorrector
 from glass_nav.localization.segment_locator import SegmentLocator
 from glass_nav.localization.segment_polish import Polish
+from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.world import wall_segments
 from glass_nav.world.grid_map import GridMap
 
-TASKS = ("quality", "basin", "speed", "filter")
+TASKS = ("quality", "basin", "speed", "filter", "judge")
 REACH_M, REACH_RAD = 0.5, np.radians(10.0)
 RIGHT_M, RIGHT_RAD = 0.02, np.radians(0.3)
 BAR_SHARE, BAR_MS = 0.95, 3.0
@@ -325,10 +328,46 @@ def filter_table(arguments: argparse.Namespace) -> bool:
     return True
 
 
+# -- judge
+
+
+def judge(arguments: argparse.Namespace) -> bool:
+    """Chance that a right pose is told to be better than a wrong one of the same scan, by each measure."""
+    print("judge: chance that the right pose of a scan gets the better value than a wrong one that it was aligned to")
+    print("| log or building | pairs | fit of the scan | Ecf | combined | Emse |\n|---|---|---|---|---|---|")
+    for name in [*arguments.logs, *arguments.buildings]:
+        track = tracks.load(name, arguments.seed)
+        field, corrector = DistanceField(track.grid_map), SegmentCorrector(walls(track.grid_map))
+        rng = np.random.default_rng(arguments.seed)
+        better = []
+        for index in np.linspace(0, len(track.moments) - 1, 40).astype(int):
+            moment = track.moments[index]
+            points = moment.scan.points_in_base()[moment.scan.answered]
+            if len(points) < 30:
+                continue
+            starts = moment.map_from_base + np.column_stack([rng.uniform(-4.0, 4.0, (12, 2)), rng.uniform(-3, 3, 12)])
+            ends = scan_alignment.align(field, points, np.vstack([moment.map_from_base, starts])).poses
+            wrong = [pose for pose in ends[1:] if not tracks.is_right(pose, moment.map_from_base)]
+            if not wrong or not tracks.is_right(ends[0], moment.map_from_base):
+                continue
+            values = np.array([_values(field, corrector, points, pose) for pose in [ends[0], *wrong]])
+            better.append(values[0] > values[1:][np.argmax(values[1:, 0])])  # the wrong one that fits best
+        shares = np.mean(better, axis=0)
+        print(f"| {name} | {len(better)} | " + " | ".join(f"{share:.3f}" for share in shares) + " |", flush=True)
+    print()
+    return True
+
+
+def _values(field: DistanceField, corrector: SegmentCorrector, points: np.ndarray, pose: np.ndarray) -> List[float]:
+    quality = corrector.quality(points, pose)
+    return [float(scan_alignment.fit(field, points, pose[None])[0]), quality.classification_factor, quality.combined,
+            -quality.mse_m2]
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tasks", nargs="+", choices=TASKS, default=list(TASKS[:3]),
-                        help="default: all but filter, which takes long")
+                        help="default: quality basin speed; the others take long")
     parser.add_argument("--logs", nargs="*", choices=sorted(replay_logs.PEERS), default=list(replay_logs.PEERS))
     parser.add_argument("--filter-seed", type=int, default=10, help="first of two of the filter (default 10)")
     parser.add_argument("--buildings", nargs="+", default=drives.buildings())
@@ -338,7 +377,7 @@ def main() -> int:
     parser.add_argument("--starts", type=int, default=10, help="at each place (default 10)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="for the pictures of the measures")
     arguments = parser.parse_args()
-    run = {"quality": quality, "basin": basin, "speed": speed, "filter": filter_table}
+    run = {"quality": quality, "basin": basin, "speed": speed, "filter": filter_table, "judge": judge}
     missed = [task for task in arguments.tasks if not run[task](arguments)]
     print(f"missed: {', '.join(missed)}" if missed else "all bars met")
     return 1 if missed else 0

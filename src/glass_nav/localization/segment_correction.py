@@ -113,15 +113,17 @@ class SegmentCorrector:
             nothing = self._judge(points, pose)
             return SegmentCorrection(pose, nothing, nothing, _ALL_FREE, 0.0)
         lever_m = max(float(np.sqrt(np.mean(np.sum(points**2, axis=1)))), 1e-6)
-        before = self._judge(points, pose)
+        pull = self._pull(points, pose)
+        before = self._judged(pull.distance_m)
         step = self._least_squares_step if self._params.method == "least_squares" else self._document_step
         for neighbourhood_m in self._neighbourhoods_m():
-            pose = step(points, pose, neighbourhood_m, lever_m)
+            pose = step(points, pose, pull, neighbourhood_m, lever_m)
+            pull = self._pull(points, pose)
         pose[2] = angles.wrap(pose[2])
-        pull = self._pull(points, pose, self._last_neighbourhood_m)
-        information, _ = _normal_equations(pull, lever_m)
-        _, free = _constrained(information, float(pull.weight.sum()), self._params.least_constraint)
-        return SegmentCorrection(pose, before, self._judge(points, pose), free, lever_m)
+        weight = votes(pull.distance_m, self._last_neighbourhood_m)
+        information, _ = _normal_equations(pull, weight, lever_m)
+        _, free = _constrained(information, float(weight.sum()), self._params.least_constraint)
+        return SegmentCorrection(pose, before, self._judged(pull.distance_m), free, lever_m)
 
     def quality(self, points_m: np.ndarray, map_from_base: np.ndarray) -> SegmentQuality:
         """How well end points (N, 2) in the robot's frame fit at a pose (3,), which is not moved."""
@@ -138,36 +140,38 @@ class SegmentCorrector:
     def _judge(self, points: np.ndarray, pose: np.ndarray) -> SegmentQuality:
         if not len(points):
             return SegmentQuality(0, float("nan"), float("nan"), 0.0, 0.0, 0.0)
-        distance_m = self._index.nearest(_placed(points, pose)[0]).distance
+        return self._judged(self._index.nearest(_placed(points, pose)[0]).distance)
+
+    def _judged(self, distance_m: np.ndarray) -> SegmentQuality:
         return judged(distance_m, self._last_neighbourhood_m, self._params.outlier_m, self._params.fit_scale_m)
 
-    def _pull(self, points: np.ndarray, pose: np.ndarray, neighbourhood_m: float) -> _Pull:
+    def _pull(self, points: np.ndarray, pose: np.ndarray) -> _Pull:
         placed, turned = _placed(points, pose)
         nearest = self._index.nearest(placed)
         normal_x, normal_y, offset = self._index.lines[nearest.segment].T
-        return _Pull(votes(nearest.distance, neighbourhood_m), normal_x, normal_y,
-                     offset - normal_x * placed[:, 0] - normal_y * placed[:, 1],
+        return _Pull(nearest.distance, normal_x, normal_y, offset - normal_x * placed[:, 0] - normal_y * placed[:, 1],
                      normal_y * turned[:, 0] - normal_x * turned[:, 1])
 
-    def _document_step(self, points: np.ndarray, pose: np.ndarray, neighbourhood_m: float,
+    def _document_step(self, points: np.ndarray, pose: np.ndarray, pull: _Pull, neighbourhood_m: float,
                        lever_m: float) -> np.ndarray:
-        pull = self._pull(points, pose, neighbourhood_m)
-        share = pull.weight / pull.weight.sum()
+        weight = votes(pull.distance_m, neighbourhood_m)
+        share = weight / weight.sum()
         pose = pose + np.array([share @ (pull.normal_x * pull.across_m), share @ (pull.normal_y * pull.across_m), 0.0])
         if self._params.correct_orientation:
-            pull = self._pull(points, pose, neighbourhood_m)
-            stiffness = float(pull.weight @ pull.lever_m**2)
-            if stiffness > self._params.least_constraint * float(pull.weight.sum()) * lever_m**2:
-                pose[2] += float(pull.weight @ (pull.lever_m * pull.across_m)) / stiffness
+            pull = self._pull(points, pose)
+            weight = votes(pull.distance_m, neighbourhood_m)
+            stiffness = float(weight @ pull.lever_m**2)
+            if stiffness > self._params.least_constraint * float(weight.sum()) * lever_m**2:
+                pose[2] += float(weight @ (pull.lever_m * pull.across_m)) / stiffness
         return pose
 
-    def _least_squares_step(self, points: np.ndarray, pose: np.ndarray, neighbourhood_m: float,
+    def _least_squares_step(self, points: np.ndarray, pose: np.ndarray, pull: _Pull, neighbourhood_m: float,
                             lever_m: float) -> np.ndarray:
-        pull = self._pull(points, pose, neighbourhood_m)
-        information, gradient = _normal_equations(pull, lever_m)
+        weight = votes(pull.distance_m, neighbourhood_m)
+        information, gradient = _normal_equations(pull, weight, lever_m)
         if not self._params.correct_orientation:
             information[2], information[:, 2], gradient[2] = 0.0, 0.0, 0.0
-        inverse, _ = _constrained(information, float(pull.weight.sum()), self._params.least_constraint)
+        inverse, _ = _constrained(information, float(weight.sum()), self._params.least_constraint)
         step = inverse @ gradient
         return pose + np.array([step[0], step[1], step[2] / lever_m])
 
@@ -190,12 +194,12 @@ def judged(distance_m: np.ndarray, neighbourhood_m: float, outlier_m: float, fit
 
 @dataclass(frozen=True)
 class _Pull:
-    """What each point does to the pose."""
-    weight: np.ndarray    # (N,) 0..1
-    normal_x: np.ndarray  # (N,) of its segment, in map
-    normal_y: np.ndarray  # (N,)
-    across_m: np.ndarray  # (N,) along that normal from the point to the line of the segment
-    lever_m: np.ndarray   # (N,) along that normal that the point moves per radian of the robot's turn
+    """Where each point pulls the pose."""
+    distance_m: np.ndarray  # (N,) from its segment
+    normal_x: np.ndarray    # (N,) of its segment, in map
+    normal_y: np.ndarray    # (N,)
+    across_m: np.ndarray    # (N,) along that normal from the point to the line of the segment
+    lever_m: np.ndarray     # (N,) along that normal that the point moves per radian of the robot's turn
 
 
 def _finite(points_m: np.ndarray) -> np.ndarray:
@@ -212,10 +216,10 @@ def _placed(points: np.ndarray, pose: np.ndarray) -> Tuple[np.ndarray, np.ndarra
     return turned + pose[:2], turned
 
 
-def _normal_equations(pull: _Pull, lever_m: float) -> Tuple[np.ndarray, np.ndarray]:
+def _normal_equations(pull: _Pull, weight: np.ndarray, lever_m: float) -> Tuple[np.ndarray, np.ndarray]:
     """Information (3, 3) and gradient (3,) of x, y and yaw times lever."""
     rows = np.stack([pull.normal_x, pull.normal_y, pull.lever_m / lever_m, pull.across_m])
-    products = (rows[:3] * pull.weight) @ rows.T
+    products = (rows[:3] * weight) @ rows.T
     return products[:, :3], products[:, 3]
 
 
