@@ -96,8 +96,10 @@ def main() -> int:
     parser.add_argument("--edges", type=int, default=60, help="of each building, with their direction (default 60)")
     parser.add_argument("--others", type=int, default=20, help="candidates beside the true one (default 20)")
     parser.add_argument("--changed", type=float, default=0.0, help="share of the furniture that moved (default 0)")
+    parser.add_argument("--limit", type=float, default=SegmentTest().segments_max_contradiction,
+                        help="segments_max_contradiction (default as the node's)")
     arguments = parser.parse_args()
-    test = SegmentTest()
+    test = SegmentTest(segments_max_contradiction=arguments.limit)
     print("| building | edges driven | ruled out | largest contradiction | others that fit by numbers | ruled out | "
           "ms each |\n|---|---|---|---|---|---|---|")
     lost, count, told_apart, others = 0, 0, 0, 0
