@@ -22,6 +22,7 @@ from glass_nav.world.grid_map import GridMap
 _WOBBLE_M = 0.04   # of a line between one graph and the next
 _R_SIGMA_M = 0.03  # of an equidistance, besides what its obstacles leave open
 _LEAST_TRACE_M = 0.05
+_LATE_POINTS = 40  # of a trace: a robot backs off by no more
 
 
 @dataclass(frozen=True)
@@ -44,8 +45,14 @@ class Trace:
         self._points = [np.array(start_m, float)]
 
     def add(self, point_m: np.ndarray) -> None:
-        """Where the robot is on the edge now; steps back and small ones are left out."""
-        if np.hypot(*(point_m - self._points[-1])) >= _LEAST_TRACE_M:
+        """Where the robot is on the edge now; small steps are left out, what it backed off from is forgotten."""
+        if np.hypot(*(point_m - self._points[-1])) < _LEAST_TRACE_M:
+            return
+        late = np.array(self._points[1:][-_LATE_POINTS:]).reshape(-1, 2)
+        passed = np.flatnonzero(np.hypot(*(late - point_m).T) < _LEAST_TRACE_M)
+        if len(passed):
+            del self._points[len(self._points) - len(late) + int(passed[0]) + 1:]
+        else:
             self._points.append(np.array(point_m, float))
 
     def cut_back(self, point_m: np.ndarray) -> None:

@@ -28,6 +28,8 @@ ABORT = "ABORT"              # nothing helped
 
 LADDER = (WAIT, BACK_OFF, TURN, NEXT_CHOICE, ABORT)
 MOVES = (WAIT, BACK_OFF, TURN)
+STALL_TOLD_M = 0.4   # a base that was told to drive so far ...
+STALL_MOVED_M = 0.1  # ... and did not come so far is held by something
 STILL_S = 2.0  # a base that makes no way for so long in a step cannot
 
 
@@ -53,6 +55,32 @@ class Step:
     name: str
     command: np.ndarray  # (3,) wanted, by WAIT, BACK_OFF and TURN; else zero
     reason: str          # one sentence
+
+
+class Stall:
+    """Notices that the base makes no way though it is told to: it stands at something that the lidar does not see."""
+
+    def __init__(self) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """The robot is expected to move from now on."""
+        self._from: Optional[np.ndarray] = None
+        self._told_m = 0.0
+
+    def is_on(self, last_command: np.ndarray, odom_from_base: np.ndarray, dt_s: float) -> bool:
+        """Whether so much was commanded and so little came of it.
+
+        Args:
+            last_command: (3,) of the step that is over.
+            odom_from_base: (3,) now.
+            dt_s: how long it took.
+        """
+        here = np.asarray(odom_from_base, float)[:2]
+        if self._from is None or float(np.hypot(*(here - self._from))) > STALL_MOVED_M:
+            self._from, self._told_m = here, 0.0
+        self._told_m += abs(float(last_command[0])) * dt_s
+        return self._told_m > STALL_TOLD_M
 
 
 class Recovery:

@@ -82,6 +82,14 @@ class RoutePlanner:
         darts, points = self._way(start, end, -1, avoided)
         return self._route(from_m, darts, points, goal_m, f"x {goal_m[0]:.2f} m, y {goal_m[1]:.2f} m")
 
+    def nearest_edge(self, point_m: np.ndarray, darts: Collection[int]) -> Optional[int]:
+        """Of those of the darts, the edge nearest to a point (2,); None without darts."""
+        def away_m(edge: int) -> float:
+            line = self._lines[edge]
+            return float(np.hypot(*(line.at(line.nearest(point_m)) - point_m)))
+        edges = {dart >> 1 for dart in darts}
+        return min(edges, key=away_m) if edges else None
+
     # -- the graph
 
     def _route(self, from_m: np.ndarray, darts: "Optional[List[int]]", points: "List[np.ndarray]",

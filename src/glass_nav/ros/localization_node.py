@@ -72,6 +72,7 @@ class LocalizationNode:
         self._mcl: Optional[GlassMcl] = None
         self._map: Optional[GridMap] = None
         self._map_origin = ""  # where it came from, in words
+        self._waits = p.node.wait_for_initialpose  # with a map, without a filter
         self._estimate: Optional[Estimate] = None
         self._scan: Optional[Scan] = None  # that the estimate was made of
         self._pose_is_news = True
@@ -117,6 +118,8 @@ class LocalizationNode:
                 command()
             self._maps.request()
             mail["scans"] += self._inbox.take_now("scans")  # a new map takes a while
+            if self._waits and mail["scans"]:
+                mail["scans"], self._scans.last_arrival_s = [], self._now_s
             unusable = "there is no map yet" if self._mcl is None else None
             for msg in mail["scans"]:
                 if self._scans.receive(msg, self._now_s, unusable):
@@ -177,7 +180,8 @@ class LocalizationNode:
         """Build the filter around the first map; a later one leaves the particles where they are."""
         if self._mcl is None:
             self._map = grid_map
-            self._begin()
+            if not self._waits:
+                self._begin()
         elif self._map is not None and grid_map.digest == self._map.digest:
             rospy.loginfo(f"the map from {origin} is the one that is in use: nothing changes")
             return
@@ -198,6 +202,7 @@ class LocalizationNode:
         starts.refuse_outside(guess, grid_map)
         self._maps.take(grid_map, request.map.header.frame_id, "service set_map")
         self._starts.give(guess, self._now_s)
+        self._wait_no_more()
         if self._p.node.force_update_after_set_map:
             self._core().request_update()
 
@@ -218,6 +223,14 @@ class LocalizationNode:
             rospy.logwarn(f"initialpose refused: {err}")
             return
         self._starts.give(guess, self._now_s)
+        self._wait_no_more()
+
+    def _wait_no_more(self) -> None:
+        """There is a pose, or somebody wants one to be found."""
+        if self._waits:
+            self._waits = False
+            if self._map is not None:
+                self._begin()
 
     def _take_area(self, msg: PolygonStamped) -> None:
         try:
@@ -227,6 +240,7 @@ class LocalizationNode:
 
     def _search(self, area: Optional[np.ndarray] = None) -> None:
         """Start over anywhere in the map, or in an area (N, 2) of it; ValueError if there is no room."""
+        self._wait_no_more()
         self._core().scatter(area)
         self._starts.forget()
         self._outputs.start_over()
@@ -304,7 +318,10 @@ class LocalizationNode:
             self._starts.begin_at(self._estimate.map_from_base, self._estimate.covariance)
         self._estimate = None
         self._rng = self._p.node.rng  # a bag that starts over gives the same poses again
-        if self._map is not None:
+        if self._simulated and self._p.node.wait_for_initialpose:
+            self._waits, self._mcl = True, None
+            rospy.logwarn(f"{why}: it waits for initialpose again")
+        elif self._map is not None:
             rospy.logwarn(f"{why}: the filter starts over {self._begin()}")
 
     def _report(self) -> None:
@@ -330,7 +347,7 @@ class LocalizationNode:
         if without_scan_s > NO_SCAN_WARNING_S:
             self._log.warn(self._scans.silence(self._now_s), NO_SCAN_WARNING_S)
         if self._mcl is None:
-            return self._maps.trouble or "no map yet"
+            return self._maps.trouble or ("it waits for initialpose" if self._map is not None else "no map yet")
         if without_scan_s > SILENCE_S:
             return self._scans.silence(self._now_s)
         if self._now_s - self._last_estimate_s > SILENCE_S or self._estimate is None:

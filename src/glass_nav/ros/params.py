@@ -39,6 +39,7 @@ class LocalizationNodeParams:
     force_update_after_initialpose: bool = False
     force_update_after_set_map: bool = False
     start_without_guess: bool = False      # begin with a search of the whole map, not at initial_pose_*
+    wait_for_initialpose: bool = False     # no pose and no map -> odom before one is given; nothing is searched
     gui_publish_rate: float = -1.0         # [Hz] of particlecloud, ~beam_cloud, ~beam_markers; <= 0: no limit
     glass_map_period_s: float = 2.0        # [s] ~glass_map goes out no more often
     save_pose_rate: float = 0.5            # [Hz]; <= 0: only when the node ends

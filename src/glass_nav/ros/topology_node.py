@@ -32,7 +32,7 @@ from visualization_msgs.msg import MarkerArray
 from glass_nav import params
 from glass_nav.msg import (EdgeTraversal, LocalizeGloballyAction, LocalizeGloballyFeedback, LocalizeGloballyGoal,
                            LocalizeGloballyResult, Meetpoint, TopologyCandidates, TopologyStatus, TurnChoice)
-from glass_nav.ros import conversions, endings, topology_displays, topology_messages
+from glass_nav.ros import action_status, conversions, endings, topology_displays, topology_messages
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Errand, Mailbox
 from glass_nav.ros.topology_params import TopologyParams
@@ -78,7 +78,7 @@ class TopologyNode:
             self._publish(0)
         rospy.Service("~restart", Trigger, self._errand(self._restart))
         rospy.Service("~reload_atlas", Trigger, self._errand(self._reload_atlas))
-        self._server.start()
+        action_status.start(self._server)
         # Subscribers last: they may fire at once.
         rospy.Subscriber("meetpoint", Meetpoint, lambda msg: self._inbox.put("reports", msg), queue_size=10,
                          tcp_nodelay=True)

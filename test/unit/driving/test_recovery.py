@@ -9,7 +9,8 @@ import pytest
 
 from glass_nav.driving import recovery
 from glass_nav.driving.base_limits import BaseLimits
-from glass_nav.driving.recovery import ABORT, BACK_OFF, NEXT_CHOICE, NONE, RETRY, TURN, WAIT, Recovery, RecoveryParams
+from glass_nav.driving.recovery import (ABORT, BACK_OFF, NEXT_CHOICE, NONE, RETRY, TURN, WAIT, Recovery,
+                                        RecoveryParams, Stall)
 from glass_nav.simulation.robot import Obstacles, Robot, RobotParams
 
 CONTROL_S = 0.05
@@ -97,6 +98,17 @@ def test_called_off_it_stands_and_has_tried_nothing():
     assert (step.name, step.command.tolist()) == (NONE, [0.0, 0.0, 0.0]) and not steps.is_on
     steps.begin("a wall", np.zeros(3))
     assert steps.step(np.zeros(3), CONTROL_S).name == WAIT
+
+
+def test_a_base_that_makes_no_way_though_it_is_told_to_is_noticed():
+    stall, forward = Stall(), np.array([0.4, 0.0, 0.0])
+    for step in range(200):  # it drives
+        assert not stall.is_on(forward, np.array([0.02 * step, 0.0, 0.0]), CONTROL_S)
+    held_at = np.array([3.98, 0.0, 0.0])
+    told_s = next(step * CONTROL_S for step in range(200) if stall.is_on(forward, held_at, CONTROL_S))
+    assert 0.5 < told_s < 2.0
+    stall.clear()
+    assert not any(stall.is_on(np.array([0.0, 0.0, 1.0]), np.zeros(3), CONTROL_S) for _ in range(200))  # it turns
 
 
 @pytest.mark.parametrize("name, value, allowed", [("recovery_wait_s", -1.0, ">= 0"), ("recovered_m", 0.0, "> 0"),

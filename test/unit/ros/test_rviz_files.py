@@ -9,7 +9,8 @@ from typing import Any, Iterator
 
 import yaml
 
-from glass_nav.ros import beam_displays, landmarks_node, localization_node, topology_displays, wall_display
+from glass_nav.ros import (beam_displays, driver_displays, driver_node, landmarks_node, localization_node,
+                           topology_displays, wall_display)
 
 REPO = Path(__file__).parents[3]
 CONFIG = yaml.safe_load((REPO / "rviz" / "glass_nav.rviz").read_text(encoding="utf-8"))
@@ -55,6 +56,23 @@ def test_the_topology_is_switched_off_and_has_a_checkbox_for_each_thing():
     assert named("Atlas and search")["Namespaces"] == dict.fromkeys(topology_displays.NAMESPACES, True)
 
 
+def test_the_driver_is_switched_off_and_has_a_checkbox_for_each_thing():
+    assert named("Driver")["Enabled"] is False
+    assert named("Local graph and way")["Namespaces"] == dict.fromkeys(driver_displays.NAMESPACES, True)
+    assert "/glass_driver/markers" in topics() and "~markers" in driver_node.__doc__
+
+
+def test_the_displays_of_the_wake_up_are_the_same_with_topology_and_driver_switched_on():
+    text = (REPO / "rviz" / "wakeup.rviz").read_text(encoding="utf-8")
+    wakeup = yaml.safe_load(text)
+    shown = wakeup["Visualization Manager"]["Displays"]
+    for display in shown:
+        if display["Name"] in ("Topology", "Driver"):
+            assert display["Enabled"] is True
+            display["Enabled"] = False
+    assert wakeup == CONFIG
+
+
 def test_the_topics_of_the_node_are_those_it_tells_of():
     told = localization_node.__doc__
     for topic in topics():
@@ -71,9 +89,9 @@ def test_every_topic_below_a_node_can_be_remapped_to_another_name():
     assert {topic for topic in remaps if topic.count("/") == 2} == below
     for origin in below:
         _, node, topic = origin.split("/")
-        argument = {"glass_localization": "name", "glass_topology": "topology_name",
+        argument = {"glass_localization": "name", "glass_topology": "topology_name", "glass_driver": "driver_name",
                     "landmarks": "landmarks_name"}[node]
         assert remaps[origin] == f"/$(arg {argument})/{topic}"
     defaults = {arg.get("name"): arg.get("default") for arg in launch.iter("arg")}
     assert (defaults["name"], defaults["topology_name"]) == ("glass_localization", "glass_topology")
-    assert defaults["landmarks_name"] == "landmarks"
+    assert (defaults["landmarks_name"], defaults["driver_name"]) == ("landmarks", "glass_driver")

@@ -1,0 +1,142 @@
+#!/usr/bin/env python3
+"""A whole wake-up by the real nodes: simulator, driver, topology, localization, of which two are killed on the way.
+
+The robot stands somewhere, nobody knows where; at the end it is localized and has driven to a node of the atlas.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import unittest
+from pathlib import Path
+from typing import List
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import actionlib
+import numpy as np
+import rospy
+import rostest
+from actionlib_msgs.msg import GoalStatus
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
+from rostest_support import Heard, LogLines, Process, wait_until
+from std_msgs.msg import Bool
+
+from glass_nav.geometry import angles
+from glass_nav.msg import (DriverStatus, EdgeTraversal, GotoNodeAction, GotoNodeGoal, LocalizationStatus, Meetpoint,
+                           TopologyStatus)
+from glass_nav.ros import conversions
+from glass_nav.topology import atlas_file, shipped_atlases
+
+BUILDING = "opaque_office"
+STEP_S = 90.0  # of the wall clock, for an edge or two
+
+
+def topology() -> Process:
+    return Process("topology_node", "__name:=glass_topology", f"_atlas:={BUILDING}")
+
+
+def driver() -> Process:
+    return Process("driver_node", "__name:=glass_driver", f"_atlas:={BUILDING}",
+                   "topology_status:=glass_topology/status", "restart_search:=glass_topology/restart",
+                   "localization_status:=glass_localization/status")
+
+
+class WakeUp(unittest.TestCase):
+
+    def setUp(self) -> None:
+        self.lines = LogLines()
+        self.truth = Heard("ground_truth", PoseStamped)
+        self.odometry = Heard("odom", Odometry)
+        self.blocked = Heard("/simulator/blocked", Bool, lambda msg: msg.data)
+        self.topology = Heard("/glass_topology/status", TopologyStatus)
+        self.driver = Heard("/glass_driver/status", DriverStatus)
+        self.meetpoints = Heard("meetpoint", Meetpoint)
+        self.traversals = Heard("edge_traversal", EdgeTraversal)
+        self.localization = Heard("/glass_localization/status", LocalizationStatus)
+        self.handed_over = Heard("initialpose", PoseWithCovarianceStamped)
+        self.poses = Heard("amcl_pose", PoseWithCovarianceStamped)
+        self.nodes: List[Process] = []
+
+    def tearDown(self) -> None:
+        for node in self.nodes:
+            node.end(signal.SIGKILL)
+
+    def start(self, node: Process) -> Process:
+        self.nodes.append(node)
+        return node
+
+    def await_(self, condition: object, timeout_s: float, what: str) -> None:
+        said = [heard.last.reason if heard.last else None for heard in (self.topology, self.driver)]
+        self.assertTrue(wait_until(condition, timeout_s), f"no {what} within {timeout_s:g} s; topology and driver say "
+                        f"{said}; {self.lines.having('')[-10:]}")
+
+    def is_at(self, depth: int, after: int) -> bool:
+        """A search that has come so far, by what the topology said after so many words."""
+        return any(msg.depth >= depth and msg.state_name in ("SEARCHING", "TENTATIVE", "CONFIRMED")
+                   for msg in self.topology.all[after:])
+
+    def true_pose(self, stamp: rospy.Time) -> np.ndarray:
+        self.await_(lambda: any(msg.header.stamp == stamp for msg in self.truth.all), 10.0, "truth at the stamp")
+        return next(conversions.planar_from_pose(msg.pose) for msg in self.truth.all if msg.header.stamp == stamp)
+
+    def test_a_robot_finds_out_where_it_is_though_nodes_die_on_the_way(self) -> None:
+        first_topology, first_driver = self.start(topology()), self.start(driver())
+        self.await_(lambda: self.is_at(1, 0), STEP_S, "edge driven")
+        self.assertEqual(self.localization.last.state_name, "UNKNOWN")
+        self.assertFalse(len(self.poses))
+
+        first_topology.end(signal.SIGKILL)  # the driver drives on to its meetpoint, and tells the next one of it
+        heard = len(self.topology)
+        self.start(topology())
+        self.await_(lambda: self.is_at(0, heard), STEP_S, "search of the second topology node")
+
+        self.await_(lambda: self.driver.last.state_name == "FOLLOWING", STEP_S, "edge that is followed")
+        first_driver.end(signal.SIGKILL)
+        self.await_(lambda: self.odometry.last.twist.twist.linear.x == 0.0, 20.0, "standstill without a driver")
+        heard = len(self.topology)
+        self.start(driver())
+        self.await_(lambda: any(msg.state_name == "WAITING" for msg in self.topology.all[heard:]), STEP_S,
+                    "search that begins anew")
+        self.assertTrue(self.lines.having("the search cannot follow the robot to this meetpoint"))
+
+        self.await_(lambda: self.topology.last.state_name in ("CONFIRMED", "AMBIGUOUS", "LOST"), 2 * STEP_S, "end")
+        self.assertEqual(self.topology.last.state_name, "CONFIRMED", self.topology.last.reason)
+        self.await_(lambda: len(self.handed_over), 10.0, "initialpose")
+        handed_over = self.handed_over.last
+        said, true = conversions.planar_from_pose(handed_over.pose.pose), self.true_pose(handed_over.header.stamp)
+        self.assertLess(np.hypot(*(said - true)[:2]), 0.3, f"said {said}, true {true}")
+        self.assertLess(abs(float(angles.wrap(said[2] - true[2]))), 0.2, f"said {said}, true {true}")
+        self.assertEqual(len(self.handed_over), 1)
+        by_stamp = {msg.header.stamp: msg for msg in self.meetpoints.all}
+        for msg in self.traversals.all:
+            self.assertIn(msg.header.stamp, by_stamp)  # both of an arrival have one stamp
+
+        self.await_(lambda: self.localization.last.state_name == "LOCALIZED", 30.0, "localization")
+        self.go_somewhere()
+        self.assertFalse(len(self.blocked), "the robot touched something")
+
+    def go_somewhere(self) -> None:
+        """To a node of the atlas, tracked on the way."""
+        atlas = atlas_file.load(shipped_atlases.find(BUILDING))
+        away = np.hypot(*(atlas.nodes.position_m - conversions.planar_from_pose(self.truth.last.pose)[:2]).T)
+        node = int(np.flatnonzero((away > 4.0) & (away < 8.0) & (atlas.nodes.r_m > 0.6))[0])
+        client = actionlib.SimpleActionClient("goto_node", GotoNodeAction)
+        self.assertTrue(client.wait_for_server(rospy.Duration(20)))
+        heard = len(self.poses)
+        client.send_goal(GotoNodeGoal(node=node))
+        self.await_(lambda: client.get_state() not in (GoalStatus.PENDING, GoalStatus.ACTIVE), STEP_S, "end of the way")
+        self.assertEqual(client.get_state(), GoalStatus.SUCCEEDED, client.get_result())
+        errors = [np.hypot(*(conversions.planar_from_pose(msg.pose.pose) - self.true_pose(msg.header.stamp))[:2])
+                  for msg in self.poses.all[heard:]]
+        self.assertGreater(len(errors), 5)
+        self.assertLess(np.mean(errors), 0.05)
+        truth = conversions.planar_from_pose(self.truth.last.pose)
+        self.assertLess(np.hypot(*(truth[:2] - atlas.nodes.position_m[node])), 0.2)
+
+
+if __name__ == "__main__":
+    rospy.init_node("wakeup_rostest")
+    rostest.rosrun("glass_nav", "wakeup", WakeUp)
