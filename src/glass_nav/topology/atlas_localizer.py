@@ -16,6 +16,7 @@ import numpy as np
 from glass_nav.geometry import se2
 from glass_nav.topology import ambiguity, vote
 from glass_nav.topology.atlas import Atlas, Visits
+from glass_nav.topology.edge_segments import SegmentTest
 from glass_nav.topology.matching import Matcher, Tolerances
 from glass_nav.topology.observations import Meetpoint, Traversal, turn_name
 from glass_nav.topology.search_forest import SearchForest
@@ -34,6 +35,7 @@ class SearchParams:
     max_detection_errors: int = 2  # meetpoints missed or seen where there are none; not with vote_mode seed
     use_edge_angles: bool = True   # as evidence; not with vote_mode seed
     tolerances: Tolerances = field(default_factory=Tolerances)
+    segments: SegmentTest = field(default_factory=SegmentTest)
 
     def __post_init__(self) -> None:
         if self.vote_mode not in VOTE_MODES:
@@ -82,7 +84,8 @@ class AtlasLocalizer:
     def __init__(self, atlas: Atlas, params: SearchParams) -> None:
         self._atlas = atlas
         self._params = params
-        self._matcher = Matcher(atlas, params.tolerances, params.use_edge_angles and not params.document)
+        self._matcher = Matcher(atlas, params.tolerances, params.use_edge_angles and not params.document,
+                                None if params.document else params.segments)
         self._forest = SearchForest(self._matcher, 0 if params.document else params.max_detection_errors)
         self._claim: Optional[_Claim] = None
         self._estimate: Optional[Estimate] = None

@@ -70,7 +70,7 @@ class Traversal:
     chord_bearing_rad: float = UNKNOWN  # direction of the chord, counterclockwise from that in which the edge left
     turn_rad: float = UNKNOWN  # direction of travel at the end, counterclockwise from that in which the edge left
     segments_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 4)))  # (n, 4) x1 y1 x2 y2 seen, in the frame
-    # at the start, x along the edge; kept for the feature maps, not matched
+    # at the start, x along the edge
 
     def __post_init__(self) -> None:
         if self.rank < 0:
