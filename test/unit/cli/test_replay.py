@@ -179,7 +179,7 @@ def test_bad_input_is_one_line_and_exit_code_3(run, room_bag, room_map, tmp_path
     (tmp_path / "cut.bag").write_bytes(path.read_bytes()[:-1])
     assert last_line(run, tmp_path / "cut.bag") == (
         "glass_nav replay: cut.bag: cut short or never closed (its index is missing); "
-        "`rosbag reindex` may save what it holds")
+        "`rosbag reindex cut.bag` may save what it holds")
     assert last_line(run, path, grid=tmp_path / "no.yaml") == (
         "glass_nav replay: no.yaml: cannot be read: No such file or directory")
     shutil.copy(room_map, tmp_path / "map.yaml")
