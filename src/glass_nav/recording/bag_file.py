@@ -61,7 +61,7 @@ def open_log(paths: Sequence[Path], options: LogOptions) -> Recording:
     entries = _Entries(paths, scan_topic, tree, odometry, base_frame, options)
     beam_truth = None if truth_topic is None else _TrueBeams(paths, truth_topic)
     name = paths[0].name if len(paths) == 1 else f"{paths[0].name} and {len(paths) - 1} more"
-    return Recording(name, scan_count, entries, truth, notes, beam_truth)
+    return Recording(name, scan_count, entries, truth, notes, beam_truth, odometry.frame or "odom", base_frame)
 
 
 class Bag:
