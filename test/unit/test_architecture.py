@@ -19,9 +19,10 @@ MAY_IMPORT = {
     "topology": "geometry world sensing",
     "recording": "geometry world sensing",
     "simulation": "geometry world sensing",
+    "checkup": "geometry world sensing localization recording",
     "evaluation": "geometry",
-    "cli": "geometry world sensing localization topology recording simulation evaluation",
-    "ros": "geometry world sensing localization topology recording simulation evaluation",
+    "cli": "geometry world sensing localization topology recording simulation evaluation checkup",
+    "ros": "geometry world sensing localization topology recording simulation evaluation checkup",
 }
 FOR_ALL = {"amcl_parameters", "params"}  # modules of no room
 ONLY_BY = {  # compiled modules, each behind its face; and what is heavy, where it is needed
