@@ -37,6 +37,15 @@ class Report:
     seen: List[str]
     findings: List[Finding]
 
+    @property
+    def text(self) -> str:
+        """For people: what was seen, then each finding with what to do."""
+        lines = [f"seen     {line}" for line in self.seen]
+        for finding in self.findings:
+            lines += ["", f"finding  {finding.name}: {finding.what}", f"  to do  {finding.advice}"]
+        count = len(self.findings)
+        return "\n".join([*lines, "", f"{count} finding{'' if count == 1 else 's'}" if count else "nothing found"])
+
 
 def examine(seen: Observed, grid_map: Optional[GridMap] = None, names: FrameNames = FrameNames()) -> Report:
     """All checks.
@@ -61,7 +70,9 @@ def examine(seen: Observed, grid_map: Optional[GridMap] = None, names: FrameName
     if grid_map is not None:
         height, width = grid_map.occupancy.shape
         lines.append(f"map: {width} x {height} cells of {grid_map.resolution_m:g} m")
-        findings += map_checks.check_map(grid_map)
+        of_map = [*map_checks.check_map(grid_map)]
+        findings += of_map
+        grid_map = None if of_map else grid_map
     for topic, scans in seen.scans.items():
         findings += _check_lidar(topic, scans, robot, grid_map)
     unique = {(each.name, each.what): each for each in findings}
@@ -175,7 +186,7 @@ def _check_motion_and_map(lidar: str, scans: Sequence[HeardScan], robot: _Robot,
         opposite = motion_checks.turns_are_opposite(moves)
         yield from motion_checks.check(moves, lidar, robot.link, opposite)
     found: List[Finding] = []
-    if grid_map is not None and grid_map.free.any() and grid_map.occupied.any():
+    if grid_map is not None:
         found = [*map_checks.check(ScansOnMap(grid_map, [_in_base(scan) for scan, _ in in_order]), opposite)]
         yield from found
     if opposite and not any(finding.name == "lidar-mirrored" for finding in found):

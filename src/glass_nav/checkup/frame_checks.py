@@ -15,6 +15,7 @@ _UNIT_TOLERANCE = 0.01   # tf2 refuses quaternions that are longer or shorter by
 _TILT = math.cos(math.radians(3.0))  # a plane tilted further meets floor or ceiling, or shortens what it sees
 _SAME_M, _SAME_TURN = 1e-3, 1e-3
 _GAP_S, _GAP_M, _GAP_RAD = 0.5, 0.2, 0.1  # of odometry during which the robot moved
+_IN_GAPS, _LONG_GAP_S = 0.01, 10.0  # share of the scans that may fall into such gaps, if none is that long
 _JUMP_M, _JUMP_M_S = 0.5, 8.0
 _UNCOVERED = 0.02        # share of the scans that may have no odometry: before it started, after it ended
 
@@ -105,11 +106,11 @@ def check_coverage(scans: Sequence[HeardScan], stamps_ns: np.ndarray, odom_from_
     apart_s = np.diff(stamps_ns) * 1e-9
     way_m = np.hypot(*np.diff(odom_from_base[:, :2], axis=0).T)
     turn = np.abs((np.diff(odom_from_base[:, 2]) + np.pi) % (2.0 * np.pi) - np.pi)
-    usual_s = float(np.median(apart_s))
+    usual_s = max(float(np.median(apart_s)), 0.6 * float(np.median(np.diff(np.sort(scan_ns)))) * 1e-9)
     gap = (apart_s > max(_GAP_S, 5.0 * usual_s)) & ((way_m > _GAP_M) | (turn > _GAP_RAD))
     inside = np.searchsorted(stamps_ns, scan_ns) - 1
     hit = gap[np.clip(inside, 0, len(gap) - 1)] & ~outside
-    if hit.any():
+    if hit.mean() > _IN_GAPS or (hit.any() and apart_s[gap].max() > _LONG_GAP_S):
         yield Finding("tf-gaps", f"{link} is silent for up to {apart_s[gap].max():.1f} s while the robot moves; {hit.sum()} scans "
                       "fall into the gaps", "look at the rate of the node that sends it (rosrun tf tf_monitor) and at the "
                       "load of the computer: a live node drops these scans")

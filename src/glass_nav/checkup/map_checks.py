@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Iterator, List, Sequence
+from typing import Iterator, Sequence, Tuple
 
 import numpy as np
 
@@ -17,9 +17,11 @@ _LEAST_SCANS, _LEAST_POINTS = 5, 20
 _MOST_POINTS, _COARSE = 150, 60
 _FOUND, _REFINED = 300, 40
 _LEAST_FIT = 0.72       # median over the scans; own maps give 0.75 to 0.99, others 0.44 to 0.71
-_GOOD_FIT = 0.9         # nothing else is tried then
+_GOOD_FIT, _FAIR_FIT = 0.9, 0.85  # mirrored and scaled ones are not tried then
+_SCALED_FIT = 0.75      # of scans that fit a map but for its scale
 _BETTER = 0.06          # another hypothesis fits so much better
-_SCALES = (0.5, 0.8, 0.87, 0.93, 1.07, 1.15, 1.25, 2.0)
+_SCALES = (0.5, *1.05 ** np.arange(-6, 7), 2.0)
+_FINE = 1.05 ** np.array([-0.5, -0.25, 0.0, 0.25, 0.5])
 _MIRROR = np.array([1.0, -1.0])
 
 
@@ -40,9 +42,9 @@ class ScansOnMap:
     def __len__(self) -> int:
         return len(self._points)
 
-    def fits(self, factor: np.ndarray) -> np.ndarray:
-        """(S,) how well each scan fits at its best place, 0..1, with its points multiplied by a factor (2,) or ()."""
-        return np.array([self._best(points * factor) for points in self._points])
+    def fits(self, factor: np.ndarray, every: int = 1) -> np.ndarray:
+        """(S,) how well each scan, or each second one, fits at its best place, 0..1, its points times a factor (2,) or ()."""
+        return np.array([self._best(points * factor) for points in self._points[::every]])
 
     def _best(self, points: np.ndarray) -> float:
         places = self._matcher.search(points[:: max(1, len(points) // _COARSE)], _FOUND)
@@ -81,17 +83,29 @@ def check(scans: ScansOnMap, turns_opposite: bool) -> Iterator[Finding]:
     if np.median(mirrored) > fit + _BETTER and np.median(mirrored - own) > 0.5 * _BETTER:
         yield _mirrored(turns_opposite, fit, float(np.median(mirrored)))
         return
-    others: List[float] = [float(np.median(scans.fits(np.array(scale)))) for scale in _SCALES]
-    best = int(np.argmax(others))
-    if others[best] > fit + _BETTER and others[best] > 0.8:
-        scale = 1.0 / _SCALES[best]
-        yield Finding("map-scale", f"the scans fit the map by {fit:.2f} of 1 as it is, and by {others[best]:.2f} were the map "
+    if fit >= _FAIR_FIT:
+        return
+    factor, scaled = _best_factor(scans)
+    if scaled > fit + 2.0 * _BETTER and scaled > _SCALED_FIT:
+        scale = 1.0 / factor
+        yield Finding("map-scale", f"the scans fit the map by {fit:.2f} of 1 as it is, and by {scaled:.2f} were the map "
                       f"{scale:.2f} times as large",
                       f"the resolution in its yaml, times about {scale:.2f}, is right; or the lidar's ranges are scaled")
     elif fit < _LEAST_FIT:
         yield Finding("map-mismatch", f"the scans fit the map nowhere: by {fit:.2f} of 1 at their best places",
                       "is it the map of this building and floor, and is it of this height above the floor? Look at scans and "
                       "map in rviz; map anew if much was rebuilt")
+
+
+def _best_factor(scans: ScansOnMap) -> Tuple[float, float]:
+    """The factor on the scans with which they fit best, and how well."""
+    best, scaled = 1.0, 0.0
+    for factors in (_SCALES, None):
+        for factor in factors if factors is not None else best * _FINE:
+            fit = float(np.median(scans.fits(np.array(factor), every=2)))
+            if fit > scaled:
+                best, scaled = float(factor), fit
+    return best, scaled
 
 
 def _mirrored(turns_opposite: bool, fit: float, mirrored: float) -> Finding:

@@ -11,14 +11,14 @@ from glass_nav.checkup.finding import Finding
 from glass_nav.checkup.scan_motion import LEAST_POINTS, EarlierScan
 from glass_nav.geometry import angles, se2
 
-PAIRS = 36               # with a turn, and as many straight ahead
+PAIRS = 24               # with a turn, and as many straight ahead
 _AHEAD = 60              # scans that are looked through for the later one of a pair
 _WAY_M, _TURN_RAD = 0.3, 0.2     # of a pair
 _MOST_M, _MOST_RAD = 1.0, 0.6
 _REACH_M, _REACH_RAD = 1.5, 0.9
 _STILL_M, _STILL_RAD = 0.02, 0.02
 _LEAST_PAIRS = 6
-_SCALE, _TURN_SCALE = 0.1, 0.15   # that an odometry may be off by
+_SCALE, _TURN_SCALE = 0.1, 0.2  # that an odometry may be off by
 _SPREAD = 0.4            # interquartile range over the median: more, and nothing is known
 _ASKEW_RAD, _ASKEW_SPREAD = np.radians(8.0), np.radians(12.0)
 
@@ -144,7 +144,8 @@ def check(moves: Moves, lidar: str, link: str, opposite: bool) -> Iterator[Findi
         yield Finding("odometry-turn-scale", f"for each degree that {link} turns the scans turn {turns.middle:.2f} degrees "
                       f"({turns.count} pairs of scans)", f"divide the distance between the wheels in the base's driver by "
                       f"{turns.middle:.2f}; for a gyro, look at its scale")
-    yield from _askew(moves, lidar)
+    if not opposite:
+        yield from _askew(moves, lidar)
 
 
 def _askew(moves: Moves, lidar: str) -> Iterator[Finding]:

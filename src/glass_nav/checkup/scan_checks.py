@@ -16,6 +16,7 @@ _LEAST_SCANS = 20
 _FEW = 0.05             # share of beams or scans that may be odd
 _LONGEST_M = 500.0      # no 2D lidar sees farther
 _PILED = 30.0           # a range so many times as frequent as its neighbours is a code
+_NARROW = 0.03          # share of the beams: some at the edge of the view do no harm
 _ROBOT_M, _STILL_M, _ALIVE_M = 0.6, 0.03, 0.2  # beams that end on the robot: how near, how still, while others change
 
 
@@ -26,14 +27,16 @@ def check(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
                       "start the lidar's driver before recording, and check its cable, power and port")
         return
     yield from _angles(topic, scans)
-    yield from _limits(topic, scans)
+    limits = [*_limits(topic, scans)]
+    yield from limits
     yield from _repeats(topic, scans)
     usable = [scan for scan in scans if len(scan.ranges_m)]
     some = usable[:: max(1, -(-len(usable) // MOST_SCANS))]
     if not some:
         yield Finding("scan-empty", f"{topic}: not one scan has a range", "the driver sends empty scans: restart it")
         return
-    yield from _ranges(topic, some)
+    if not any(finding.name == "scan-limits" for finding in limits):
+        yield from _ranges(topic, some)
     yield from _robot_in_view(topic, some)
     fault = next((fault for fault in (deskew.fault(len(scan.ranges_m), scan.time_increment_s, scan.scan_time_s)
                                       for scan in some) if fault), None)
@@ -172,7 +175,7 @@ def _robot_in_view(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
     low, middle, high = _quantiles(np.where(inside, rows, np.nan), inside)
     still = (inside.mean(axis=0) > 0.9) & (middle < _ROBOT_M) & (high - low < _STILL_M)
     alive = inside.mean(axis=0) > 0.5
-    if still.sum() < max(3, 0.01 * width) or not np.median((high - low)[alive & ~still]) > _ALIVE_M:
+    if still.sum() < max(3, _NARROW * width) or not np.median((high - low)[alive & ~still]) > _ALIVE_M:
         return
     angles = np.degrees(scans[-1].angle_min_rad + scans[-1].angle_increment_rad * np.nonzero(still)[0])
     yield Finding("scan-sees-robot", f"{topic}: {still.sum()} beams between {angles.min():.0f} and {angles.max():.0f} "

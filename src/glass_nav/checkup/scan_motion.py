@@ -20,8 +20,8 @@ CELL_M = 0.05
 FARTHEST_M = 20.0       # of beams that are used
 MOST_POINTS = 120       # of the later scan
 LEAST_POINTS = 30
-_STEP_M, _STEP_RAD = 0.1, np.radians(3.0)
-_KEEP = 12              # of the grid's best, to be refined
+_STEP_M, _STEP_RAD = 0.15, np.radians(4.0)
+_KEEP = 16              # of the grid's best, to be refined
 _LEAST_FIT = 0.6        # of the beams that lie on the earlier scan
 _RIVAL = 0.97           # another place that fits about as well: the motion is not known
 _LEAST_INFORMATION = 0.08  # of the beams that hold the least certain direction
@@ -58,7 +58,7 @@ class EarlierScan:
         points = points_m[:: max(1, -(-len(points_m) // MOST_POINTS))]
         offsets = np.arange(-reach_m, reach_m + 1e-9, _STEP_M)
         turns = np.arange(-reach_rad, reach_rad + 1e-9, _STEP_RAD)
-        coarse = points[:: max(1, len(points) // 60)]
+        coarse = points[:: max(1, len(points) // 40)]
         x0, y0 = np.meshgrid(offsets, offsets)
         near = np.hypot(x0, y0).ravel() <= reach_m
         starts = np.stack([x0.ravel()[near], y0.ravel()[near]], axis=-1)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import List, Optional
 
 from glass_nav.checkup import doctor
-from glass_nav.checkup.doctor import FrameNames, Report
+from glass_nav.checkup.doctor import FrameNames
 from glass_nav.cli.progress import Progress
 from glass_nav.recording import bag_observer
 from glass_nav.recording.recording import RecordingError
@@ -61,17 +61,8 @@ def main(arguments: argparse.Namespace) -> bool:
     finally:
         progress.finish()
     report = doctor.examine(seen, grid_map, FrameNames(arguments.odom_frame.lstrip("/"), arguments.base_frame))
-    print(as_text(report))
+    print(report.text)
     return not report.findings
-
-
-def as_text(report: Report) -> str:
-    """For people: what was seen, then each finding with what to do."""
-    lines = [f"seen     {line}" for line in report.seen]
-    for finding in report.findings:
-        lines += ["", f"finding  {finding.name}: {finding.what}", f"  to do  {finding.advice}"]
-    count = len(report.findings)
-    return "\n".join([*lines, "", f"{count} finding{'' if count == 1 else 's'}" if count else "nothing found"])
 
 
 def _live(arguments: argparse.Namespace) -> bool:
