@@ -20,15 +20,15 @@ def main(argv: Optional[List[str]] = None) -> int:
         says what), 130 interrupted.
     """
     try:
-        from glass_nav.cli import atlas, doctor, landmarks, replay, simulate
+        from glass_nav.cli import atlas, doctor, landmarks, params, replay, simulate
     except ImportError as err:
         if not str(err.name).startswith("glass_nav"):
             raise
         print(f"glass_nav: {err.name or err} is not there: build the package and source its setup.bash",
               file=sys.stderr)
         return BAD_INPUT
-    modules: Dict[str, Any] = {"atlas": atlas, "doctor": doctor, "landmarks": landmarks, "replay": replay,
-                               "simulate": simulate}  # each: see replay.py
+    modules: Dict[str, Any] = {"atlas": atlas, "doctor": doctor, "landmarks": landmarks, "params": params,
+                               "replay": replay, "simulate": simulate}  # each: see replay.py
     parser = argparse.ArgumentParser(prog="glass_nav", description="Localization in buildings of glass: offline tools.")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     commands.required = True  # as an attribute: the argument came with Python 3.7 only for some callers

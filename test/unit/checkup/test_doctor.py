@@ -28,9 +28,7 @@ DEG = np.pi / 180.0
 def simulated(tmp_path_factory):
     """Records and map of a robot that drives around half an atrium of glass."""
     folder = tmp_path_factory.mktemp("simulated")
-    (folder / "path.yaml").write_text("[[11, 1.35], [19.6, 0.55], [20.4, 1.3], [21.5, 6.4], [21.5, 12.6], [20.8, 13.1], "
-                                      "[12, 13.9]]\n")
-    assert cli.main(["simulate", "glass_atrium", "--path", str(folder / "path.yaml"), "--beams", "181", "--rate", "5",
+    assert cli.main(["simulate", "glass_atrium", "--path", "ring", "--beams", "181", "--rate", "5",
                      "--out", str(folder / "good.bag")]) == 0
     return faults.read(folder / "good.bag"), map_file.load(folder / "good.map.yaml")
 
@@ -216,8 +214,6 @@ def other_map(data_dir: Path) -> GridMap:
 
 @pytest.mark.parametrize("name, change", [
     ("map-mirrored", lambda own: replace(own, occupancy=np.ascontiguousarray(own.occupancy[:, ::-1]))),
-    ("map-scale", lambda own: replace(own, resolution_m=own.resolution_m * 1.2)),
-    ("map-scale", lambda own: replace(own, resolution_m=own.resolution_m * 0.85)),
     ("map-empty", lambda own: replace(own, occupancy=np.where(own.occupied, -1, own.occupancy).astype(np.int8))),
     ("map-inverted", lambda own: replace(own, occupancy=np.where(own.occupied, 0, 100).astype(np.int8)))])
 def test_a_map_that_does_not_belong_to_the_scans_is_named(good, named, name, change):
@@ -227,5 +223,16 @@ def test_a_map_that_does_not_belong_to_the_scans_is_named(good, named, name, cha
     assert found <= {name}
 
 
-def test_the_map_of_another_building_is_named(good, named, data_dir):
-    assert named(good[0], other_map(data_dir)) == {"map-mismatch"}
+def test_the_map_of_another_building_is_named(real, named, data_dir):
+    assert named(real[0], other_map(data_dir)) == {"map-mismatch"}
+
+
+@pytest.mark.parametrize("which, factor", [("simulated", 1.2), ("real", 0.85)])
+def test_a_map_with_a_wrong_resolution_is_named_with_the_right_one(request, tmp_path, which, factor):
+    records, own = request.getfixturevalue(which)
+    wrong = replace(own, resolution_m=own.resolution_m * factor)
+    report = doctor.examine(bag_observer.observe([faults.write(tmp_path / "good.bag", records)]), wrong)
+    (finding,) = report.findings
+    assert finding.name == "map-scale"
+    told = float(finding.what.split("were the map ")[1].split()[0])
+    assert told * factor == pytest.approx(1.0, abs=0.02)
