@@ -32,8 +32,8 @@ class ReplayLaunch(unittest.TestCase):
     def test_the_node_is_ready_before_the_bag_plays_and_follows_it(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
             bag = Path(folder) / "run.bag"
-            code, printed = Process("glass_nav", "simulate", "glass_atrium", "--path", "half", "--beams", "181", "--rate",
-                                    "5", "--speed", "1.0", "--out", str(bag)).wait(60.0)
+            code, printed = Process("glass_nav", "simulate", "glass_atrium", "--path", "half", "--beams", "181",
+                                    "--rate", "5", "--speed", "1.0", "--out", str(bag)).wait(60.0)
             self.assertEqual(code, 0, printed)
             with rosbag.Bag(str(bag)) as recorded:
                 stamps = [msg.header.stamp for _, msg, _ in recorded.read_messages(topics=["/scan"])
@@ -45,7 +45,8 @@ class ReplayLaunch(unittest.TestCase):
             scans, truth = Heard("scan", LaserScan), Heard("ground_truth", PoseStamped)
             launch = subprocess.Popen(
                 ["roslaunch", "glass_nav", "replay.launch", f"bag:={bag}", f"map:={bag.with_suffix('.map.yaml')}",
-                 f"bag_options:=--duration={PLAYED_S}", f"initial_pose_x:={start[0]}", f"initial_pose_y:={start[1]}", f"initial_pose_a:={start[2]}"],
+                 f"bag_options:=--duration={PLAYED_S}",
+                 f"initial_pose_x:={start[0]}", f"initial_pose_y:={start[1]}", f"initial_pose_a:={start[2]}"],
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
             try:
                 self.assertTrue(wait_until(lambda: len(poses), START_S), "no pose within a minute")

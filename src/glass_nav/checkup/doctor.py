@@ -21,7 +21,8 @@ from glass_nav.world.grid_map import GridMap
 
 BASE_FRAMES = ("base_link", "base_footprint")  # tried in this order
 _MOST_SCANS = 3000  # that motion is looked for in
-_SPOILS = {"scan-units", "scan-angles-no-radians", "scan-limits", "scan-blind", "scan-empty"}  # ranges mean nothing then
+# Ranges mean nothing then.
+_SPOILS = {"scan-units", "scan-angles-no-radians", "scan-limits", "scan-blind", "scan-empty"}
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,10 @@ def examine(seen: Observed, grid_map: Optional[GridMap] = None, names: FrameName
         findings.append(Finding("bag-damaged", seen.damage, "`rosbag check` and `rosbag reindex` may save the rest"))
     if not seen.scans:
         holds = ", ".join(seen.topics) or "nothing"
-        findings.append(Finding("no-scans", f"no topic of sensor_msgs/LaserScan; there is {holds}",
-                                "record the lidar's topic; a PointCloud2 becomes one with pointcloud_to_laserscan"))
+        findings.append(Finding(
+            "no-scans",
+            f"no topic of sensor_msgs/LaserScan; there is {holds}",
+            "record the lidar's topic; a PointCloud2 becomes one with pointcloud_to_laserscan"))
     findings += frame_checks.check_links(seen.transforms)
     robot = _Robot(seen, names)
     lines.append(robot.describe())
@@ -131,11 +134,15 @@ class _Robot:
     def _no_odometry(self, seen: Observed) -> Finding:
         said = f"no transform {self.odom} <- {self.base} in tf; frames: {', '.join(self.tree.frames) or 'none'}"
         if any(seen.odometry.values()):
-            return Finding("odometry-not-in-tf", f"{said}; {', '.join(seen.odometry)} has odometry",
-                           "set publish_tf in the base's driver, or name the frames with --odom-frame and --base-frame: the "
-                           "node needs tf; glass_nav replay takes the topic")
-        return Finding("no-odometry", said, "start the base's driver, record /tf, or name the frames with --odom-frame and "
-                       "--base-frame")
+            return Finding(
+                "odometry-not-in-tf",
+                f"{said}; {', '.join(seen.odometry)} has odometry",
+                "set publish_tf in the base's driver, or name the frames with --odom-frame and "
+                "--base-frame: the node needs tf; glass_nav replay takes the topic")
+        return Finding(
+            "no-odometry",
+            said,
+            "start the base's driver, record /tf, or name the frames with --odom-frame and --base-frame")
 
 
 def _check_lidar(topic: str, scans: Sequence[HeardScan], robot: _Robot,
@@ -152,9 +159,12 @@ def _check_lidar(topic: str, scans: Sequence[HeardScan], robot: _Robot,
     for lidar in sorted({scan.frame.lstrip("/") for scan in scans if scan.frame}):
         own = [scan for scan in scans if scan.frame.lstrip("/") == lidar]
         if lidar != robot.base and not robot.tree.connected(robot.base, lidar):
-            yield Finding("lidar-not-in-tf", f"no transform {robot.base} <- {lidar}, the frame of {topic}; frames: "
-                          f"{', '.join(robot.tree.frames) or 'none'}",
-                          "add the lidar to the URDF, run static_transform_publisher, or correct frame_id in the driver")
+            yield Finding(
+                "lidar-not-in-tf",
+                f"no transform {robot.base} <- {lidar}, the frame of {topic}; frames: "
+                f"{', '.join(robot.tree.frames) or 'none'}",
+                "add the lidar to the URDF, run static_transform_publisher, or correct frame_id in the "
+                "driver")
         elif not _SPOILS.intersection(finding.name for finding in of_scans):
             yield from _check_motion_and_map(lidar, own, robot, grid_map)
 
@@ -195,11 +205,16 @@ def _check_motion_and_map(lidar: str, scans: Sequence[HeardScan], robot: _Robot,
 
 def _opposite(with_map: bool, lidar: str, link: str) -> Finding:
     if with_map:
-        return Finding("odometry-turns-opposite", f"{link} turns the other way than the scans, which fit the map as they are",
-                       "the yaw of odometry has the wrong sign: swap left and right wheel, or turn the gyro's axis round")
-    return Finding("turns-opposite", f"{link} turns the other way than the scans",
-                   f"either {lidar} is mounted upside down and tf does not say so (add roll 180 deg), or odometry's yaw has "
-                   "the wrong sign; with --map the doctor tells which")
+        return Finding(
+            "odometry-turns-opposite",
+            f"{link} turns the other way than the scans, which fit the map as they are",
+            "the yaw of odometry has the wrong sign: swap left and right wheel, or turn the gyro's axis "
+            "round")
+    return Finding(
+        "turns-opposite",
+        f"{link} turns the other way than the scans",
+        f"either {lidar} is mounted upside down and tf does not say so (add roll 180 deg), or odometry's "
+        "yaw has the wrong sign; with --map the doctor tells which")
 
 
 def _points(scan: Scan) -> np.ndarray:

@@ -43,7 +43,12 @@ class ScansOnMap:
         return len(self._points)
 
     def fits(self, factor: np.ndarray, every: int = 1) -> np.ndarray:
-        """(S,) how well each scan, or each second one, fits at its best place, 0..1, its points times a factor (2,) or ()."""
+        """How well each scan fits at its best place, 0..1.
+
+        Args:
+            factor: (2,) or (), on the points of the scans.
+            every: 2: only each second scan.
+        """
         return np.array([self._best(points * factor) for points in self._points[::every]])
 
     def _best(self, points: np.ndarray) -> float:
@@ -59,11 +64,15 @@ def check_map(grid_map: GridMap) -> Iterator[Finding]:
     """Findings on the map alone."""
     free, occupied = float(grid_map.free.mean()), float(grid_map.occupied.mean())
     if not (grid_map.free.any() and grid_map.occupied.any()):
-        yield Finding("map-empty", f"the map has {100 * free:.1f} % free and {100 * occupied:.1f} % occupied cells",
-                      "look at negate, occupied_thresh and free_thresh in its yaml, and at the image")
+        yield Finding(
+            "map-empty",
+            f"the map has {100 * free:.1f} % free and {100 * occupied:.1f} % occupied cells",
+            "look at negate, occupied_thresh and free_thresh in its yaml, and at the image")
     elif occupied > 0.5 and occupied > 3.0 * free:
-        yield Finding("map-inverted", f"the map has {100 * occupied:.0f} % occupied and {100 * free:.1f} % free cells",
-                      "negate in its yaml is wrong, or the image has white walls")
+        yield Finding(
+            "map-inverted",
+            f"the map has {100 * occupied:.0f} % occupied and {100 * free:.1f} % free cells",
+            "negate in its yaml is wrong, or the image has white walls")
 
 
 def check(scans: ScansOnMap, turns_opposite: bool) -> Iterator[Finding]:
@@ -88,31 +97,40 @@ def check(scans: ScansOnMap, turns_opposite: bool) -> Iterator[Finding]:
     factor, scaled = _best_factor(scans)
     if scaled > fit + 2.0 * _BETTER and scaled > _SCALED_FIT:
         scale = 1.0 / factor
-        yield Finding("map-scale", f"the scans fit the map by {fit:.2f} of 1 as it is, and by {scaled:.2f} were the map "
-                      f"{scale:.2f} times as large",
-                      f"the resolution in its yaml, times about {scale:.2f}, is right; or the lidar's ranges are scaled")
+        yield Finding(
+            "map-scale",
+            f"the scans fit the map by {fit:.2f} of 1 as it is, and by {scaled:.2f} were the map "
+            f"{scale:.2f} times as large",
+            f"the resolution in its yaml, times about {scale:.2f}, is right; or the lidar's ranges are "
+            "scaled")
     elif fit < _LEAST_FIT:
-        yield Finding("map-mismatch", f"the scans fit the map nowhere: by {fit:.2f} of 1 at their best places",
-                      "is it the map of this building and floor, and is it of this height above the floor? Look at scans and "
-                      "map in rviz; map anew if much was rebuilt")
+        yield Finding(
+            "map-mismatch",
+            f"the scans fit the map nowhere: by {fit:.2f} of 1 at their best places",
+            "is it the map of this building and floor, and is it of this height above the floor? Look at "
+            "scans and map in rviz; map anew if much was rebuilt")
 
 
 def _best_factor(scans: ScansOnMap) -> Tuple[float, float]:
     """The factor on the scans with which they fit best, and how well."""
-    best, scaled = 1.0, 0.0
-    for factors in (_SCALES, None):
-        for factor in factors if factors is not None else best * _FINE:
-            fit = float(np.median(scans.fits(np.array(factor), every=2)))
-            if fit > scaled:
-                best, scaled = float(factor), fit
-    return best, scaled
+    best = _best_of(scans, np.array(_SCALES), every=4)[0]
+    return _best_of(scans, best * _FINE, every=2)
+
+
+def _best_of(scans: ScansOnMap, factors: np.ndarray, every: int) -> Tuple[float, float]:
+    fits = [float(np.median(scans.fits(factor, every))) for factor in factors]
+    return float(factors[int(np.argmax(fits))]), max(fits)
 
 
 def _mirrored(turns_opposite: bool, fit: float, mirrored: float) -> Finding:
     figures = f"by {fit:.2f} of 1 as they are, and by {mirrored:.2f} mirrored"
     if turns_opposite:
-        return Finding("lidar-mirrored", f"the scans fit the map {figures}, and turn the other way than odometry",
-                       "the lidar is mounted upside down: add roll 180 deg to its frame in the URDF or "
-                       "static_transform_publisher, or set the driver's option for it (inverted, reversed)")
-    return Finding("map-mirrored", f"the scans fit the map {figures}, while their turns agree with odometry",
-                   "the image of the map is mirrored: flip it, and correct the origin in its yaml")
+        return Finding(
+            "lidar-mirrored",
+            f"the scans fit the map {figures}, and turn the other way than odometry",
+            "the lidar is mounted upside down: add roll 180 deg to its frame in the URDF or "
+            "static_transform_publisher, or set the driver's option for it (inverted, reversed)")
+    return Finding(
+        "map-mirrored",
+        f"the scans fit the map {figures}, while their turns agree with odometry",
+        "the image of the map is mirrored: flip it, and correct the origin in its yaml")

@@ -132,18 +132,25 @@ def check(moves: Moves, lidar: str, link: str, opposite: bool) -> Iterator[Findi
     if moves.idle:
         moved = (np.hypot(moves.by_scans[:, 0], moves.by_scans[:, 1]) > 0.15) | (np.abs(moves.by_scans[:, 2]) > 0.1)
         if moved.sum() >= _LEAST_PAIRS and moved.mean() > 0.3:
-            yield Finding("odometry-stands", f"{link} does not move, but the scans do",
-                          "the wheels' encoders or their node are dead: rostopic echo the odometry while driving")
+            yield Finding(
+                "odometry-stands",
+                f"{link} does not move, but the scans do",
+                "the wheels' encoders or their node are dead: rostopic echo the odometry while driving")
         return
     ways, turns = way_ratio(moves), turn_ratio(moves)
     if ways.is_known and not 1.0 - _SCALE < ways.middle < 1.0 / (1.0 - _SCALE):
-        yield Finding("odometry-scale", f"for each metre of {link} the scans move {ways.middle:.2f} m ({ways.count} pairs of "
-                      "scans)", f"multiply the wheels' radius in the base's driver by {ways.middle:.2f}, or look for a wrong "
-                      "gear ratio or ticks per turn")
+        yield Finding(
+            "odometry-scale",
+            f"for each metre of {link} the scans move {ways.middle:.2f} m ({ways.count} pairs of scans)",
+            f"multiply the wheels' radius in the base's driver by {ways.middle:.2f}, or look for a wrong "
+            "gear ratio or ticks per turn")
     if turns.is_known and not opposite and not 1.0 - _TURN_SCALE < turns.middle < 1.0 / (1.0 - _TURN_SCALE):
-        yield Finding("odometry-turn-scale", f"for each degree that {link} turns the scans turn {turns.middle:.2f} degrees "
-                      f"({turns.count} pairs of scans)", f"divide the distance between the wheels in the base's driver by "
-                      f"{turns.middle:.2f}; for a gyro, look at its scale")
+        yield Finding(
+            "odometry-turn-scale",
+            f"for each degree that {link} turns the scans turn {turns.middle:.2f} degrees ({turns.count} "
+            "pairs of scans)",
+            f"divide the distance between the wheels in the base's driver by {turns.middle:.2f}; for a "
+            "gyro, look at its scale")
     if not opposite:
         yield from _askew(moves, lidar)
 
@@ -157,7 +164,9 @@ def _askew(moves: Moves, lidar: str) -> Iterator[Finding]:
     low, high = np.percentile(angles.wrap(off - middle), [25, 75])
     centre = float(angles.wrap(middle + np.median(angles.wrap(off - middle))))
     if high - low < _ASKEW_SPREAD and abs(centre) > _ASKEW_RAD:
-        yield Finding("lidar-turned", f"the scans move {np.degrees(abs(centre)):.0f} deg to the "
-                      f"{'right' if centre > 0.0 else 'left'} of where the robot drives ({len(off)} pairs of scans)",
-                      f"add {np.degrees(centre):+.0f} deg to the yaw of {lidar} in the URDF or static_transform_publisher: the "
-                      "lidar is mounted turned")
+        yield Finding(
+            "lidar-turned",
+            f"the scans move {np.degrees(abs(centre)):.0f} deg to the {'right' if centre > 0.0 else 'left'} "
+            f"of where the robot drives ({len(off)} pairs of scans)",
+            f"add {np.degrees(centre):+.0f} deg to the yaw of {lidar} in the URDF or "
+            "static_transform_publisher: the lidar is mounted turned")

@@ -23,8 +23,10 @@ _ROBOT_M, _STILL_M, _ALIVE_M = 0.6, 0.03, 0.2  # beams that end on the robot: ho
 def check(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
     """Findings on the scans of one topic, in the order in which they were heard."""
     if not scans:
-        yield Finding("no-scans", f"{topic} has no scan",
-                      "start the lidar's driver before recording, and check its cable, power and port")
+        yield Finding(
+            "no-scans",
+            f"{topic} has no scan",
+            "start the lidar's driver before recording, and check its cable, power and port")
         return
     yield from _angles(topic, scans)
     limits = [*_limits(topic, scans)]
@@ -41,9 +43,11 @@ def check(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
     fault = next((fault for fault in (deskew.fault(len(scan.ranges_m), scan.time_increment_s, scan.scan_time_s)
                                       for scan in some) if fault), None)
     if fault is not None:
-        yield Finding("scan-time-increment", f"{topic}: {fault}",
-                      "set time_increment to the seconds between two beams (scan_time / beams), or to 0 if unknown: "
-                      "scans are not straightened as it is")
+        yield Finding(
+            "scan-time-increment",
+            f"{topic}: {fault}",
+            "set time_increment to the seconds between two beams (scan_time / beams), or to 0 if unknown: "
+            "scans are not straightened as it is")
 
 
 def describe(topic: str, scans: Sequence[HeardScan]) -> str:
@@ -88,34 +92,44 @@ def _angles(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
             odd.append(scan)
     widest = max(abs(scan.angle_max_rad - scan.angle_min_rad) for scan in scans)
     if widest > 2.0 * np.pi + 0.2 or any(abs(scan.angle_increment_rad) > 0.5 for scan in scans):
-        yield Finding("scan-angles-no-radians", f"{topic}: angles from {scans[-1].angle_min_rad:g} to "
-                      f"{scans[-1].angle_max_rad:g}, {scans[-1].angle_increment_rad:g} apart: more than a circle",
-                      "write angle_min, angle_max and angle_increment in radians; these look like degrees")
+        yield Finding(
+            "scan-angles-no-radians",
+            f"{topic}: angles from {scans[-1].angle_min_rad:g} to {scans[-1].angle_max_rad:g}, "
+            f"{scans[-1].angle_increment_rad:g} apart: more than a circle",
+            "write angle_min, angle_max and angle_increment in radians; these look like degrees")
     elif odd:
         scan = odd[0]
-        yield Finding("scan-angles", f"{topic}: {len(odd)} of {len(scans)} scans with angles that do not fit their "
-                      f"number of beams: {scan.angle_min_rad:.4f} to {scan.angle_max_rad:.4f} rad in steps of "
-                      f"{scan.angle_increment_rad:.5f}, {len(scan.ranges_m)} ranges",
-                      "angle_max must be angle_min + (ranges - 1) * angle_increment: correct the driver; beams are "
-                      "taken to lie angle_increment apart from angle_min on")
+        yield Finding(
+            "scan-angles",
+            f"{topic}: {len(odd)} of {len(scans)} scans with angles that do not fit their number of beams: "
+            f"{scan.angle_min_rad:.4f} to {scan.angle_max_rad:.4f} rad in steps of "
+            f"{scan.angle_increment_rad:.5f}, {len(scan.ranges_m)} ranges",
+            "angle_max must be angle_min + (ranges - 1) * angle_increment: correct the driver; beams are "
+            "taken to lie angle_increment apart from angle_min on")
     counts = Counter(len(scan.ranges_m) for scan in scans)
     rare = len(scans) - counts.most_common(1)[0][1]
     if rare > _FEW * len(scans) and len(counts) > 1:
-        yield Finding("scan-beams-change", f"{topic}: scans have {min(counts)} to {max(counts)} beams",
-                      "if two lidars share the topic, give each its own frame_id; else set the driver to a fixed "
-                      "number of beams")
+        yield Finding(
+            "scan-beams-change",
+            f"{topic}: scans have {min(counts)} to {max(counts)} beams",
+            "if two lidars share the topic, give each its own frame_id; else set the driver to a fixed "
+            "number of beams")
 
 
 def _limits(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
     bad = [scan for scan in scans if not (np.isfinite([scan.range_min_m, scan.range_max_m]).all()
                                           and 0.0 <= scan.range_min_m < scan.range_max_m)]
     if bad:
-        yield Finding("scan-limits", f"{topic}: {len(bad)} of {len(scans)} scans have range_min {bad[0].range_min_m:g} "
-                      f"and range_max {bad[0].range_max_m:g} m", "set both from the lidar's data sheet, 0 <= range_min "
-                      "< range_max; such scans are refused")
+        yield Finding(
+            "scan-limits",
+            f"{topic}: {len(bad)} of {len(scans)} scans have range_min {bad[0].range_min_m:g} and range_max "
+            f"{bad[0].range_max_m:g} m",
+            "set both from the lidar's data sheet, 0 <= range_min < range_max; such scans are refused")
     elif max(scan.range_max_m for scan in scans) > _LONGEST_M:
-        yield Finding("scan-units", f"{topic}: range_max is {scans[-1].range_max_m:g} m",
-                      "ranges and limits must be in metres; these look like millimetres or centimetres")
+        yield Finding(
+            "scan-units",
+            f"{topic}: range_max is {scans[-1].range_max_m:g} m",
+            "ranges and limits must be in metres; these look like millimetres or centimetres")
 
 
 def _repeats(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
@@ -123,8 +137,10 @@ def _repeats(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
     same = [bool(np.isfinite(now.ranges_m).any()) and before.ranges_m.tobytes() == now.ranges_m.tobytes()
             for before, now in zip(scans[:-1], scans[1:])]
     if sum(same) >= 5 and sum(same) > _FEW * len(same):
-        yield Finding("scan-repeats", f"{topic}: {sum(same)} of {len(same)} scans repeat the ranges of the one before",
-                      "the driver sends old data again, or two nodes publish the topic: rostopic info tells")
+        yield Finding(
+            "scan-repeats",
+            f"{topic}: {sum(same)} of {len(same)} scans repeat the ranges of the one before",
+            "the driver sends old data again, or two nodes publish the topic: rostopic info tells")
 
 
 def _ranges(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
@@ -134,21 +150,28 @@ def _ranges(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
     if len(np.unique(beyond)) >= 20 and len(beyond) > _FEW * beams:
         median_m = float(np.median(beyond))
         unit = "; millimetres?" if median_m > 100.0 else ""
-        yield Finding("scan-units", f"{topic}: {100 * len(beyond) / beams:.0f} % of the ranges lie beyond range_max "
-                      f"{scans[-1].range_max_m:g} m, by their median at {median_m:.4g} m{unit}",
-                      "write ranges in metres, and range_max from the data sheet: what lies beyond counts as nothing met")
+        yield Finding(
+            "scan-units",
+            f"{topic}: {100 * len(beyond) / beams:.0f} % of the ranges lie beyond range_max "
+            f"{scans[-1].range_max_m:g} m, by their median at {median_m:.4g} m{unit}",
+            "write ranges in metres, and range_max from the data sheet: what lies beyond counts as nothing "
+            "met")
     answered = [np.mean(np.isfinite(scan.ranges_m) & (scan.ranges_m > scan.range_min_m)
                         & (scan.ranges_m < scan.range_max_m)) for scan in scans]
     if np.median(answered) < _FEW:
-        yield Finding("scan-blind", f"{topic}: only {100 * np.median(answered):.1f} % of the beams of a scan answer "
-                      "with a range between its limits",
-                      "look at range_min, range_max and the unit of the ranges, and for a cover on the lidar")
+        yield Finding(
+            "scan-blind",
+            f"{topic}: only {100 * np.median(answered):.1f} % of the beams of a scan answer with a range "
+            "between its limits",
+            "look at range_min, range_max and the unit of the ranges, and for a cover on the lidar")
     code = _piled(scans)
     if code is not None:
-        yield Finding("no-return-as-range", f"{topic}: many beams end at exactly {code:g} m, below range_max "
-                      f"{scans[-1].range_max_m:g} m: this is how the driver writes that nothing was met",
-                      f"set range_max to {code:g} m in the driver, or laser_max_range: {0.999 * code:.4g} in the "
-                      "parameters of the localization; else it sees walls where there are none")
+        yield Finding(
+            "no-return-as-range",
+            f"{topic}: many beams end at exactly {code:g} m, below range_max {scans[-1].range_max_m:g} m: "
+            "this is how the driver writes that nothing was met",
+            f"set range_max to {code:g} m in the driver, or laser_max_range: {0.999 * code:.4g} in the "
+            "parameters of the localization; else it sees walls where there are none")
 
 
 def _piled(scans: Sequence[HeardScan]) -> Optional[float]:
@@ -178,10 +201,12 @@ def _robot_in_view(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
     if still.sum() < max(3, _NARROW * width) or not np.median((high - low)[alive & ~still]) > _ALIVE_M:
         return
     angles = np.degrees(scans[-1].angle_min_rad + scans[-1].angle_increment_rad * np.nonzero(still)[0])
-    yield Finding("scan-sees-robot", f"{topic}: {still.sum()} beams between {angles.min():.0f} and {angles.max():.0f} "
-                  f"deg always end {np.nanmedian(middle[still]):.2f} m away: the lidar sees a part of the robot",
-                  f"set laser_min_range to {np.nanmax(high[still]) + 0.05:.2f} in the parameters, or cut these angles "
-                  "with laser_filters")
+    yield Finding(
+        "scan-sees-robot",
+        f"{topic}: {still.sum()} beams between {angles.min():.0f} and {angles.max():.0f} deg always end "
+        f"{np.nanmedian(middle[still]):.2f} m away: the lidar sees a part of the robot",
+        f"set laser_min_range to {np.nanmax(high[still]) + 0.05:.2f} in the parameters, or cut these angles "
+        "with laser_filters")
 
 
 def _quantiles(rows: np.ndarray, inside: np.ndarray) -> np.ndarray:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import subprocess
 import sys
 from pathlib import Path
 from typing import List, Optional
 
 from glass_nav.checkup import doctor
 from glass_nav.checkup.doctor import FrameNames
+from glass_nav.cli import ros_process
 from glass_nav.cli.progress import Progress
 from glass_nav.recording import bag_observer
-from glass_nav.recording.recording import RecordingError
 from glass_nav.world import map_file
 
 HELP = "say what is wrong with a bag or a running robot, and what to do"
@@ -66,12 +65,8 @@ def main(arguments: argparse.Namespace) -> bool:
 
 
 def _live(arguments: argparse.Namespace) -> bool:
-    """A process of its own listens: nothing outside of ros/ knows ROS."""
-    command: List[str] = [sys.executable, "-m", LIVE_MODULE, "--seconds", str(arguments.seconds), "--odom-frame",
-                          arguments.odom_frame]
+    command: List[str] = ["--seconds", str(arguments.seconds), "--odom-frame", arguments.odom_frame]
     for option, value in (("--map", arguments.map), ("--base-frame", arguments.base_frame)):
         command += [] if value is None else [option, str(value)]
-    code = subprocess.run(command, check=False).returncode
-    if code not in (0, 1):
-        raise RecordingError("the robot could not be listened to")
-    return code == 0
+    print(f"glass_nav doctor: listening for {arguments.seconds:g} s; let the robot drive, with a turn", file=sys.stderr)
+    return ros_process.run(LIVE_MODULE, command, "glass_nav doctor", codes=(0, 1)) == 0

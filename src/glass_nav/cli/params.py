@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import subprocess
-import sys
 from typing import Optional
+
+from glass_nav.cli import ros_process
 
 HELP = "translate the parameters of a launch file that starts amcl"
 DESCRIPTION = """Reads a launch file that starts amcl, as roslaunch does (includes, args, groups, rosparam files), and
 prints the parameters of localization_node as yaml, for rosparam and for glass_nav replay --params. Comments say what
 has no meaning here, and why. Needs the Python of ROS, but no roscore."""
-READER = "glass_nav.ros.amcl_launch"  # a process of its own: nothing outside of ros/ knows ROS
+READER = "glass_nav.ros.amcl_launch"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,16 +34,4 @@ def main(arguments: argparse.Namespace) -> None:
         ValueError: the file cannot be used; one line.
     """
     node = [] if arguments.node is None else ["--node", arguments.node]
-    done = subprocess.run([sys.executable, "-m", READER, arguments.from_amcl, *arguments.arguments, *node],
-                          stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True, check=False)
-    if done.returncode:
-        raise ValueError(last_line(done.stderr))
-    print(done.stdout, end="")
-
-
-def last_line(errors: str) -> str:
-    """What a process said last, without the name of the command, which is said again."""
-    lines = [line for line in errors.splitlines() if line.strip()] or ["the reader of launch files failed"]
-    if "No module named" in lines[-1]:
-        return f"reading launch files needs ROS: {lines[-1]}; source its setup.bash"
-    return lines[-1].replace("glass_nav params: ", "", 1)
+    ros_process.run(READER, [arguments.from_amcl, *arguments.arguments, *node], "glass_nav params")

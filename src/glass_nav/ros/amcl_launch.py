@@ -155,9 +155,9 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     given = parser.parse_args(argv)
     try:
         node = chosen(given.file, nodes(given.file, given.arguments), given.node)
-        print(explained(node, str(given.file)))
+        sys.stdout.write(explained(node, str(given.file)) + "\n")
     except ValueError as err:  # LaunchError, ParamError
-        print(f"glass_nav params: {err}", file=sys.stderr)
+        sys.stderr.write(f"glass_nav params: {err}\n")
         return BAD_INPUT
     return DONE
 

@@ -1,4 +1,4 @@
-"""bag_player: waits until the localization has its map and its filter, then becomes `rosbag play` with the same arguments.
+"""bag_player: waits until the localization has its map, then becomes `rosbag play` with the same arguments.
 
 Calls: request_nomotion_update (Empty), which the localization refuses until it is ready.
 Parameters: ~wait_s (default 60), the longest wait; then it plays all the same, and says so.

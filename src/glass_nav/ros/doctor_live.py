@@ -41,8 +41,8 @@ class Listener:
         for topic, kind in sorted(rospy.get_published_topics()):
             self.seen.topics[topic] = kind
             if kind in KINDS:
-                self._subscribers.append(rospy.Subscriber(topic, KINDS[kind], self._keeper(topic, kind), queue_size=1000,
-                                                          buff_size=2 ** 22, tcp_nodelay=True))
+                self._subscribers.append(rospy.Subscriber(topic, KINDS[kind], self._keeper(topic, kind),
+                                                          queue_size=1000, buff_size=2 ** 22, tcp_nodelay=True))
 
     def _keeper(self, topic: str, kind: str) -> Callable[[Any], None]:
         if kind == "sensor_msgs/LaserScan":
@@ -102,16 +102,15 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         grid_map = None if given.map is None else map_file.load(given.map)
         rospy.init_node("glass_doctor", anonymous=True, disable_rosout=True)
         listener = Listener()
-        print(f"glass_nav doctor: listening for {given.seconds:g} s; let the robot drive, with a turn", file=sys.stderr)
         listener.listen(given.seconds)
         grid_map = served_map() if grid_map is None else grid_map
     except (ValueError, OSError) as err:
-        print(f"glass_nav doctor: {' '.join(str(err).split())}", file=sys.stderr)
+        sys.stderr.write(f"glass_nav doctor: {' '.join(str(err).split())}\n")
         return BAD_INPUT
     report = doctor.examine(listener.seen, grid_map, FrameNames(given.odom_frame.lstrip("/"), given.base_frame))
     if grid_map is None:
         report.seen.append("map: neither static_map nor the topic map gives one")
-    print(report.text)
+    sys.stdout.write(report.text + "\n")
     return FINDINGS if report.findings else NOTHING_FOUND
 
 

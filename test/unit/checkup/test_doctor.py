@@ -133,7 +133,8 @@ def no_return_as(metres: float) -> Callable[[int, Any], Any]:
 # name of the finding -> the fault; and what follows from it beside
 ON_EACH_MESSAGE: "List[Tuple[str, faults.Change, Set[str]]]" = [
     ("stamps-zero", scans(lambda i, m: with_stamp(m, lambda ns: 0) if second_of_ten(i) else m), set()),
-    ("stamps-backwards", scans(lambda i, m: with_stamp(m, lambda ns: ns - 25 * 10**7) if second_of_ten(i) else m), set()),
+    ("stamps-backwards",
+     scans(lambda i, m: with_stamp(m, lambda ns: ns - 25 * 10**7) if second_of_ten(i) else m), set()),
     ("stamps-repeated", scans(lambda i, m: [m, copy.deepcopy(m)] if second_of_ten(i) else m), {"scan-repeats"}),
     ("scan-gaps", scans(lambda i, m: None if 20 < i < 35 else m), set()),
     ("clocks-differ", scans(lambda i, m: with_stamp(m, lambda ns: ns - 15 * 10**8)), {"odometry-missing"}),

@@ -54,7 +54,8 @@ def test_includes_args_groups_and_files_mean_what_they_mean_to_roslaunch(launch,
                                    "max_particles": 1501}
     lines = out.splitlines()
     assert lines[0] == f"# {launch}: node /r2/amcl (amcl/amcl)"
-    assert ("# laser_model_type: beam  # there is one sensor model here; vote_mode says how beams are told apart") in lines
+    assert ("# laser_model_type: beam  # there is one sensor model here; vote_mode says how beams are told "
+            "apart") in lines
     assert "# unknown parameter ~odom_frame" in lines
     assert lines[-1] == "# remaps stay in the launch file: scan -> base_scan"
 
@@ -86,7 +87,8 @@ def test_a_default_that_the_file_contradicts_gives_way_and_is_told():
      "FILE: starts 2 amcl (/a, /b), choose one with --node"),
     ("<launch><node pkg='amcl' type='amcl' name='a'/></launch>", ["--node", "c"],
      "FILE: starts no amcl of the name c; it starts /a"),
-    ("<launch><node pkg='amcl' type='amcl' name='a'><param name='max_particles' value='-3'/></node></launch>", [], None),
+    ("<launch><node pkg='amcl' type='amcl' name='a'><param name='max_particles' "
+     "value='-3'/></node></launch>", [], None),
     ("<launch><include file='$(find no_such_package)/x.launch'/></launch>", [], None),
     ("<launch><arg name='map'/></launch>", [], None),
     ("<launch>", [], None)])
