@@ -28,7 +28,6 @@ class MessageWriter:
     KINDS: Dict[str, str] = {}  # topic -> message type
     LATCHED: Tuple[str, ...] = ()  # a player sends the last of these to those who come late, too
     OWN_TYPES: Dict[str, str] = {}  # definitions of the types that Noetic's message packages do not have
-    COMPRESS = False
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -53,8 +52,6 @@ class MessageWriter:
         except FileNotFoundError:
             pass
         self._writer = Writer(self._growing)
-        if self.COMPRESS:
-            self._writer.set_compression(Writer.CompressionFormat.LZ4)
         try:
             self._writer.open()
         except OSError as err:

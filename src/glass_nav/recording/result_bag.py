@@ -1,7 +1,8 @@
 """What the filter made of a log -> a ROS 1 bag, for rviz and PlotJuggler: topics, types and frames of the running node.
 
 It stands by itself: map, tf from map to the laser, the scans. Stamps are those of the scans, map -> odom included, so
-that nothing lies ahead of its data. B beams, P particles, H rows and W columns of the map.
+that nothing lies ahead of its data. Not compressed: the player of ROS cannot read what rosbags compresses by lz4.
+B beams, P particles, H rows and W columns of the map.
 """
 
 from __future__ import annotations
@@ -40,7 +41,6 @@ class ResultBag(MessageWriter):
     }
     LATCHED = ("/tf_static", "/map", NODE + "/glass_map")
     OWN_TYPES = {"glass_nav/msg/LocalizationStatus": STATUS, "glass_nav/msg/BeamCases": BEAM_CASES}
-    COMPRESS = True
 
     def __init__(self, path: Path, frames: "Tuple[str, str, str]") -> None:
         """
