@@ -6,7 +6,7 @@ The same whether it was read from a bag or heard on a running robot.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Dict, List, Optional, Tuple
+from typing import Dict, List, Tuple
 
 import numpy as np
 
@@ -58,5 +58,3 @@ class Observed:
     transforms: List[HeardTransform] = field(default_factory=list)
     odometry: Dict[str, List[HeardOdometry]] = field(default_factory=dict)
     damage: str = ""                                            # where reading had to stop, in words
-    live: bool = False
-    heard_s: Optional[float] = None                             # how long was listened; None: a log

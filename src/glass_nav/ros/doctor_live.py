@@ -36,7 +36,7 @@ class Listener:
     """Keeps what comes, until it has been long enough."""
 
     def __init__(self) -> None:
-        self.seen = Observed("the running robot", live=True)
+        self.seen = Observed("the running robot")
         self._subscribers: List[rospy.Subscriber] = []
         for topic, kind in sorted(rospy.get_published_topics()):
             self.seen.topics[topic] = kind
@@ -64,7 +64,6 @@ class Listener:
             time.sleep(min(0.1, max(end_s - time.monotonic(), 0.0)))
         for subscriber in self._subscribers:
             subscriber.unregister()
-        self.seen.heard_s = seconds
 
 
 def _now_ns() -> int:
