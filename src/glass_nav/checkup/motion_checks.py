@@ -70,8 +70,10 @@ def _pairs(odom_from_laser: np.ndarray) -> List[Tuple[int, int]]:
         if not len(enough):
             continue
         at = int(enough[0])
-        if way_m[at] <= _MOST_M and turn[at] <= _MOST_RAD:
-            (turning if turn[at] >= _TURN_RAD else straight).append((first, first + 1 + at))
+        chosen = turning if turn[at] >= _TURN_RAD else straight
+        overlaps = bool(chosen) and first < (chosen[-1][0] + chosen[-1][1]) // 2  # tells the same once more
+        if way_m[at] <= _MOST_M and turn[at] <= _MOST_RAD and not overlaps:
+            chosen.append((first, first + 1 + at))
     return [pairs[index] for pairs in (turning, straight) if pairs
             for index in np.unique(np.linspace(0, len(pairs) - 1, PAIRS).astype(int))]
 

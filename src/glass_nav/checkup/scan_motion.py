@@ -58,7 +58,7 @@ class EarlierScan:
         points = points_m[:: max(1, -(-len(points_m) // MOST_POINTS))]
         offsets = np.arange(-reach_m, reach_m + 1e-9, _STEP_M)
         turns = np.arange(-reach_rad, reach_rad + 1e-9, _STEP_RAD)
-        coarse = points[:: max(1, len(points) // 40)]
+        coarse = points[:: max(1, len(points) // 30)]
         x0, y0 = np.meshgrid(offsets, offsets)
         near = np.hypot(x0, y0).ravel() <= reach_m
         starts = np.stack([x0.ravel()[near], y0.ravel()[near]], axis=-1)

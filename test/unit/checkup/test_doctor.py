@@ -189,9 +189,11 @@ def test_nothing_is_found_where_nothing_is_wrong(good, named):
     assert named(short(records)) == set()
 
 
-@pytest.mark.parametrize("name, change, also", ON_EACH_MESSAGE, ids=[name for name, _, _ in ON_EACH_MESSAGE])
-def test_a_fault_that_every_message_shows_is_named(good, named, name, change, also):
-    found = named(change(short(good[0])))
+@pytest.mark.parametrize("which, name, change, also", [
+    pytest.param(which, *fault, id=f"{which}-{fault[0]}")
+    for which, some in (("simulated", ON_EACH_MESSAGE), ("real", ON_EACH_MESSAGE[::2])) for fault in some])
+def test_a_fault_that_every_message_shows_is_named(request, named, which, name, change, also):
+    found = named(change(short(request.getfixturevalue(which)[0])))
     assert name in found
     assert found <= {name} | also
 
