@@ -112,6 +112,7 @@ class EdgeDriver:
         self._graph: Optional[LocalGraph] = None
         self._graph_ns = 0
         self._scans = 0
+        self._scan: Optional[Scan] = None   # the last one
         self._points_m = np.zeros((0, 2))   # of the last scan, in odom
         self._walls_m = np.zeros((0, 2))    # of the local map near the robot, in odom
         self._pose = np.zeros(3)
@@ -183,6 +184,7 @@ class EdgeDriver:
         self._pose, self._stamp_ns = self._at.correct(scan, odom_from_base), scan.stamp_ns
         self._map.add(scan, self._pose)
         self._scans += 1
+        self._scan = scan
         self._points_m = _steady_points(scan, self._pose)
         due = self._stamp_ns - self._graph_ns >= _GRAPH_PERIOD_NS
         if self._phase in _DRIVING and self._sweep_rad <= 0.0 and (due or self._graph is None):
@@ -488,8 +490,8 @@ class EdgeDriver:
         driven = None
         if self._trace is not None:
             driven = edge_report.traversal(self._trace.line_m(node.position_m), self._rank, self._grid)
-        self._arrival = Arrival(self._stamp_ns, self._pose, edge_report.meetpoint(node, self._pose, self._stamp_ns),
-                                driven)
+        seen = replace(edge_report.meetpoint(node, self._pose, self._stamp_ns), scan=self._scan)
+        self._arrival = Arrival(self._stamp_ns, self._pose, seen, driven)
         self._node = node
         self._begin(ARRIVED, f"at a meetpoint of degree {node.degree}, {node.r_m:.2f} m from its obstacles")
 

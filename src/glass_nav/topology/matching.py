@@ -11,17 +11,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Dict, Optional, Tuple
+from typing import Callable, Dict, Optional, Tuple
 
 import numpy as np
 
 from glass_nav.geometry import angles, se2
+from glass_nav.sensing.scan import Scan
 from glass_nav.topology import edge_segments
 from glass_nav.topology.atlas import Atlas, twin
 from glass_nav.topology.edge_segments import Reach, SegmentTest
 from glass_nav.topology.edge_views import poses_along
 from glass_nav.topology.observations import Meetpoint, Traversal
 
+_MOST_JUDGED = 2000    # candidates by a scan: a tenth of a millisecond each
 _MOST_COMPARED = 100  # candidates by their walls: some milliseconds each
 _LOOKED_FROM_M = 0.5  # between points of a way
 _REMEMBERED = 64      # traversals whose comparisons are kept
@@ -62,18 +64,27 @@ class Tolerances:
         return self.length_sigma_m + self.length_sigma_share * length_m
 
 
+Explained = Callable[[Scan, np.ndarray], np.ndarray]  # scan, map_from_base (C, 3) -> (C,) share that the map explains
+
+
 class Matcher:
     """An atlas with what the tests need of it, by dart."""
 
     def __init__(self, atlas: Atlas, tolerances: Tolerances, use_angles: bool,
-                 segments: Optional[SegmentTest] = None) -> None:
+                 segments: Optional[SegmentTest] = None, explained: Optional[Explained] = None,
+                 least_explained: float = 0.0) -> None:
         """
         Args:
             atlas: with the segments of its darts, if these are to be compared.
             tolerances: of the tests on numbers.
             use_angles: directions of edges are evidence.
             segments: the test on the walls seen along an edge; None: they are no evidence.
+            explained: of scans at meetpoints; None: they are no evidence.
+            least_explained: share of a scan that the map must explain from where a candidate is.
         """
+        self._explained = explained
+        self._least_explained = least_explained
+        self._judged: Dict[int, Tuple[Meetpoint, Dict[int, bool]]] = {}  # by identity of the meetpoint
         self.atlas = atlas
         self._segments = segments if segments is not None and segments.match_segments else None
         self._compared: Dict[int, Tuple[Traversal, Dict[int, bool]]] = {}  # by identity of the traversal
@@ -132,7 +143,8 @@ class Matcher:
         node = node[self._r_fits(node, meetpoint)]
         start = self.atlas.rings.offsets[node]
         dart = self.atlas.rings.values[(start[:, None] + np.arange(meetpoint.degree)).ravel()]
-        return np.sort(dart[self._angles_fit(dart, meetpoint)])
+        dart = np.sort(dart[self._angles_fit(dart, meetpoint)])
+        return dart[self._scan_fits(dart, meetpoint)]
 
     def at(self, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
         """(C,) bool: darts (C,) fit the reference edge of the meetpoint."""
@@ -140,7 +152,26 @@ class Matcher:
         fits = self._degree[node] == meetpoint.degree
         fits[fits] = self._r_fits(node[fits], meetpoint)
         fits[fits] = self._angles_fit(dart[fits], meetpoint)
+        fits[fits] = self._scan_fits(dart[fits], meetpoint)
         return fits
+
+    @property
+    def judges_scans(self) -> bool:
+        """Whether scans at meetpoints are evidence."""
+        return self._explained is not None
+
+    def _scan_fits(self, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
+        """(C,) bool: enough of the scan is explained if darts (C,) are the reference edge; of too many nothing is
+        asked."""
+        if self._explained is None or meetpoint.scan is None or not 0 < len(dart) <= _MOST_JUDGED:
+            return np.ones(len(dart), bool)
+        if id(meetpoint) not in self._judged and len(self._judged) >= _REMEMBERED:
+            self._judged.clear()
+        _, known = self._judged.setdefault(id(meetpoint), (meetpoint, {}))
+        new = [each for each in dart.tolist() if each not in known]
+        shares = self._explained(meetpoint.scan, poses_at(self.atlas, np.array(new, np.int64), meetpoint))
+        known.update(zip(new, (~(shares < self._least_explained)).tolist()))  # a scan that says nothing rules out none
+        return np.array([known[each] for each in dart.tolist()], bool)
 
     def sigma_r_m(self, meetpoint: Optional[Meetpoint] = None) -> float:
         """Of an equidistance measured, the atlas' part not included."""
@@ -320,3 +351,10 @@ class Matcher:
         allowed_ahead = self.z * math.hypot(limits.bearing_sigma_rad, limits.turn_sigma_rad) + across
         return (np.abs(angles.wrap(turned)) <= allowed) & (
             (off_m >= chord) | (np.abs(angles.wrap(ahead)) <= allowed_ahead))
+
+
+def poses_at(atlas: Atlas, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
+    """(C, 3) poses in the frame map of a robot whose reference edges are darts (C,)."""
+    behind = float(meetpoint.bearings_rad[0]) if len(meetpoint.bearings_rad) else np.pi
+    base_from_dart = np.array([*meetpoint.centre_m, behind])
+    return se2.compose(atlas.map_from_dart(dart), se2.inverse(base_from_dart))
