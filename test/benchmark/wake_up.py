@@ -217,6 +217,15 @@ def run(job: Job) -> Dict[str, Any]:
             "all_s": trial.now_s}
 
 
+def told(found: Dict[str, Any]) -> str:
+    """One run in one line."""
+    verdict = ", right" if found["right"] else ", WRONG" if found["wrong"] else ""
+    return (f"{found['building']} {found['lidar']} seed {found['seed']}: {found['state']}{verdict} after "
+            f"{found['edges']} edges, {found['search_s']:.0f} s; {found['collisions']} collisions; legs "
+            f"{found.get('legs', '-')}, tracking {found.get('tracking_m', math.nan):.3f} m; failures "
+            f"{found['failures']}; {found['cpu_s']:.0f} s CPU")
+
+
 def line(name: str, runs: List[Dict[str, Any]]) -> str:
     """One row of the table."""
     right = [each for each in runs if each["right"]]
@@ -251,15 +260,11 @@ def main() -> None:
     with ProcessPoolExecutor(arguments.jobs) as pool:
         for found in pool.map(run, jobs):
             runs.append(found)
-            print(f"{found['building']} {found['lidar']} seed {found['seed']}: {found['state']}"
-                  f"{', right' if found['right'] else ', WRONG' if found['wrong'] else ''} after {found['edges']} edges, "
-                  f"{found['search_s']:.0f} s; {found['collisions']} collisions; legs {found.get('legs', '-')}, tracking "
-                  f"{found.get('tracking_m', math.nan):.3f} m; failures {found['failures']}; {found['cpu_s']:.0f} s CPU",
-                  file=sys.stderr, flush=True)
+            print(told(found), file=sys.stderr, flush=True)
             if arguments.out:
                 arguments.out.write_text(json.dumps(runs, indent=1))
-    print("| building | robots | right | wrong | others | edges | search, s | with a collision | error, m | tracking, m "
-          "| legs |\n|---|---|---|---|---|---|---|---|---|---|---|")
+    print("| building | robots | right | wrong | others | edges | search, s | with a collision | error, m | "
+          "tracking, m | legs |\n|---|---|---|---|---|---|---|---|---|---|---|")
     for name in arguments.buildings:
         print(line(name, [each for each in runs if each["building"] == name]))
     print(line("all", runs))

@@ -98,6 +98,25 @@ class Progress:
 class EdgeDriver:
     """see() every scan, ask for a command() at every control step; seek(), leave(), go_back() and stop() say what."""
 
+    # Of what it does just now; _begin() sets them all.
+    _phase: str
+    _reason: str
+    _failure: str
+    _way: Optional[Polyline]       # that it drives along; None: none known yet
+    _trace: Optional[Trace]        # of the edge so far; None: no edge that began at a meetpoint
+    _rank: int                     # by which the edge left
+    _near_start_m: float           # nodes so near to its beginning are that
+    _target: np.ndarray            # (2,) the node that it homes to
+    _looking: bool                 # it stands there, or brakes, and looks
+    _looks: int                    # graphs since then
+    _nodes: List[Node]             # what was there in these
+    _dismissed: List[np.ndarray]   # (2,) places that turned out to be no nodes
+    _swept: bool                   # it has turned round once to see more
+    _sweep_rad: float              # what is left of that turn
+    _yaw: float                    # at the last command
+    _blocked_s: float
+    _lost_since_ns: int            # no graph has had its line since then; 0: the last one has
+
     def __init__(self, p: EdgeDriverParams = EdgeDriverParams()) -> None:
         self._p = p
         self._map, self._at = LocalMap(p.local_map), LocalPose()
@@ -499,14 +518,12 @@ class EdgeDriver:
 
     def _begin(self, phase: str, reason: str) -> None:
         self._phase, self._reason, self._failure = phase, reason, ""
-        self._way: Optional[Polyline] = None
-        self._trace: Optional[Trace] = None
+        self._way, self._trace = None, None
         self._rank = 0
         self._near_start_m = _SAME_NODE_M
         self._target = np.zeros(2)
         self._looking, self._looks = False, 0
-        self._nodes: List[Node] = []
-        self._dismissed: List[np.ndarray] = []
+        self._nodes, self._dismissed = [], []
         self._swept = False
         self._sweep_rad = 0.0
         self._yaw = float(self._pose[2])

@@ -180,8 +180,8 @@ class AtlasLocalizer:
         else:
             self._estimate = self._among_several(dart, errors)
         self._estimate = replace(self._estimate, depth=self._edges_before + self._forest.depth)
-        if (self._estimate.state == LOST and self._matcher.judges_scans and self._search < self._params.searches
-                and self._forest.depth > 0):
+        judged = self._matcher.judges_scans and self._forest.meetpoints[-1].scan is not None
+        if self._estimate.state == LOST and judged and self._search < self._params.searches and self._forest.depth > 0:
             self._search += 1
             self._edges_before += self._forest.depth
             begun = self._begin(self._forest.meetpoints[-1])
