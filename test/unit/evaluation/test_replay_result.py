@@ -21,6 +21,7 @@ def a_result(**changes):
         "odom_from_base": np.zeros((4, 3)), "deviation": np.full((4, 3), 0.05),
         "states": ["UNKNOWN", "LOCALIZED", "LOCALIZED", "LOCALIZED"], "reasons": ["none", "a, b", "c", "d"],
         "used_share": np.array([0.5, 1.0, 1.0, np.nan]), "updated": np.array([True, False, True, False]),
+        "reliability": np.array([0.0, 0.9, 0.95, 1.0]), "places": np.array([7, 1, 1, 1]),
         "particles": np.full(4, 100), "cpu_ms": np.array([10.0, 2.0, 20.0, 4.0]),
         "cases": np.array([[1, 1], [3, 0], [1, 2], [1, NO_BEAM]], np.uint8),
         "refusals": Counter({"time runs backwards": 2}),
