@@ -19,14 +19,14 @@ def main(argv: Optional[List[str]] = None) -> int:
         0 done, 2 wrong usage, 3 bad input (a line on stderr says what), 130 interrupted.
     """
     try:
-        from glass_nav.cli import atlas, landmarks, replay, simulate
+        from glass_nav.cli import atlas, landmarks, replay, report, simulate
     except ImportError as err:
         if not str(err.name).startswith("glass_nav"):
             raise
         print(f"glass_nav: {err.name or err} is not there: build the package and source its setup.bash",
               file=sys.stderr)
         return BAD_INPUT
-    modules: Dict[str, Any] = {"atlas": atlas, "landmarks": landmarks, "replay": replay,
+    modules: Dict[str, Any] = {"atlas": atlas, "landmarks": landmarks, "replay": replay, "report": report,
                                "simulate": simulate}  # each: see replay.py
     parser = argparse.ArgumentParser(prog="glass_nav", description="Localization in buildings of glass: offline tools.")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import platform
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Optional, Tuple
 
@@ -37,6 +38,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("log", metavar="LOG", type=Path, help="ROS bag, or MRPT .rawlog")
     parser.add_argument("--map", required=True, type=Path, help="map_server .yaml, or MRPT .gridmap[.gz]")
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for the results")
+    add_run_arguments(parser)
+    add_log_arguments(parser)
+    parser.add_argument("--no-picture", action="store_true", help="do not draw trajectory.png and cases.png")
+
+
+def add_run_arguments(parser: argparse.ArgumentParser) -> None:
+    """What makes one run over a log another than the next."""
+    parser.add_argument("--params", type=Path, metavar="FILE",
+                        help="yaml of parameters, names as for the node; default: the node's defaults")
+    parser.add_argument("--seed", type=int, default=0, help="of the filter's random numbers (default 0)")
+
+
+def add_log_arguments(parser: argparse.ArgumentParser) -> None:
+    """What is taken from a log, and where the robot starts in it: the same for all runs over it."""
     parser.add_argument("--ground-truth", metavar="TOPIC_OR_FILE",
                         help="poses in the map: a PoseStamped, PoseWithCovarianceStamped or Odometry topic, a TUM "
                              "file, or MRPT's _GT.txt; default: /ground_truth of a bag, LOG_GT.txt beside a "
@@ -44,9 +59,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--true-beams", metavar="TOPIC",
                         help="true cases: glass_nav/TrueBeams, or a glass_nav/BeamCases; default: the only topic of "
                              "the first, or true_cases of the second; none: do not score the cases")
-    parser.add_argument("--params", type=Path, metavar="FILE",
-                        help="yaml of parameters, names as for the node; default: the node's defaults")
-    parser.add_argument("--seed", type=int, default=0, help="of the filter's random numbers (default 0)")
     start = parser.add_argument_group("start")
     start.add_argument("--initial-pose", type=float, nargs=3, metavar=("X", "Y", "YAW"),
                        help="m, m, rad; default: the ground truth's pose at the first scan, else initial_pose_* "
@@ -68,7 +80,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     part.add_argument("--duration", type=float, metavar="S", help="seconds from there")
     part.add_argument("--every", type=int, default=1, metavar="N", help="only each N-th scan")
     part.add_argument("--max-scans", type=int, metavar="N")
-    parser.add_argument("--no-picture", action="store_true", help="do not draw trajectory.png and cases.png")
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
@@ -90,26 +101,18 @@ def main(arguments: argparse.Namespace) -> None:
     Raises:
         RecordingError, MapError, ParamError, ValueError, OSError: bad input; one line.
     """
-    settings, unused = (ReplayParams(), []) if arguments.params is None else replay_params.load(arguments.params)
-    grid_map = map_file.load(arguments.map)
-    recording = open_log(arguments.log, _log_options(arguments, settings))
-    notes = list(recording.notes)
-    if unused:
-        notes.append(f"parameters that only a node uses: {', '.join(unused)}")
+    ready = prepare(arguments)
+    recording, mcl, grid_map = ready.recording, ready.mcl, ready.grid_map
     arguments.out.mkdir(parents=True, exist_ok=True)
-    mcl = GlassMcl(settings.mcl, grid_map, np.random.default_rng(arguments.seed))
-    start, origin = _start(mcl, recording, arguments, settings.start)
-    notes.append(f"start: {origin}")
-    for note in notes:
+    for note in ready.notes:
         _say(note)
-    window = _window(arguments)
-    progress = Progress("replay", window.expected(len(recording)))
+    progress = Progress("replay", ready.expected_scans)
     try:
-        result = replay_run.run(recording, mcl, start, arguments.seed, window, progress.step)
+        result = ready.run(progress.step)
     finally:
         progress.finish()
-    about = {"log": str(arguments.log), "map": str(arguments.map), "start": origin, "notes": notes,
-             "params": params.as_mapping(settings.mcl), "versions": versions()}
+    about = {"log": str(arguments.log), "map": str(arguments.map), "start": ready.origin, "notes": ready.notes,
+             "params": params.as_mapping(ready.settings.mcl), "versions": versions()}
     replay_result.write(result, arguments.out, about)
     glass = GridMap(mcl.glass_map.occupancy(), grid_map.resolution_m, grid_map.map_from_grid)
     map_file.save(glass, arguments.out / "glass_map.yaml", image_suffix=".png")
@@ -122,6 +125,49 @@ def main(arguments: argparse.Namespace) -> None:
         _say(f"{count} scans refused: {reason}")
     print(table(result))
     print(f"written to {arguments.out}")
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A log, a map and a filter, from the options of a command; nothing has run yet."""
+    settings: ReplayParams
+    grid_map: GridMap
+    recording: Recording
+    mcl: GlassMcl
+    start: Callable[[int], None]  # see replay_run.run()
+    origin: str                   # where the robot starts, in words
+    notes: List[str]              # what was chosen or found odd
+    seed: int
+    window: Window
+
+    @property
+    def expected_scans(self) -> int:
+        """About how many will be used: for a progress bar."""
+        return self.window.expected(len(self.recording))
+
+    def run(self, step_done: Callable[[], None] = lambda: None) -> ReplayResult:
+        """Once only: the filter is not the same afterwards.
+
+        Raises:
+            RecordingError: not one scan of the log can be used.
+        """
+        return replay_run.run(self.recording, self.mcl, self.start, self.seed, self.window, step_done)
+
+
+def prepare(arguments: argparse.Namespace) -> Prepared:
+    """Open what the options name: log, map, params, seed, and those of add_log_arguments().
+
+    Raises:
+        RecordingError, MapError, ParamError, ValueError, OSError: bad input; one line.
+    """
+    settings, unused = (ReplayParams(), []) if arguments.params is None else replay_params.load(arguments.params)
+    grid_map = map_file.load(arguments.map)
+    recording = open_log(arguments.log, _log_options(arguments, settings))
+    mcl = GlassMcl(settings.mcl, grid_map, np.random.default_rng(arguments.seed))
+    start, origin = _start(mcl, recording, arguments, settings.start)
+    unused_note = [f"parameters that only a node uses: {', '.join(unused)}"] if unused else []
+    return Prepared(settings, grid_map, recording, mcl, start, origin,
+                    [*recording.notes, *unused_note, f"start: {origin}"], arguments.seed, _window(arguments))
 
 
 def versions() -> Dict[str, str]:
