@@ -75,7 +75,7 @@ def episodes(result: ReplayResult) -> List[Episode]:
 
 def seconds_of(result: ReplayResult) -> np.ndarray:
     """(S,) since the first scan."""
-    return (result.stamps_ns - result.stamps_ns[0]) * 1e-9
+    return (result.stamps_ns - result.stamps_ns[0]) / 1e9
 
 
 def first_localized(result: ReplayResult) -> Optional[int]:
