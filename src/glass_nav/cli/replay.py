@@ -28,8 +28,8 @@ from glass_nav.world.grid_map import GridMap
 
 HELP = "run the localization on a recorded log"
 DESCRIPTION = """Runs the localization on a recorded log, every scan of it, and writes metrics.json,
-trajectory.tum, per_scan.csv, beam_cases.npz, glass_map.yaml (how glassy each wall cell proved) and
-trajectory.png; where the log has the truth about its beams, as
+trajectory.tum, per_scan.csv, beam_cases.npz, worst_scans.npz, glass_map.yaml (how glassy each wall cell proved)
+and trajectory.png; where the log has the truth about its beams, as
 simulated ones do, also the scores of the cases and cases.png. Needs no roscore."""
 
 

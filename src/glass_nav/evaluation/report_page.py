@@ -42,7 +42,8 @@ dl.figures dd strong { font-size: 1.4rem; font-variant-numeric: tabular-nums; di
 dl.figures dd small { color: var(--dim); }
 .first { display: grid; grid-template-columns: minmax(0, 1.9fr) minmax(16rem, 1fr); gap: .8rem; align-items: start; }
 @media (max-width: 55rem) { .first { grid-template-columns: minmax(0, 1fr); } }
-.card, figure { background: var(--card); border: 1px solid var(--line); border-radius: .5rem; padding: .75rem; margin: 0; }
+.card, figure { background: var(--card); border: 1px solid var(--line); border-radius: .5rem; padding: .75rem;
+  margin: 0; }
 figure img { display: block; width: auto; max-width: 100%; height: auto; margin: 0 auto; background: #fff;
   border-radius: .25rem; }
 .first figure img { max-height: 50vh; }
@@ -55,14 +56,16 @@ ol.story time, ol.story small { color: var(--dim); } ol.story small { display: b
 .ribbon { display: flex; height: 1.1rem; border-radius: .25rem; overflow: hidden; margin: .3rem 0 .8rem; }
 .pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(30rem, 100%), 1fr)); gap: .8rem; }
 .pictures .wide { grid-column: 1 / -1; }
-nav ul { display: flex; flex-wrap: wrap; gap: .2rem 1rem; list-style: none; padding: 0; margin: .6rem 0 0; font-size: .9rem; }
+nav ul { display: flex; flex-wrap: wrap; gap: .2rem 1rem; list-style: none; padding: 0; margin: .6rem 0 0;
+  font-size: .9rem; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .88rem; font-variant-numeric: tabular-nums; }
 th, td { text-align: left; padding: .2rem .8rem .2rem 0; border-bottom: 1px solid var(--line); vertical-align: top;
   overflow-wrap: anywhere; }
 th { font-weight: 600; } td.number, th.number { text-align: right; }
 @media print { :root { --page: #fff; --card: #fff; --text: #000; --dim: #444; --line: #bbb; --good: #1d7a3a;
-  --fair: #7a5200; --bad: #b3261e; } body { font-size: 10pt; } main { max-width: none; padding: 0; } nav { display: none; }
+  --fair: #7a5200; --bad: #b3261e; } body { font-size: 10pt; } main { max-width: none; padding: 0; }
+  nav { display: none; }
   figure, .card, .verdict, dl.figures div { break-inside: avoid; } h2 { break-after: avoid; }
   .first figure img { max-height: 11cm; } * { print-color-adjust: exact; -webkit-print-color-adjust: exact; } }
 """
@@ -78,7 +81,8 @@ def write(path: Path, title: str, story: Story, pictures: Sequence[Picture], wor
         f"<p>{' '.join(escape(sentence) for sentence in story.sentences)}</p></section>",
         '<dl class="figures">', *(f"<div><dt>{escape(each.name)}</dt><dd><strong>{escape(each.value)}</strong>"
                                   f"<small>{escape(each.note)}</small></dd></div>" for each in story.figures), "</dl>",
-        '<div class="first">', _picture(first, lazy=False), "<div>", _happened(story.episodes), _moments(worst), "</div></div>",
+        '<div class="first">', _picture(first, lazy=False), "<div>", _happened(story.episodes), _moments(worst),
+        "</div></div>",
         _contents(bool(worst)),
         '<h2 id="run">The run in pictures</h2><div class="pictures">', *(_picture(each) for each in rest), "</div>"]
     if worst:
@@ -131,7 +135,8 @@ def _picture(each: Picture, lazy: bool = True) -> str:
 def _happened(episodes: List[Episode]) -> str:
     """What it said of itself and when: all in a ribbon, the longest in words."""
     total = max(episodes[-1].end_s, 1e-9)
-    ribbon = "".join(f'<span style="flex:{max(each.duration_s / total, 1e-4):.5f} 1 0;background:{_colour(each)}"></span>'
+    ribbon = "".join(f'<span style="flex:{max(each.duration_s / total, 1e-4):.5f} 1 0;'
+                     f'background:{_colour(each)}"></span>'
                      for each in episodes)
     told = sorted(sorted(episodes, key=lambda each: each.duration_s, reverse=True)[:_SHOWN],
                   key=lambda each: each.first)
@@ -150,8 +155,8 @@ def _moments(worst: Sequence[Picture]) -> str:
     if not worst:
         return ""
     items = "".join(f'<li><a href="#{each.path.stem}">{escape(each.title)}</a></li>' for each in worst[:_MOMENTS])
-    return (f'<section class="card" aria-label="Worst moments"><h3>Its worst moments</h3><ul class="moments">{items}</ul>'
-            "</section>")
+    return ('<section class="card" aria-label="Worst moments"><h3>Its worst moments</h3>'
+            f'<ul class="moments">{items}</ul></section>')
 
 
 def _colour(episode: Episode) -> str:

@@ -87,7 +87,7 @@ def _way(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
     _draw_states(axes, result)
     for number, kept in reversed(list(enumerate(result.worst, 1))):
         spot = result.map_from_base[kept.row, :2]
-        if np.all(spot >= low) and np.all(spot <= high):
+        if np.all(np.isfinite(spot)) and np.all(spot >= low) and np.all(spot <= high):
             axes.annotate(str(number), spot, fontsize=7, ha="center", va="center", zorder=6, color="white",
                           bbox={"boxstyle": "circle,pad=0.25", "facecolor": "#333333", "edgecolor": "white"})
     axes.plot(*result.map_from_base[-1, :2], "s", color=TRUTH_COLOUR, markersize=7, markeredgecolor="white",
@@ -257,8 +257,9 @@ def _reliability(folder: Path, result: ReplayResult, ground: Ground) -> Optional
                  "Told reliability against the true error of each scan, and the share of right poses for each class of "
                  "reliability: " + ", ".join(f"{centre:.2f}: {height:.2f} of {count}" for centre, height, count in
                                              zip(centres, share, counts)) + ".",
-                 f"Left: each dot is a scan; above the dashed line ({run_story.RIGHT_M:g} m) the pose was wrong. Right: "
-                 "bars on the dashed line would be a reliability that is exactly true; numbers are scans. Right is "
+                 f"Left: each dot is a scan; above the dashed line ({run_story.RIGHT_M:g} m) the pose was wrong. "
+                 "Right: bars on the dashed line would be a reliability that is exactly true; numbers are scans. "
+                 "Right is "
                  f"within {run_story.RIGHT_M:g} m and {np.degrees(run_story.RIGHT_RAD):.0f}°.")
 
 

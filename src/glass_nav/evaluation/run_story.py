@@ -181,8 +181,8 @@ def _beginning(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -
     text = (f"It began without a guess: up to {most} places were possible, one was left after "
             f"{duration(float(seconds_of(result)[found]))} and {driven_m(result)[found]:.1f} m")
     if errors.matched[found]:
-        text += f", {'the right one' if right(errors)[found] else 'a WRONG one'}, " \
-                f"{metres(errors.position_m[found])} off"
+        which = "the right one" if right(errors)[found] else "a WRONG one"
+        text += f", {which}, {metres(errors.position_m[found])} off"
     return [text + "."]
 
 

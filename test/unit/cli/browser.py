@@ -33,7 +33,8 @@ def opened(page: Path, folder: Path) -> Opened:
     program = next((found for found in map(shutil.which, PROGRAMS) if found), None)
     if program is None:
         reason = f"no browser ({', '.join(PROGRAMS)}): scripts/setup --dev installs one on Debian"
-        if os.environ.get("CI") == "true" and not os.path.exists("/opt/ros/noetic"):  # Ubuntu 20.04 has it as a snap only
+        # Ubuntu 20.04 has it as a snap only
+        if os.environ.get("CI") == "true" and not os.path.exists("/opt/ros/noetic"):
             pytest.fail(reason)
         pytest.skip(reason)
     log = folder / "network.json"
@@ -41,8 +42,7 @@ def opened(page: Path, folder: Path) -> Opened:
         [program, "--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-extensions",
          "--disable-background-networking", "--disable-component-update", "--disable-sync",
          f"--user-data-dir={folder / 'profile'}", "--enable-logging=stderr", f"--log-net-log={log}", "--dump-dom",
-         page.resolve().as_uri()], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        timeout=120)
+         page.resolve().as_uri()], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr[-2000:]
     network = json.loads(log.read_text())
     begun = network["constants"]["logEventTypes"]["URL_REQUEST_START_JOB"]

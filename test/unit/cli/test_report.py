@@ -67,7 +67,7 @@ def test_a_log_becomes_one_page_that_asks_no_address_for_anything(run, room_bag,
     drawn = PICTURES - {"glass.png"} | WORST | {"candidates.png", "confusion.png"}  # no wall was proved so early
     assert drawn | {"report.html", "per_scan.csv"} <= files
     assert out.endswith("written to out/report.html\n")
-    assert "It began without a guess: up to " in out
+    assert "It began without a guess; up to " in out
     (tmp_path / "elsewhere").mkdir()
     shutil.move(str(tmp_path / "out" / "report.html"), str(tmp_path / "elsewhere" / "report.html"))  # all inside
     page = browser.opened(tmp_path / "elsewhere" / "report.html", tmp_path)
@@ -119,7 +119,8 @@ def test_what_is_no_run_is_refused_in_one_line(run, room_bag, room_map, tmp_path
     (tmp_path / "empty").mkdir()
     assert run("report", tmp_path / "empty", "--out", tmp_path / "out") == (
         3, "", "glass_nav report: empty: holds no results of a replay (there is no metrics.json)\n")
-    assert run("replay", path, "--map", room_map, "--out", tmp_path / "results", "--no-picture", "--max-scans", 3)[0] == 0
+    assert run("replay", path, "--map", room_map, "--out", tmp_path / "results", "--no-picture",
+               "--max-scans", 3)[0] == 0
     (tmp_path / "other.yaml").write_text((room_map.parent / "map.yaml").read_text().replace("map.pgm", "other.png"))
     Image.new("L", (30, 20), 254).save(tmp_path / "other.png")
     code, _, err = run("report", tmp_path / "results", "--map", tmp_path / "other.yaml", "--out", tmp_path / "out")

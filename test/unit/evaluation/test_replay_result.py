@@ -199,7 +199,8 @@ def test_what_was_written_is_read_back(tmp_path):
      ": its results have no 'worst_scans.npz', an older glass_nav wrote them: replay again"),
     (lambda folder: (folder / "per_scan.csv").write_text("stamp_ns\n1\n2\n3\n4\n"),
      ": its results have no 'true_x_m', an older glass_nav wrote them: replay again"),
-    (lambda folder: (folder / "per_scan.csv").write_text((folder / "per_scan.csv").read_text().rpartition("1000000003")[0]),
+    (lambda folder: (folder / "per_scan.csv").write_text(
+        (folder / "per_scan.csv").read_text().rpartition("1000000003")[0]),
      ": its results are damaged: 3 rows in per_scan.csv, cases of 4 scans in beam_cases.npz"),
     (lambda folder: (folder / "beam_cases.npz").write_bytes(b"PK"), ": its results are damaged: "),
     (lambda folder: (folder / "metrics.json").write_text("{"), ": its results are damaged: ")])

@@ -19,7 +19,8 @@ GLASS = np.where(GRID.occupancy == 100, 80, -1).astype(np.int8)
 
 @pytest.mark.parametrize("changes, there, absent", [
     pytest.param({}, {"reliability", "errors"}, {"candidates"}, id="with a reference"),
-    pytest.param({"reference": None, "states": ["GLOBAL_SEARCH"] * 4}, {"candidates"}, set(), id="never found, no truth"),
+    pytest.param({"reference": None, "states": ["GLOBAL_SEARCH"] * 4}, {"candidates"}, set(),
+                 id="never found, no truth"),
     pytest.param({"states": ["GLOBAL_SEARCH", "GLOBAL_SEARCH", "LOCALIZED", "NEW"]}, {"candidates"}, set(),
                  id="found, and a state of tomorrow"),
     pytest.param({"map_from_base": np.full((4, 3), np.nan)}, {"way"}, set(), id="no pose at all"),
