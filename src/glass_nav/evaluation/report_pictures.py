@@ -108,7 +108,8 @@ def _draw_states(axes: Any, result: ReplayResult) -> None:
     way, states = result.map_from_base[:, :2], np.array(result.states)
     apart = np.hypot(*(way[1:] - way[:-1]).T) if len(way) > 1 else np.zeros(0)
     drove = np.hypot(*np.diff(result.odom_from_base[:, :2], axis=0).T) if len(way) > 1 else np.zeros(0)
-    joined = apart <= drove + _JUMP_M
+    with np.errstate(invalid="ignore"):  # a pose that is NaN is joined to none
+        joined = apart <= drove + _JUMP_M
     for state in _present(states):
         colour = STATE_COLOURS.get(state, "#000000")
         here = states == state
