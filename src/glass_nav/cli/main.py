@@ -20,7 +20,7 @@ def main(argv: Optional[List[str]] = None) -> int:
         says what), 130 interrupted.
     """
     try:
-        from glass_nav.cli import atlas, doctor, landmarks, locate, params, replay, simulate
+        from glass_nav.cli import atlas, doctor, landmarks, locate, params, replay, report, simulate
     except ImportError as err:
         if not str(err.name).startswith("glass_nav"):
             raise
@@ -28,7 +28,8 @@ def main(argv: Optional[List[str]] = None) -> int:
               file=sys.stderr)
         return BAD_INPUT
     modules: Dict[str, Any] = {"atlas": atlas, "doctor": doctor, "landmarks": landmarks, "locate": locate,
-                               "params": params, "replay": replay, "simulate": simulate}  # each: see replay.py
+                               "params": params, "replay": replay, "report": report,
+                               "simulate": simulate}  # each: see replay.py
     parser = argparse.ArgumentParser(prog="glass_nav", description="Localization in buildings of glass: offline tools.")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     commands.required = True  # as an attribute: the argument came with Python 3.7 only for some callers

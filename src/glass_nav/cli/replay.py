@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import platform
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Optional, Tuple
 
@@ -19,17 +20,17 @@ from glass_nav.evaluation import pictures, replay_result, thresholds
 from glass_nav.evaluation.case_scores import CASE_NAMES, NEAR_M
 from glass_nav.evaluation.replay_result import ReplayResult
 from glass_nav.evaluation.thresholds import Threshold
-from glass_nav.localization.glass_mcl import GlassMcl
+from glass_nav.localization.glass_mcl import Estimate, GlassMcl
 from glass_nav.localization.start_pose import StartPose
 from glass_nav.recording.log_file import open_log
-from glass_nav.recording.recording import LogOptions, Recording
+from glass_nav.recording.recording import LogOptions, Recording, Step
 from glass_nav.world import map_file
 from glass_nav.world.grid_map import GridMap
 
 HELP = "run the localization on a recorded log"
 DESCRIPTION = """Runs the localization on a recorded log, every scan of it, and writes metrics.json,
-trajectory.tum, per_scan.csv, beam_cases.npz, glass_map.yaml (how glassy each wall cell proved) and
-trajectory.png; where the log has the truth about its beams, as
+trajectory.tum, per_scan.csv, beam_cases.npz, worst_scans.npz, glass_map.yaml (how glassy each wall cell proved)
+and trajectory.png; where the log has the truth about its beams, as
 simulated ones do, also the scores of the cases and cases.png. Needs no roscore."""
 
 
@@ -45,6 +46,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fail-if", action="append", default=[], metavar="METRIC>LIMIT",
                         help="exit with 1 if a figure of metrics.json is beyond a limit, such as 'position_p95_m>0.3'; "
                              "may be repeated")
+    add_run_arguments(parser)
+    add_log_arguments(parser)
+    parser.add_argument("--no-picture", action="store_true", help="do not draw trajectory.png and cases.png")
+
+
+def add_run_arguments(parser: argparse.ArgumentParser) -> None:
+    """What makes one run over a log another than the next."""
+    parser.add_argument("--params", type=Path, metavar="FILE",
+                        help="yaml of parameters, names as for the node; default: the node's defaults")
+    parser.add_argument("--seed", type=int, default=0, help="of the filter's random numbers (default 0)")
+
+
+def add_log_arguments(parser: argparse.ArgumentParser) -> None:
+    """What is taken from a log, and where the robot starts in it: the same for all runs over it."""
     parser.add_argument("--ground-truth", metavar="TOPIC_OR_FILE",
                         help="poses in the map: a PoseStamped, PoseWithCovarianceStamped or Odometry topic, a TUM "
                              "file, or MRPT's _GT.txt; default: /ground_truth of a bag, LOG_GT.txt beside a "
@@ -52,9 +67,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--true-beams", metavar="TOPIC",
                         help="true cases: glass_nav/TrueBeams, or a glass_nav/BeamCases; default: the only topic of "
                              "the first, or true_cases of the second; none: do not score the cases")
-    parser.add_argument("--params", type=Path, metavar="FILE",
-                        help="yaml of parameters, names as for the node; default: the node's defaults")
-    parser.add_argument("--seed", type=int, default=0, help="of the filter's random numbers (default 0)")
     start = parser.add_argument_group("start")
     start.add_argument("--initial-pose", type=float, nargs=3, metavar=("X", "Y", "YAW"),
                        help="m, m, rad; default: the ground truth's pose at the first scan, else initial_pose_* "
@@ -76,7 +88,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     part.add_argument("--duration", type=float, metavar="S", help="seconds from there")
     part.add_argument("--every", type=int, default=1, metavar="N", help="only each N-th scan")
     part.add_argument("--max-scans", type=int, metavar="N")
-    parser.add_argument("--no-picture", action="store_true", help="do not draw trajectory.png and cases.png")
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
@@ -102,31 +113,23 @@ def main(arguments: argparse.Namespace) -> bool:
     Raises:
         RecordingError, MapError, ParamError, ValueError, OSError: bad input; one line.
     """
-    settings, unused = (ReplayParams(), []) if arguments.params is None else replay_params.load(arguments.params)
-    grid_map = map_file.load(arguments.map)
-    recording = open_log(arguments.log, _log_options(arguments, settings))
-    notes = list(recording.notes)
-    if unused:
-        notes.append(f"parameters that only a node uses: {', '.join(unused)}")
+    ready = prepare(arguments)
+    recording, mcl, grid_map = ready.recording, ready.mcl, ready.grid_map
     arguments.out.mkdir(parents=True, exist_ok=True)
-    mcl = GlassMcl(settings.mcl, grid_map, np.random.default_rng(arguments.seed))
-    start, origin = _start(mcl, recording, arguments, settings.start)
-    notes.append(f"start: {origin}")
-    for note in notes:
+    for note in ready.notes:
         _say(note)
-    window = _window(arguments)
-    progress = Progress("replay", window.expected(len(recording)))
+    progress = Progress("replay", ready.expected_scans)
     try:
         if arguments.bag is None:
-            result = replay_run.run(recording, mcl, start, arguments.seed, window, progress.step)
+            result = ready.run(progress.step)
         else:
             arguments.bag.parent.mkdir(parents=True, exist_ok=True)
             with replay_bag.listener(arguments.bag, recording, mcl, grid_map) as listen:
-                result = replay_run.run(recording, mcl, start, arguments.seed, window, progress.step, listen)
+                result = ready.run(progress.step, listen)
     finally:
         progress.finish()
-    about = {"log": " ".join(map(str, arguments.log)), "map": str(arguments.map), "start": origin, "notes": notes,
-             "params": params.as_mapping(settings.mcl), "versions": versions()}
+    about = {"log": " ".join(map(str, arguments.log)), "map": str(arguments.map), "start": ready.origin,
+             "notes": ready.notes, "params": params.as_mapping(ready.settings.mcl), "versions": versions()}
     replay_result.write(result, arguments.out, about)
     glass = GridMap(mcl.glass_map.occupancy(), grid_map.resolution_m, grid_map.map_from_grid)
     map_file.save(glass, arguments.out / "glass_map.yaml", image_suffix=".png")
@@ -144,6 +147,50 @@ def main(arguments: argparse.Namespace) -> bool:
     for failure in failures:
         _say(failure)
     return not failures
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A log, a map and a filter, from the options of a command; nothing has run yet."""
+    settings: ReplayParams
+    grid_map: GridMap
+    recording: Recording
+    mcl: GlassMcl
+    start: Callable[[int], None]  # see replay_run.run()
+    origin: str                   # where the robot starts, in words
+    notes: List[str]              # what was chosen or found odd
+    seed: int
+    window: Window
+
+    @property
+    def expected_scans(self) -> int:
+        """About how many will be used: for a progress bar."""
+        return self.window.expected(len(self.recording))
+
+    def run(self, step_done: Callable[[], None] = lambda: None,
+            listen: Callable[[Step, Estimate], None] = lambda step, estimate: None) -> ReplayResult:
+        """Once only: the filter is not the same afterwards. For the arguments see replay_run.run().
+
+        Raises:
+            RecordingError: not one scan of the log can be used.
+        """
+        return replay_run.run(self.recording, self.mcl, self.start, self.seed, self.window, step_done, listen)
+
+
+def prepare(arguments: argparse.Namespace) -> Prepared:
+    """Open what the options name: log, map, params, seed, and those of add_log_arguments().
+
+    Raises:
+        RecordingError, MapError, ParamError, ValueError, OSError: bad input; one line.
+    """
+    settings, unused = (ReplayParams(), []) if arguments.params is None else replay_params.load(arguments.params)
+    grid_map = map_file.load(arguments.map)
+    recording = open_log(arguments.log, _log_options(arguments, settings))
+    mcl = GlassMcl(settings.mcl, grid_map, np.random.default_rng(arguments.seed))
+    start, origin = _start(mcl, recording, arguments, settings.start)
+    unused_note = [f"parameters that only a node uses: {', '.join(unused)}"] if unused else []
+    return Prepared(settings, grid_map, recording, mcl, start, origin,
+                    [*recording.notes, *unused_note, f"start: {origin}"], arguments.seed, _window(arguments))
 
 
 def versions() -> Dict[str, str]:

@@ -5,19 +5,22 @@ from __future__ import annotations
 import time
 from collections import Counter
 from dataclasses import dataclass
-from typing import Callable, Iterable, Iterator, List, Optional
+from typing import Callable, Dict, Iterable, Iterator, List, Optional, Tuple
 
 import numpy as np
 
-from glass_nav.evaluation import case_scores
+from glass_nav.evaluation import case_scores, pose_errors
 from glass_nav.evaluation.case_scores import CaseScores, SurfaceScores
-from glass_nav.evaluation.replay_result import NO_BEAM, BeamExample, ReplayResult
+from glass_nav.evaluation.replay_result import NO_BEAM, BeamExample, KeptScan, ReplayResult
 from glass_nav.geometry import se2
 from glass_nav.localization.glass_mcl import Estimate, GlassMcl
+from glass_nav.localization.pose_quality import GLOBAL_SEARCH, UNKNOWN
 from glass_nav.recording.recording import BeamTruth, Entry, Recording, RecordingError, Refusal, Step
 from glass_nav.sensing.scan import Scan, ScanError
 
 EXAMPLES = 3  # scans whose beams are kept for the picture, spread over the log
+WORST = 10    # scans kept that went worst, each from another part of the log
+PARTS = 60    # of the log, so that they do not all show one moment
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,7 @@ def run(recording: Recording, mcl: GlassMcl, start: Callable[[int], None], seed:
     rows: List[_Row] = []
     refusals: "Counter[str]" = Counter()
     scores = _Scores(recording, window.expected(len(recording)))
+    worst = _WorstScans(recording, window.expected(len(recording)))
     for entry in window.of(recording):
         if isinstance(entry, Refusal):
             refusals[entry.reason] += 1
@@ -100,6 +104,7 @@ def run(recording: Recording, mcl: GlassMcl, start: Callable[[int], None], seed:
                 before = time.process_time()
                 estimate = mcl.update(entry.scan, entry.odom_from_base)
                 cpu_ms = 1e3 * (time.process_time() - before)
+                worst.take(len(rows), entry.scan, estimate)
                 rows.append(_Row(entry.odom_from_base, estimate, cpu_ms, scores.take(entry.scan, estimate)))
                 listen(entry, estimate)
             except ScanError as err:
@@ -107,7 +112,7 @@ def run(recording: Recording, mcl: GlassMcl, start: Callable[[int], None], seed:
         step_done()
     if not rows:
         raise RecordingError(f"{recording.name}: {_nothing_usable(refusals)}")
-    return _result(rows, refusals, recording, scores, time.perf_counter() - began, seed)
+    return _result(rows, refusals, recording, scores, worst.kept(), time.perf_counter() - began, seed)
 
 
 class _Scores:
@@ -146,6 +151,31 @@ class _Scores:
         return truth.case
 
 
+class _WorstScans:
+    """The worst scan of each part of the log: farthest off, or least reliable where nobody knows. One part of it is in
+    memory at a time: all scans of a long log would not fit."""
+
+    def __init__(self, recording: Recording, expected_scans: int) -> None:
+        self._reference = recording.ground_truth
+        self._expected = max(expected_scans, 1)
+        self._of_part: Dict[int, Tuple[Tuple[bool, float], KeptScan]] = {}
+
+    def take(self, row: int, scan: Scan, estimate: Estimate) -> None:
+        """Look at one scan."""
+        errors = pose_errors.of(np.array([estimate.stamp_ns]), estimate.map_from_base[None], self._reference)
+        # Nobody relies on a pose that is still being looked for: such scans come last.
+        bad = (estimate.state not in (UNKNOWN, GLOBAL_SEARCH),
+               float(errors.position_m[0]) if errors.matched[0] else 1.0 - estimate.reliability)
+        part = row * PARTS // self._expected
+        if part not in self._of_part or bad > self._of_part[part][0]:
+            self._of_part[part] = bad, KeptScan(row, scan.base_from_laser, scan.points_in_base())
+
+    def kept(self) -> List[KeptScan]:
+        """The worst of all parts, the worst first."""
+        ordered = sorted(self._of_part.values(), key=lambda each: each[0], reverse=True)
+        return [kept for _, kept in ordered[:WORST]]
+
+
 def _example(scan: Scan, estimate: Estimate, truth: BeamTruth) -> BeamExample:
     map_from_laser = se2.compose(estimate.map_from_base, scan.base_from_laser)
     return BeamExample(scan.stamp_ns, map_from_laser[:2],
@@ -163,6 +193,7 @@ class _Row:
         self.deviation = np.sqrt(np.maximum(np.diag(estimate.covariance), 0.0))
         self.state, self.reason = estimate.state, estimate.reason
         self.used_share, self.updated = estimate.used_share, estimate.updated
+        self.reliability, self.places = estimate.reliability, estimate.places
         self.particles, self.case, self.true_case = len(estimate.particles), estimate.cases.case, true_case
 
 
@@ -173,8 +204,8 @@ def _nothing_usable(refusals: "Counter[str]") -> str:
     return f"none of its {sum(refusals.values())} scans can be used; {most}"
 
 
-def _result(rows: List[_Row], refusals: "Counter[str]", recording: Recording, scores: _Scores, wall_s: float,
-            seed: int) -> ReplayResult:
+def _result(rows: List[_Row], refusals: "Counter[str]", recording: Recording, scores: _Scores, worst: List[KeptScan],
+            wall_s: float, seed: int) -> ReplayResult:
     cases = np.full((len(rows), max(len(row.case) for row in rows)), NO_BEAM, np.uint8)
     true_cases = None if scores.cases is None else cases.copy()
     for index, row in enumerate(rows):
@@ -191,6 +222,9 @@ def _result(rows: List[_Row], refusals: "Counter[str]", recording: Recording, sc
         used_share=np.array([row.used_share for row in rows], float),
         updated=np.array([row.updated for row in rows], bool),
         particles=np.array([row.particles for row in rows], int),
+        reliability=np.array([row.reliability for row in rows], float),
+        places=np.array([row.places for row in rows], int),
         cpu_ms=np.array([row.cpu_ms for row in rows], float),
         cases=cases, refusals=refusals, reference=recording.ground_truth, wall_s=wall_s, seed=seed,
-        true_cases=true_cases, case_scores=scores.cases, surface_scores=scores.surfaces, examples=scores.examples)
+        true_cases=true_cases, case_scores=scores.cases, surface_scores=scores.surfaces, examples=scores.examples,
+        worst=worst)

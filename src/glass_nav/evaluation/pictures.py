@@ -55,7 +55,7 @@ def draw_trajectory(path: Path, grid: MapImage, result: ReplayResult, title: str
     above.set_xlabel("x [m]")
     above.set_ylabel("y [m]")
     above.set_title(f"{title}\n{_figures(result)}", fontsize=11)
-    _draw_errors(below, result)
+    draw_errors(below, result)
     figure.savefig(path)
 
 
@@ -73,7 +73,7 @@ def draw_cases(path: Path, grid: MapImage, result: ReplayResult, title: str) -> 
     figure = Figure(figsize=(5.5 + 4.2 * columns, 8.4 if columns else 6.0), dpi=100, constrained_layout=True)
     FigureCanvasAgg(figure)
     parts = figure.add_gridspec(2, columns + 1, width_ratios=[5.5] + [4.2] * columns)
-    _draw_confusion(figure.add_subplot(parts[:, 0]), result.case_scores.confusion)
+    draw_confusion(figure.add_subplot(parts[:, 0]), result.case_scores.confusion)
     for column, example in enumerate(result.examples, 1):
         for row, (name, case) in enumerate((("true", example.true_case), ("told", example.told_case))):
             axes = figure.add_subplot(parts[row, column])
@@ -86,7 +86,7 @@ def draw_cases(path: Path, grid: MapImage, result: ReplayResult, title: str) -> 
     figure.savefig(path)
 
 
-def _draw_confusion(axes: Any, confusion: np.ndarray) -> None:
+def draw_confusion(axes: Any, confusion: np.ndarray) -> None:
     share = confusion / np.maximum(confusion.sum(axis=1, keepdims=True), 1)
     axes.imshow(share, cmap="Blues", vmin=0.0, vmax=1.0)
     for true, row in enumerate(confusion):
@@ -185,7 +185,7 @@ def _draw_ways(figure: Any, axes: Any, result: ReplayResult) -> None:
     axes.legend(loc="best", fontsize=9, framealpha=0.9)
 
 
-def _draw_errors(axes: Any, result: ReplayResult) -> None:
+def draw_errors(axes: Any, result: ReplayResult) -> None:
     from matplotlib.patches import Patch
 
     seconds = (result.stamps_ns - result.stamps_ns[0]) * 1e-9

@@ -8,10 +8,11 @@ from __future__ import annotations
 import csv
 import json
 import math
+import zipfile
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional
+from typing import Any, Dict, List, Mapping, Optional, Tuple
 
 import numpy as np
 
@@ -35,6 +36,14 @@ class BeamExample:
 
 
 @dataclass(frozen=True)
+class KeptScan:
+    """A scan that went badly, kept for a picture."""
+    row: int                     # which of the S scans
+    base_from_laser: np.ndarray  # (3,)
+    points_m: np.ndarray         # (B, 2) end points in the robot's frame, NaN without an answer
+
+
+@dataclass(frozen=True)
 class ReplayResult:
     """One run of the filter over one log."""
     stamps_ns: np.ndarray       # (S,) int64
@@ -46,6 +55,8 @@ class ReplayResult:
     used_share: np.ndarray      # (S,) share of the answering beams that a case 1-4 explains
     updated: np.ndarray         # (S,) bool: the scan moved the particles
     particles: np.ndarray       # (S,) int: how many there were
+    reliability: np.ndarray     # (S,) chance that the pose is right, as the filter tells it
+    places: np.ndarray          # (S,) int: how many are possible while the pose is looked for; 1: it is known
     cpu_ms: np.ndarray          # (S,) CPU time of the filter, all its threads
     cases: np.ndarray           # (S, B) uint8: 0..4, NO_BEAM where a scan has no such beam
     refusals: "Counter[str]"    # reason -> scans of the log that could not be used
@@ -56,6 +67,7 @@ class ReplayResult:
     case_scores: Optional[CaseScores] = None
     surface_scores: Optional[SurfaceScores] = None
     examples: List[BeamExample] = field(default_factory=list)
+    worst: List[KeptScan] = field(default_factory=list)  # the worst first
 
     def __len__(self) -> int:
         return len(self.stamps_ns)
@@ -96,13 +108,36 @@ class ReplayResult:
 
 
 def write(result: ReplayResult, folder: Path, about: Mapping[str, Any]) -> None:
-    """metrics.json, trajectory.tum, per_scan.csv and beam_cases.npz; `about` goes into the first."""
+    """metrics.json, trajectory.tum, per_scan.csv, beam_cases.npz and worst_scans.npz; `about` goes into the first."""
     write_json(folder / "metrics.json", {**result.metrics(), **about})
     _write_tum(folder / "trajectory.tum", result)
     _write_per_scan(folder / "per_scan.csv", result)
     true = {} if result.true_cases is None else {"true_cases": result.true_cases}
     np.savez_compressed(folder / "beam_cases.npz", stamps_ns=result.stamps_ns.astype(np.int64), cases=result.cases,
                         **true)
+    _write_worst(folder / "worst_scans.npz", result.worst)
+
+
+def read(folder: Path) -> "Tuple[ReplayResult, Dict[str, Any]]":
+    """What write() wrote, and the contents of metrics.json; the scores are in the second only.
+
+    Raises:
+        ValueError, OSError: no results, or not whole; one line.
+    """
+    if not (folder / "metrics.json").is_file():
+        raise ValueError(f"{folder}: holds no results of a replay (there is no metrics.json)")
+    try:
+        metrics: Dict[str, Any] = json.loads((folder / "metrics.json").read_text())
+        with np.load(folder / "beam_cases.npz") as arrays:
+            cases, true_cases = arrays["cases"], arrays["true_cases"] if "true_cases" in arrays else None
+        with (folder / "per_scan.csv").open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        worst = _read_worst(folder / "worst_scans.npz")
+        return _from_rows(rows, cases, true_cases, worst, metrics), metrics
+    except KeyError as err:
+        raise ValueError(f"{folder}: its results have no {err}, an older glass_nav wrote them: replay again") from err
+    except (ValueError, zipfile.BadZipFile) as err:
+        raise ValueError(f"{folder}: its results are damaged: {err}") from err
 
 
 def write_json(path: Path, values: Mapping[str, Any]) -> None:
@@ -141,15 +176,62 @@ def _write_per_scan(path: Path, result: ReplayResult) -> None:
         rows.writerow(["stamp_ns", "x_m", "y_m", "yaw_rad", "odom_x_m", "odom_y_m", "odom_yaw_rad",
                        "true_x_m", "true_y_m", "true_yaw_rad", "position_error_m", "yaw_error_deg",
                        "std_x_m", "std_y_m", "std_yaw_rad", "state", "reason", "used_share", "updated",
-                       "particles", "cpu_ms", *(f"beams_case_{case}" for case in CASES)])
+                       "particles", "cpu_ms", "reliability", "places", *(f"beams_case_{case}" for case in CASES)])
         for i in range(len(result)):
             rows.writerow([int(result.stamps_ns[i]), *_texts(result.map_from_base[i]),
                            *_texts(result.odom_from_base[i]), *_texts(true[i]),
                            *_texts([errors.position_m[i], np.degrees(errors.yaw_rad[i])]),
                            *_texts(result.deviation[i]), result.states[i], result.reasons[i],
                            *_texts([result.used_share[i]]), int(result.updated[i]), int(result.particles[i]),
-                           f"{result.cpu_ms[i]:.3f}", *counts[i].tolist()])
+                           f"{result.cpu_ms[i]:.3f}", *_texts([result.reliability[i]]), int(result.places[i]),
+                           *counts[i].tolist()])
 
 
 def _texts(values: Any) -> List[str]:
     return ["" if math.isnan(value) else f"{value:.6f}" for value in values]
+
+
+def _write_worst(path: Path, worst: List[KeptScan]) -> None:
+    """K kept scans: their rows (K,), base_from_laser (K, 3), points_m (K, B, 2) of the widest, NaN beyond a scan's."""
+    points = np.full((len(worst), max((len(kept.points_m) for kept in worst), default=0), 2), np.nan, np.float32)
+    for index, kept in enumerate(worst):
+        points[index, :len(kept.points_m)] = kept.points_m
+    np.savez_compressed(path, rows=np.array([kept.row for kept in worst], np.int64), points_m=points,
+                        base_from_laser=np.array([kept.base_from_laser for kept in worst], float).reshape(-1, 3))
+
+
+def _read_worst(path: Path) -> List[KeptScan]:
+    if not path.is_file():
+        raise KeyError(path.name)
+    with np.load(path) as arrays:
+        return [KeptScan(int(row), laser, points) for row, laser, points in
+                zip(arrays["rows"], arrays["base_from_laser"], arrays["points_m"].astype(float))]
+
+
+def _from_rows(rows: List[Dict[str, str]], cases: np.ndarray, true_cases: Optional[np.ndarray],
+               worst: List[KeptScan], metrics: Mapping[str, Any]) -> ReplayResult:
+    """The rows of per_scan.csv as arrays."""
+    def column(name: str) -> np.ndarray:
+        return np.array([float(row[name] or "nan") for row in rows])
+
+    def columns(*names: str) -> np.ndarray:
+        return np.stack([column(name) for name in names], axis=1)
+
+    if len(cases) != len(rows):
+        raise ValueError(f"{len(rows)} rows in per_scan.csv, cases of {len(cases)} scans in beam_cases.npz")
+    stamps_ns = np.array([int(row["stamp_ns"]) for row in rows], np.int64)
+    true = columns("true_x_m", "true_y_m", "true_yaw_rad")
+    known = np.isfinite(true).all(axis=1)
+    reference = None
+    if known.any():
+        unique_ns, first = np.unique(stamps_ns[known], return_index=True)
+        reference = Trajectory(unique_ns, true[known][first])
+    return ReplayResult(
+        stamps_ns=stamps_ns, map_from_base=columns("x_m", "y_m", "yaw_rad"),
+        odom_from_base=columns("odom_x_m", "odom_y_m", "odom_yaw_rad"),
+        deviation=columns("std_x_m", "std_y_m", "std_yaw_rad"), states=[row["state"] for row in rows],
+        reasons=[row["reason"] for row in rows], used_share=column("used_share"),
+        updated=column("updated").astype(bool), particles=column("particles").astype(int),
+        reliability=column("reliability"), places=column("places").astype(int), cpu_ms=column("cpu_ms"), cases=cases,
+        refusals=Counter(metrics["refusals"]), reference=reference, wall_s=float(metrics["wall_s"]),
+        seed=int(metrics["seed"]), true_cases=true_cases, worst=worst)

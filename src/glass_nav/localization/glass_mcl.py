@@ -59,6 +59,7 @@ class Estimate:
     used_share: float           # share of the answering beams that a case 1-4 explains
     updated: bool               # whether this scan moved the particles
     reliability: float          # chance that the pose is right, 0..1
+    places: int = 1             # that are possible, see pose_quality.Judgement
 
 
 class _MadeOnce:
@@ -456,7 +457,7 @@ class GlassMcl:
         surfaces = self._surfaces(scan, cases, references, judgement.state == pose_quality.LOCALIZED)
         return Estimate(scan.stamp_ns, map_from_base, self._best.covariance, self._map_from_odom, cases, surfaces,
                         self._particles, judgement.state, judgement.reason, used_share, updated,
-                        judgement.reliability)
+                        judgement.reliability, judgement.places)
 
     def _surfaces(self, scan: Scan, cases: BeamCases, references: ReferenceRanges, trusted: bool) -> SurfaceScan:
         """The scan cut at glass; references are of the pose that is told."""

@@ -52,6 +52,7 @@ class Judgement:
     state: str
     reason: str          # in one sentence
     reliability: float   # chance that the pose is right, 0..1
+    places: int = 1      # that are possible while the pose is looked for; 0: no scan has told anything yet
 
 
 class PoseQuality:
@@ -87,7 +88,7 @@ class PoseQuality:
         """Of the best cluster of particles."""
         if self._candidates is not None:
             known = best.share if len(self._candidates.poses) else 0.0
-            return Judgement(GLOBAL_SEARCH, _progress(self._candidates), min(known, 1.0))
+            return Judgement(GLOBAL_SEARCH, _progress(self._candidates), min(known, 1.0), _possible(self._candidates))
         limits = self._limits
         position_sigma_m = float(np.sqrt(np.linalg.eigvalsh(best.covariance[:2, :2])[-1]))
         heading_sigma_rad = float(np.sqrt(best.covariance[2, 2]))
@@ -116,10 +117,17 @@ class PoseQuality:
         return Judgement(LOCALIZED, f"{explained}; {spread}", reliability)
 
 
+def _possible(candidates: Candidates) -> int:
+    """How many places still count."""
+    if not len(candidates.poses):
+        return 0
+    return int(np.count_nonzero(candidates.weights > candidates.weights[0] * np.exp(-_POSSIBLE)))
+
+
 def _progress(candidates: Candidates) -> str:
     if not len(candidates.poses):
         return "no scan has told anything yet"
-    possible = int(np.count_nonzero(candidates.weights > candidates.weights[0] * np.exp(-_POSSIBLE)))
+    possible = _possible(candidates)
     x, y, yaw = candidates.poses[0]
     best = f"the best at x {x:.1f} m, y {y:.1f} m, {np.degrees(yaw):.0f} deg, where scans fit by {candidates.fit:.0%}"
     if possible == 1:

@@ -44,8 +44,8 @@ def test_a_replay_follows_the_robot_and_writes_everything(run, room_bag, tmp_pat
     code, out, err = run(room_bag().write())
     assert code == 0
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
-        "metrics.json", "trajectory.tum", "per_scan.csv", "beam_cases.npz", "trajectory.png", "glass_map.yaml",
-        "glass_map.png"}
+        "metrics.json", "trajectory.tum", "per_scan.csv", "beam_cases.npz", "worst_scans.npz", "trajectory.png",
+        "glass_map.yaml", "glass_map.png"}
     assert (map_file.load(tmp_path / "out" / "glass_map.yaml").occupancy >= 0).any()
     result = figures(tmp_path)
     assert result["scans"] == 20

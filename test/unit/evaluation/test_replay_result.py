@@ -21,6 +21,7 @@ def a_result(**changes):
         "odom_from_base": np.zeros((4, 3)), "deviation": np.full((4, 3), 0.05),
         "states": ["UNKNOWN", "LOCALIZED", "LOCALIZED", "LOCALIZED"], "reasons": ["none", "a, b", "c", "d"],
         "used_share": np.array([0.5, 1.0, 1.0, np.nan]), "updated": np.array([True, False, True, False]),
+        "reliability": np.array([0.0, 0.9, 0.95, 1.0]), "places": np.array([7, 1, 1, 1]),
         "particles": np.full(4, 100), "cpu_ms": np.array([10.0, 2.0, 20.0, 4.0]),
         "cases": np.array([[1, 1], [3, 0], [1, 2], [1, NO_BEAM]], np.uint8),
         "refusals": Counter({"time runs backwards": 2}),
@@ -174,3 +175,38 @@ def test_beams_have_the_colours_of_their_true_and_of_their_told_cases(tmp_path):
 def test_cases_without_examples_have_a_picture_too(tmp_path):
     pictures.draw_cases(tmp_path / "cases.png", GRID, a_result(case_scores=case_scores.none_yet()), "a log")
     assert (tmp_path / "cases.png").stat().st_size > 5_000
+
+
+def test_what_was_written_is_read_back(tmp_path):
+    true = np.array([[1, 1], [3, 3], [NO_BEAM] * 2, [1, NO_BEAM]], np.uint8)
+    result = a_result(true_cases=true)
+    replay_result.write(result, tmp_path, {"log": "x"})
+    back, metrics = replay_result.read(tmp_path)
+    assert metrics["log"] == "x"
+    for name in ("stamps_ns", "cases", "updated", "particles", "places", "true_cases"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(result, name), err_msg=name)
+    for name in ("map_from_base", "odom_from_base", "deviation", "used_share", "reliability", "cpu_ms"):
+        np.testing.assert_allclose(getattr(back, name), getattr(result, name), atol=1e-6, err_msg=name)
+    assert (back.states, back.reasons, back.refusals, back.seed) == (result.states, result.reasons, result.refusals, 7)
+    np.testing.assert_allclose(back.errors.position_m, result.errors.position_m, atol=1e-6)
+    replay_result.write(a_result(reference=None), tmp_path, {})
+    assert replay_result.read(tmp_path)[0].reference is None
+
+
+@pytest.mark.parametrize("damage, text", [
+    (lambda folder: (folder / "metrics.json").unlink(), ": holds no results of a replay (there is no metrics.json)"),
+    (lambda folder: (folder / "worst_scans.npz").unlink(),
+     ": its results have no 'worst_scans.npz', an older glass_nav wrote them: replay again"),
+    (lambda folder: (folder / "per_scan.csv").write_text("stamp_ns\n1\n2\n3\n4\n"),
+     ": its results have no 'true_x_m', an older glass_nav wrote them: replay again"),
+    (lambda folder: (folder / "per_scan.csv").write_text(
+        (folder / "per_scan.csv").read_text().rpartition("1000000003")[0]),
+     ": its results are damaged: 3 rows in per_scan.csv, cases of 4 scans in beam_cases.npz"),
+    (lambda folder: (folder / "beam_cases.npz").write_bytes(b"PK"), ": its results are damaged: "),
+    (lambda folder: (folder / "metrics.json").write_text("{"), ": its results are damaged: ")])
+def test_results_that_are_not_whole_are_refused(tmp_path, damage, text):
+    replay_result.write(a_result(), tmp_path, {})
+    damage(tmp_path)
+    with pytest.raises(ValueError) as caught:
+        replay_result.read(tmp_path)
+    assert str(caught.value).startswith(f"{tmp_path}{text}")

@@ -1,0 +1,100 @@
+"""glass_nav report: one run told to a person, as one HTML file with its pictures inside."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any, Dict, Optional
+
+import numpy as np
+
+from glass_nav.cli import replay
+from glass_nav.cli.progress import Progress
+from glass_nav.evaluation import pictures, replay_result, report_page, report_pictures, run_story
+from glass_nav.evaluation.report_pictures import Ground
+from glass_nav.world import map_file
+
+HELP = "tell one run as an HTML file with pictures"
+DESCRIPTION = """Writes report.html, one file that needs no network and holds its pictures, and the same pictures as
+PNG files: the way over the map by state, what the beams met over time, how glassy each wall proved, errors,
+reliability against the truth, places possible until one was left, update time, and the ten worst scans. Takes the
+folder that `glass_nav replay --out` wrote, or a log, which is replayed first (all options but --map and --out are for
+that)."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of the subcommand."""
+    parser.add_argument("run", metavar="RESULTS|LOG", type=Path,
+                        help="folder of results of a replay; or a ROS bag or MRPT .rawlog")
+    parser.add_argument("--map", type=Path, help="map_server .yaml, or MRPT .gridmap[.gz]; default for RESULTS: the "
+                                                 "map that the replay had")
+    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for the report")
+    replay.add_run_arguments(parser)
+    replay.add_log_arguments(parser)
+
+
+def usage_error(arguments: argparse.Namespace) -> Optional[str]:
+    """What is wrong with the options as such, before any file is opened."""
+    if arguments.map is None and not _is_results(arguments.run):
+        return "a log needs --map"
+    return replay.usage_error(_replay_arguments(arguments))
+
+
+def main(arguments: argparse.Namespace) -> None:
+    """Replay if it is a log, read, draw, write.
+
+    Raises:
+        ValueError, OSError: bad input; one line.
+    """
+    folder = arguments.run
+    if not _is_results(folder):
+        replay.main(_replay_arguments(arguments))
+        folder = arguments.out
+    result, metrics = replay_result.read(folder)
+    path_map = Path(metrics["map"]) if arguments.map is None else arguments.map
+    if arguments.map is None and not path_map.exists():
+        raise ValueError(f"{folder}: the map of that replay, {path_map}, is not there from here: give --map")
+    grid_map = map_file.load(path_map)
+    image = pictures.MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid)
+    ground = Ground(image, _glass(folder, grid_map.occupancy.shape))
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    scores: Optional[Dict[str, Any]] = metrics.get("cases")
+    confusion = None if scores is None else np.array(scores["confusion"])
+    progress = Progress("report", 7 + len(result.worst) + (confusion is not None), unit="pictures")
+    try:
+        drawn, worst = report_pictures.draw_all(arguments.out, result, ground, confusion, progress.step)
+    finally:
+        progress.finish()
+    story = run_story.of(result)
+    title = f"{Path(metrics['log']).name} on {path_map.parent.name}/{path_map.name}, seed {result.seed}"
+    report_page.write(arguments.out / "report.html", title, story, drawn, worst, metrics)
+    print(f"{story.headline}. {' '.join(story.sentences)}")
+    print(f"written to {arguments.out / 'report.html'}")
+
+
+def _is_results(path: Path) -> bool:
+    """A ROS 2 bag is a folder as well, with another file in it."""
+    return path.is_dir() and not (path / "metadata.yaml").exists()
+
+
+def _replay_arguments(arguments: argparse.Namespace) -> argparse.Namespace:
+    """As if `glass_nav replay` had been given the same options."""
+    parser = argparse.ArgumentParser()
+    replay.add_arguments(parser)
+    given = parser.parse_args([str(arguments.run), "--map", str(arguments.map), "--out", str(arguments.out)])
+    for name, value in vars(arguments).items():
+        if hasattr(given, name):
+            setattr(given, name, value)
+    given.log, given.no_picture = [arguments.run], True
+    return given
+
+
+def _glass(folder: Path, shape: "tuple[int, ...]") -> Optional[np.ndarray]:
+    """How glassy each wall of the map proved in that run; None: not known, or of another map."""
+    if not (folder / "glass_map.yaml").exists():
+        return None
+    glass = map_file.load(folder / "glass_map.yaml").occupancy
+    if glass.shape != shape:
+        raise ValueError(f"{folder}: its glass map has {glass.shape[1]} x {glass.shape[0]} cells, the map {shape[1]} x "
+                         f"{shape[0]}: it is of another map")
+    return glass
