@@ -5,6 +5,7 @@ to goto_node, one after the other, prints the errors against the simulator's tru
 
 Subscribes: meetpoint, edge_traversal, turn_choice, topology_status, topology_candidates, initialpose, amcl_pose,
     localization_status, ground_truth, map.
+Calls: restart_search (Trigger), when the search is LOST.
 Parameters: WakeupDemoParams. Exit code: 0 if the place was right and the tour was driven, 1 if not, 2 for a parameter
     that cannot be used.
 """
@@ -25,6 +26,7 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
+from std_srvs.srv import Trigger
 
 from glass_nav import params
 from glass_nav.evaluation import pose_errors, wake_up_picture
@@ -51,9 +53,10 @@ class WakeupDemoParams:
     """Private parameters of the node."""
     atlas: str = ""              # of the building
     picture: str = ""            # file of the picture; empty: none
+    searches: int = 3            # a robot that is LOST begins anew where it stands, so often at most
     tour: int = 4                # nodes to be driven to
     seed: int = 0                # of which
-    search_limit_s: float = 900.0  # simulated, for the search
+    search_limit_s: float = 900.0  # simulated, for one search
     tour_limit_s: float = 300.0    # simulated, for each node
     start_limit_s: float = 60.0    # of the wall clock, until something is heard
 
@@ -62,6 +65,8 @@ class WakeupDemoParams:
             raise ValueError("~atlas must be a file, a folder or the name of a shipped atlas, got ''")
         if self.tour < 0 or self.seed < 0:
             raise ValueError(f"~tour and ~seed must be >= 0, got {self.tour} and {self.seed}")
+        if self.searches < 1:
+            raise ValueError(f"~searches must be >= 1, got {self.searches}")
         for name in ("search_limit_s", "tour_limit_s", "start_limit_s"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ValueError(f"~{name} must be > 0 and finite, got {getattr(self, name)}")
@@ -106,12 +111,15 @@ class WakeupDemo:
         start = self._truth[min(self._truth)]
         self._print(f"wakes up at x {start[0]:.2f} m, y {start[1]:.2f} m, yaw {math.degrees(start[2]):.0f} degrees, "
                     "which it does not know")
-        if not self._wait(lambda: self._status is not None and self._status.state_name in DONE,
-                          simulated_s=self._p.search_limit_s):
-            self._print(f"the search did not end within {self._p.search_limit_s:g} s")
-            self._draw("still searching")
-            return 1
-        assert self._status is not None
+        for searches_left in reversed(range(self._p.searches)):
+            if not self._wait(lambda: self._status is not None and self._status.state_name in DONE,
+                              simulated_s=self._p.search_limit_s):
+                self._print(f"the search did not end within {self._p.search_limit_s:g} s")
+                self._draw("still searching")
+                return 1
+            assert self._status is not None
+            if self._status.state_name != "LOST" or not searches_left or not self._search_anew():
+                break
         right = self._tell_outcome(self._status)
         toured = self._drive_tour() if right else False
         self._draw(self._status.state_name)
@@ -143,13 +151,29 @@ class WakeupDemo:
                     "the truth")
         return right
 
+    def _search_anew(self) -> bool:
+        """Whether there will be another search, from the meetpoint where the robot stands."""
+        assert self._status is not None
+        try:
+            rospy.ServiceProxy("restart_search", Trigger)()
+        except rospy.ServiceException as err:
+            self._print(f"no new search: {err}")
+            return False
+        if not self._wait(lambda: self._status is not None and self._status.state_name != "LOST", wall_s=10.0):
+            return False
+        self._print("LOST: it forgets the search and begins anew where it stands")
+        return True
+
     def _tell_depth(self, status: TopologyStatus) -> None:
         """One row of the search forest: the match edge, the match node, what is left, the turn."""
         stamp_ns = conversions.ns_from_stamp(status.header.stamp)
-        self._wait(lambda: stamp_ns in self._meetpoints and stamp_ns in self._candidates, wall_s=2.0, nested=True)
+        self._wait(lambda: stamp_ns in self._meetpoints and stamp_ns in self._candidates
+                   and self._candidates[stamp_ns].total == status.candidates, wall_s=2.0, nested=True)
         meetpoint, candidates = self._meetpoints.get(stamp_ns), self._candidates.get(stamp_ns)
         if meetpoint is None or candidates is None:
             return
+        if status.depth == 0:
+            self._depths = []
         self._print(f"search depth {status.depth}")
         traversal = self._traversals.get(stamp_ns)
         if traversal is not None and status.depth:
