@@ -57,6 +57,7 @@ _BEHIND_M = 1.0          # a node that shows only once the robot is past it
 _DOUBT_M = 0.15          # an obstacle that is further from any wall: look around first
 _BLOCKED_S = 4.0
 _LOST_LINE_S = 3.0       # driven on along the last line, without a graph that has it
+_THICKER_M = 0.03      # walls of the local map than those of a drawn one: noise of the ranges
 _SEEN_M = 0.12          # a wall of the map beside a point of the scan is the same
 _NEAR_M = 2.0            # obstacles further away are not braked for
 
@@ -93,6 +94,7 @@ class EdgeDriver:
     def __init__(self, p: EdgeDriverParams = EdgeDriverParams()) -> None:
         self._p = p
         self._map, self._at = LocalMap(p.local_map), LocalPose()
+        self._graph_params = replace(p.graph, robot_radius_m=max(p.graph.robot_radius_m - _THICKER_M, 0.05))
         self.reset()
 
     def reset(self) -> None:
@@ -286,7 +288,7 @@ class EdgeDriver:
 
     def _look(self) -> None:
         self._grid = self._map.grid()
-        self._graph = LocalGraph(self._grid, self._p.graph)
+        self._graph = LocalGraph(self._grid, self._graph_params)
         self._graph_ns = self._stamp_ns
         self._at.know(self._map.walls())
         self._near_walls(self._grid.occupied)
