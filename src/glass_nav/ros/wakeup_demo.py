@@ -114,7 +114,8 @@ class WakeupDemo:
         for searches_left in reversed(range(self._p.searches)):
             if not self._wait(lambda: self._status is not None and self._status.state_name in DONE,
                               simulated_s=self._p.search_limit_s):
-                self._print(f"the search did not end within {self._p.search_limit_s:g} s")
+                if not self._is_ending():
+                    self._print(f"the search did not end within {self._p.search_limit_s:g} s")
                 self._draw("still searching")
                 return 1
             assert self._status is not None
@@ -209,6 +210,8 @@ class WakeupDemo:
             self._client.send_goal(GotoNodeGoal(node=node))
             ended = self._wait(lambda: self._client.get_state() not in (GoalStatus.PENDING, GoalStatus.ACTIVE),
                                simulated_s=self._p.tour_limit_s)
+            if self._is_ending():
+                return False
             if not ended:
                 self._client.cancel_goal()
                 self._print(f"goto_node {node}: not there within {self._p.tour_limit_s:g} s")
@@ -263,7 +266,7 @@ class WakeupDemo:
               nested: bool = False) -> bool:
         """Take in what comes until the condition holds, or too much time has passed."""
         began_s, wall_began_s = self._simulated_s(), time.monotonic()
-        while not (rospy.is_shutdown() or self._ending.is_set()):
+        while not self._is_ending():
             if condition():
                 return True
             if self._simulated_s() - began_s > simulated_s or time.monotonic() - wall_began_s > wall_s:
@@ -280,6 +283,9 @@ class WakeupDemo:
                 self._tell_depth(rows.pop(0))
                 rows, self._waiting_rows = self._waiting_rows + rows, []
         return False
+
+    def _is_ending(self) -> bool:
+        return bool(rospy.is_shutdown() or self._ending.is_set())
 
     def _hear(self, topic: str, msg: Any) -> Optional[TopologyStatus]:
         """A row of the search, if the message is one."""
