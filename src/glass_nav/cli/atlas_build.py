@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--force", action="store_true", help="replace an atlas in which robots have left statistics")
     _numbers(parser.add_argument_group("robot"), [
         ("--robot-radius", "robot_radius_m", "narrower passages are closed to it, m"),
+        ("--passage-margin", "passage_margin_m", "room that it needs besides on each side of a passage, m"),
         ("--view-range", "view_range_m", "of the lidar for the segment maps, m"),
         ("--field-of-view", "field_of_view_deg", "of the lidar around straight ahead, degrees")])
     _numbers(parser.add_argument_group("graph"), [

@@ -44,15 +44,18 @@ _DRIVING = (SEEKING, FOLLOWING, HOMING, RETURNING)
 # why it FAILED
 NO_GRAPH, BLOCKED = "NO_GRAPH", "BLOCKED"
 
-_GRAPH_PERIOD_NS = 300_000_000  # between two graphs while driving
-_LOOKS = 3               # scans before the first graph; graphs that must agree on a meetpoint
-_MOST_LOOKS = 7          # then it is none
+_GRAPH_PERIOD_NS = 300_000_000  # between two graphs
+_LEAST_SCANS = 3         # before the first graph
+_LOOKS = 4               # graphs that must agree on a meetpoint: over a second, people walk on
+_MOST_LOOKS = 9          # then it is none
 _AHEAD_M = 0.4            # of the robot, where its edge is told from others
 _FOOT_M = 0.4            # the line moves by no more from one graph to the next
 _TO_GRAPH_M = 4.0        # the graph may be so far away at the beginning
 _AT_NODE_M = 0.08        # the robot stands at a node
 _ALMOST_M = 0.45         # ... or as near as it gets, if something stands in the way
 _SAME_NODE_M = 0.3       # a node moves by no more from one graph to the next
+_SHORT_EDGE_M = 0.7      # along a longer edge no node follows within
+_SPLIT_M = 0.6           # so much: it would be a part of the one that the robot left
 _BEHIND_M = 1.0          # a node that shows only once the robot is past it
 _DOUBT_M = 0.15          # an obstacle that is further from any wall: look around first
 _BLOCKED_S = 4.0
@@ -94,7 +97,7 @@ class EdgeDriver:
     def __init__(self, p: EdgeDriverParams = EdgeDriverParams()) -> None:
         self._p = p
         self._map, self._at = LocalMap(p.local_map), LocalPose()
-        self._graph_params = replace(p.graph, robot_radius_m=max(p.graph.robot_radius_m - _THICKER_M, 0.05))
+        self._graph_params = replace(p.graph, passage_margin_m=max(p.graph.passage_margin_m - _THICKER_M, 0.0))
         self.reset()
 
     def reset(self) -> None:
@@ -137,6 +140,7 @@ class EdgeDriver:
         self._rank = rank
         self._way = self._node.branches[rank].way_m
         self._trace = Trace(self._node.position_m)
+        self._near_start_m = _SAME_NODE_M if pursuit.length(self._way) < _SHORT_EDGE_M else _SPLIT_M
 
     def go_back(self) -> None:
         """Return to the meetpoint that the robot left last.
@@ -175,12 +179,11 @@ class EdgeDriver:
         self._map.add(scan, self._pose)
         self._scans += 1
         self._points_m = _steady_points(scan, self._pose)
-        every = self._phase == HOMING and self._standing
-        if self._phase in _DRIVING and self._sweep_rad <= 0.0 and (
-                every or self._stamp_ns - self._graph_ns >= _GRAPH_PERIOD_NS or self._graph is None):
+        due = self._stamp_ns - self._graph_ns >= _GRAPH_PERIOD_NS
+        if self._phase in _DRIVING and self._sweep_rad <= 0.0 and (due or self._graph is None):
             self._look()
             self._think()
-        elif self._stamp_ns - self._graph_ns >= _GRAPH_PERIOD_NS:
+        elif due:
             self._graph_ns = self._stamp_ns
             walls = self._map.walls()
             self._at.know(walls)
@@ -248,7 +251,7 @@ class EdgeDriver:
         if self._phase in _DRIVING:
             if self._sweep_rad > 0.0:
                 self._sweep_rad -= turned
-                if self._scans >= _LOOKS:
+                if self._scans >= _LEAST_SCANS:
                     wanted[2] = self._p.limits.max_turn_rad_s
             elif len(self._way) and not self._looking:
                 wanted = self._along_way(pose)
@@ -351,7 +354,11 @@ class EdgeDriver:
         if foot is None:
             return None
         ahead = graph.ahead(foot, there.along)
-        way, node = graph.walk(ahead, self._counts(graph))
+        counts = self._counts(graph)
+        if self._trace is not None and self._node is not None and self._trace.length_m < _BEHIND_M:
+            away = np.hypot(*(graph.graph.position_m - self._node.position_m).T)
+            counts = counts & (away > self._near_start_m)
+        way, node = graph.walk(ahead, counts)
         return np.concatenate([ahead.back_m[:0:-1], way]), node, ahead.back_node
 
     def _join_graph(self, graph: LocalGraph, here: np.ndarray) -> bool:
@@ -381,7 +388,7 @@ class EdgeDriver:
         if self._trace is None or self._node is None:
             return False
         there = graph.graph.position_m[node] - self._node.position_m
-        return float(np.hypot(*there)) < _SAME_NODE_M and self._trace.length_m < 2.0 * _BEHIND_M
+        return float(np.hypot(*there)) < self._near_start_m and self._trace.length_m < 2.0 * _BEHIND_M
 
     def _without_line(self, why: str) -> None:
         if not self._lost_since_ns:
@@ -483,6 +490,7 @@ class EdgeDriver:
         self._way = np.zeros((0, 2))
         self._trace: Optional[Trace] = None
         self._rank = 0
+        self._near_start_m = _SAME_NODE_M
         self._target = np.zeros(2)
         self._looking, self._looks = False, 0
         self._nodes: List[Node] = []

@@ -3,7 +3,7 @@
 A single scan shows a pane only where beams meet it almost at right angles, and what lies behind everywhere else. So
 each cell counts by the direction of the beams how many ended in it and how many passed it, and stands if they end there
 from any one direction: beams that pass a pane at a flat angle do not contradict those that came back from it, beams
-from where others came back do (somebody who walked on). As a robot drives along a pane it sees every piece of it that
+from about where others came back do (somebody who walked on). As a robot drives along a pane it sees every piece of it that
 way, and the piece next to it always: the nearest point of a plane is met at right angles.
 
 Between and beside such pieces there is more of the pane, most likely: they are extended along their line until
@@ -38,7 +38,7 @@ class LocalMapParams:
     resolution_m: float = 0.05       # edge of a cell; that of the atlas' map
     directions: int = 16             # of beams, told apart
     least_ends: int = 2              # beams that must have ended in a cell from one direction ...
-    least_share: float = 0.2         # ... and at least this share of those that came that way
+    least_share: float = 0.15        # ... and at least this share of those that came about that way
     unanswered_m: float = 4.0        # a beam that did not come back proves free space so far at most
     extend_glass_m: float = 0.6      # how far beyond what was seen of it a pane is taken to go on; 0: not
     robot_radius_m: float = 0.22     # where the robot stands there is room for it
@@ -106,9 +106,14 @@ class LocalMap:
 
     def occupied(self) -> np.ndarray:
         """(n, n) bool: something stands there, glass included, as far as it was seen itself."""
-        stands = (self._ended >= self._p.least_ends) & (
-            self._ended >= self._p.least_share * (self._ended.astype(np.float32) + self._passed))
-        return stands.any(axis=0) & ~self._stood
+        likely = np.flatnonzero((self._ended >= self._p.least_ends).any(axis=0))  # few cells: the rest is quick
+        ended, passed = (counts.reshape(self._p.directions, -1)[:, likely].astype(np.int64)
+                         for counts in (self._ended, self._passed))
+        passed += np.roll(passed, 1, axis=0) + np.roll(passed, -1, axis=0)
+        stands = (ended >= self._p.least_ends) & (ended >= self._p.least_share * (ended + passed))
+        occupied = np.zeros(self._size ** 2, bool)
+        occupied[likely] = stands.any(axis=0)
+        return occupied.reshape(self._size, self._size) & ~self._stood
 
     def glass(self) -> np.ndarray:
         """(n, n) bool: of what stands there, what beams passed from elsewhere."""

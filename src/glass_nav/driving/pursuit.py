@@ -55,6 +55,11 @@ def point_at(way_m: np.ndarray, passed_m: float) -> np.ndarray:
     return way_m[-1] + (passed_m - starts[-1]) * last / max(float(np.hypot(*last)), 1e-9)
 
 
+def length(way_m: np.ndarray) -> float:
+    """Of a way (n, 2)."""
+    return float(np.hypot(*np.diff(way_m, axis=0).T).sum())
+
+
 def part(way_m: np.ndarray, from_m: float, to_m: float) -> np.ndarray:
     """(k, 2) the piece of a way (n, 2) between two lengths along it, k >= 2."""
     starts = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way_m, axis=0).T))])

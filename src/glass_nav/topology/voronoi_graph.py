@@ -42,7 +42,8 @@ POINT_CELLS = 1.0         # distance of the points of a line
 @dataclass(frozen=True)
 class VoronoiParams:
     """Lengths in metres. The defaults are for a robot of 0.22 m radius with a lidar good to some centimetres."""
-    robot_radius_m: float = 0.22         # narrower passages and what lies beyond them are not in the graph
+    robot_radius_m: float = 0.22         # narrower passages and what lies beyond them are not in the graph,
+    passage_margin_m: float = 0.04       # nor those with less room than this on each side: no robot drives through them
     smallest_obstacle_m: float = 0.25    # free-standing things that measure less make no meetpoints
     leaf_m: float = 0.3                  # a twig goes when length + r at its end - r at its junction is less than this,
     leaf_share_of_r: float = 0.6         # or less than this times r at its junction
@@ -91,7 +92,7 @@ def build(grid_map: GridMap, params: VoronoiParams = VoronoiParams(),
         step: called STEPS times on the way.
     """
     cell_m = grid_map.resolution_m
-    clearance = max(params.robot_radius_m / cell_m, SEPARATION_CELLS / 2.0)
+    clearance = max((params.robot_radius_m + params.passage_margin_m) / cell_m, SEPARATION_CELLS / 2.0)
     bounds = _bounds(grid_map, clearance, params.smallest_obstacle_m / cell_m)
     step()
     raw = _raw_graph(bounds, clearance)

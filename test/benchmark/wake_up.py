@@ -1,0 +1,265 @@
+#!/usr/bin/env python3
+"""Whole wake-ups without ROS: simulated robots that know nothing find out where they are, and drive a tour.
+
+The parts are those of the nodes: the edge driver with its recovery, the search in the atlas, the filter. A robot is put
+at a random place of a building, seeks a meetpoint, and drives as the votes say until the search is over; then it hands
+its pose over to the filter and drives to nodes of the atlas. Right: CONFIRMED within 0.5 m and 20 degrees of the truth;
+wrong: CONFIRMED elsewhere. A collision is a control step in which the base stood at an obstacle.
+
+    test/benchmark/wake_up.py --opaque --seeds 14        # film on all glass; all buildings, or --buildings A B
+    test/benchmark/wake_up.py --lidars sensitive weak coated --jobs 2
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+from glass_nav.driving import tasks
+from glass_nav.driving.base_limits import BaseLimits
+from glass_nav.driving.edge_driver import Arrival, EdgeDriver, EdgeDriverParams
+from glass_nav.driving.recovery import RecoveryParams
+from glass_nav.driving.route import RoutePlanner
+from glass_nav.driving.route_follower import FollowerParams
+from glass_nav.driving.tasks import EdgeTask, GoTask, Moment, Task
+from glass_nav.geometry import angles, se2
+from glass_nav.localization.glass_mcl import GlassMcl
+from glass_nav.localization.glass_mcl_params import GlassMclParams
+from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings, start_place
+from glass_nav.simulation.simulation import Frame, Simulation
+from glass_nav.topology import atlas_file, shipped_atlases
+from glass_nav.topology.atlas_localizer import CONFIRMED, AtlasLocalizer, Estimate, SearchParams
+
+CONTROL_S = 0.05
+SEARCH_S, LEG_S = 900.0, 120.0   # simulated, at most
+MOST_EDGES = 60
+LEGS = 3
+RIGHT_M, RIGHT_RAD = 0.5, math.radians(20.0)
+START_COVARIANCE = np.diag([0.25 ** 2, 0.25 ** 2, 0.17 ** 2])  # as topology_node hands it over
+LEAST_LEG_M, MOST_LEG_M, LEG_ROOM_M = 4.0, 15.0, 0.45
+
+
+class Job(NamedTuple):
+    """One robot."""
+    building: str
+    lidar: str
+    opaque: bool
+    seed: int
+    verbose: bool
+
+
+class Trial:
+    """One robot in one building."""
+
+    def __init__(self, job: Job) -> None:
+        building = building_file.load(shipped_buildings.find(job.building))
+        building = building.opaque() if job.opaque else building
+        self.grid_map = building_map.draw(building)
+        self.atlas = atlas_file.load(shipped_atlases.find(job.building))
+        start = start_place.random_place(building, np.random.default_rng([job.seed, 1]))
+        self.simulation = Simulation(building, lidar.preset(job.lidar), seed=job.seed, start=start)
+        self.limits = BaseLimits()
+        self.driver = EdgeDriver(EdgeDriverParams(limits=self.limits))
+        self.localizer = AtlasLocalizer(self.atlas, SearchParams())
+        self.rng = np.random.default_rng([job.seed, 2])
+        self.collisions = 0
+        self.map_from_odom: Optional[np.ndarray] = None
+        self.command = np.zeros(3)
+        self.verbose = job.verbose
+        self._last_node = -1
+        self._began_ns = self.simulation.stamp_ns
+
+    @property
+    def now_s(self) -> float:
+        """Simulated time since the start."""
+        return (self.simulation.stamp_ns - self._began_ns) * 1e-9
+
+    def do(self, task: Task, limit_s: float) -> Iterator[Frame]:
+        """Scan by scan, until the task has an outcome or its time is over."""
+        until_s = self.now_s + limit_s
+        while self.now_s < until_s:
+            frame = self.simulation.look()
+            self.driver.see(frame.scan, frame.odom_from_base)
+            yield frame
+            for _ in range(round(self.simulation.scan_period_s / CONTROL_S)):
+                odom_from_base = self.simulation.reading.odom_from_base
+                pose = None if self.map_from_odom is None else se2.compose(self.map_from_odom, odom_from_base)
+                self.command = task.step(Moment(odom_from_base, pose, self.command, CONTROL_S))
+                self.simulation.move(CONTROL_S, self.command)
+                self.collisions += self.simulation.blocked
+            if task.outcome is not None:
+                return
+        task.cancel()
+
+    # -- the search
+
+    def search(self) -> Dict[str, Any]:
+        """Until the search is over."""
+        estimate: Optional[Estimate] = None
+        rank: Optional[int] = None
+        failures: List[str] = []
+        while self.now_s < SEARCH_S:
+            task = EdgeTask(self.driver, RecoveryParams(), self.limits, rank, may_choose=True)
+            for _ in self.do(task, SEARCH_S - self.now_s):
+                pass
+            if task.arrival is None:
+                failures.append("" if task.outcome is None else task.outcome.code)
+                if len(failures) > 5:
+                    break
+                rank = None
+                continue
+            estimate = self._told(task.arrival, rank)
+            if self.verbose:
+                print(f"{self.now_s:7.1f} s depth {estimate.depth} {estimate.state}: {estimate.reason}; rank "
+                      f"{estimate.choice.rank if estimate.choice else '-'}; {self._truth(task.arrival)}", flush=True)
+            if estimate.done or estimate.depth >= MOST_EDGES or estimate.choice is None:
+                break
+            rank = estimate.choice.rank
+        return {"state": "NO_MEETPOINT" if estimate is None else estimate.state, "failures": failures,
+                "edges": -1 if estimate is None else estimate.depth, "search_s": self.now_s,
+                "candidates": -1 if estimate is None else len(estimate.dart), **self._errors(estimate)}
+
+    def _told(self, arrival: Arrival, rank: Optional[int]) -> Estimate:
+        last = self.localizer.estimate
+        if arrival.traversal is None or last is None or last.done:
+            return self.localizer.start(arrival.meetpoint)
+        return self.localizer.update(arrival.traversal, arrival.meetpoint)
+
+    def _truth(self, arrival: Arrival) -> str:
+        """What the meetpoint really is."""
+        at = se2.transform_points(self.simulation.map_from_base, arrival.meetpoint.centre_m)
+        away = np.hypot(*(self.atlas.nodes.position_m - at).T)
+        node = int(away.argmin())
+        return (f"node {node} {away[node]:.2f} m off, degree {arrival.meetpoint.degree} of {self.atlas.degree[node]}, "
+                f"r {arrival.meetpoint.r_m:.2f} of {self.atlas.nodes.r_m[node]:.2f} m{self._edge_truth(arrival, node)}")
+
+    def _edge_truth(self, arrival: Arrival, node: int) -> str:
+        """The edges between the last node and this one that are most like what was driven."""
+        before, self._last_node = self._last_node, node
+        driven = arrival.traversal
+        if driven is None:
+            return ""
+        ends = self.atlas.darts.node.reshape(-1, 2)
+        edges = np.flatnonzero((np.sort(ends, axis=1) == sorted((before, node))).all(axis=1)).tolist()
+        lengths = [f"{self.atlas.edges.length_m[edge]:.2f}/{self.atlas.edges.chord_m[edge]:.2f}" for edge in edges]
+        return (f"; rank {driven.rank} from node {before}, {driven.length_m:.2f}/{driven.chord_m:.2f} m of "
+                f"{' or '.join(lengths) or 'no edge'}")
+
+    def _errors(self, estimate: Optional[Estimate]) -> Dict[str, Any]:
+        truth = self.simulation.map_from_base
+        if estimate is None or estimate.state != CONFIRMED:
+            return {"right": False, "wrong": False, "error_m": math.nan}
+        pose = self.localizer.map_from_base(estimate.dart)[0]
+        off_m = float(np.hypot(*(pose[:2] - truth[:2])))
+        right = off_m < RIGHT_M and abs(float(angles.wrap(pose[2] - truth[2]))) < RIGHT_RAD
+        self.map_from_odom = se2.compose(pose, se2.inverse(self.simulation.reading.odom_from_base))
+        return {"right": right, "wrong": not right, "error_m": off_m}
+
+    # -- the tour
+
+    def tour(self) -> Dict[str, Any]:
+        """To some nodes, while the filter tracks."""
+        mcl = GlassMcl(GlassMclParams(), self.grid_map, self.rng)
+        assert self.map_from_odom is not None
+        mcl.set_pose(se2.compose(self.map_from_odom, self.simulation.reading.odom_from_base), START_COVARIANCE)
+        planner = RoutePlanner(self.atlas, self.limits, self.grid_map)
+        off_m: List[float] = []
+        outcomes = []
+        for node in self._goals(planner):
+            task = GoTask(planner, self.driver, FollowerParams(), RecoveryParams(), self.limits, node)
+            for frame in self.do(task, LEG_S):
+                estimate = mcl.update(frame.scan, frame.odom_from_base)
+                self.map_from_odom = se2.compose(estimate.map_from_base, se2.inverse(frame.odom_from_base))
+                off_m.append(float(np.hypot(*(estimate.map_from_base[:2] - frame.map_from_base[:2]))))
+            outcomes.append("TIME" if task.outcome is None else task.outcome.code)
+        return {"legs": outcomes, "tracking_m": float(np.mean(off_m)) if off_m else math.nan,
+                "tracking_max_m": float(np.max(off_m)) if off_m else math.nan}
+
+    def _goals(self, planner: RoutePlanner) -> Iterator[int]:
+        for _ in range(LEGS):
+            assert self.map_from_odom is not None
+            here = se2.compose(self.map_from_odom, self.simulation.reading.odom_from_base)[:2]
+            for node in self.rng.permutation(len(self.atlas.nodes)).tolist():
+                if self.atlas.nodes.r_m[node] < LEG_ROOM_M:
+                    continue
+                try:
+                    route = planner.to_node(here, node)
+                except ValueError:
+                    continue
+                if LEAST_LEG_M <= route.length_m <= MOST_LEG_M:
+                    yield node
+                    break
+
+
+def run(job: Job) -> Dict[str, Any]:
+    """One robot, from waking up to the end of its tour."""
+    began = time.process_time()
+    trial = Trial(job)
+    found = trial.search()
+    if found["right"]:
+        found.update(trial.tour())
+    return {**job._asdict(), **found, "collisions": trial.collisions, "cpu_s": time.process_time() - began,
+            "all_s": trial.now_s}
+
+
+def line(name: str, runs: List[Dict[str, Any]]) -> str:
+    """One row of the table."""
+    right = [each for each in runs if each["right"]]
+    states = [each["state"] for each in runs if not each["right"]]
+    legs = [leg for each in right for leg in each["legs"]]
+    def mean(key: str) -> str:
+        return f"{np.mean([each[key] for each in right]):.3f}" if right else "-"
+    return (f"| {name} | {len(runs)} | {len(right)} | {sum(each['wrong'] for each in runs)} | "
+            f"{', '.join(f'{states.count(state)} {state}' for state in sorted(set(states))) or '-'} | "
+            f"{np.mean([each['edges'] for each in runs]):.1f} | {np.mean([each['search_s'] for each in runs]):.0f} | "
+            f"{sum(each['collisions'] > 0 for each in runs)} | {mean('error_m')} | {mean('tracking_m')} | "
+            f"{sum(leg == tasks.SUCCEEDED for leg in legs)}/{len(legs)} |")
+
+
+def main() -> None:
+    """Run all, print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--buildings", nargs="+", default=[name for name in shipped_buildings.shipped()])
+    parser.add_argument("--lidars", nargs="+", default=["sensitive"], choices=list(lidar.PRESETS))
+    parser.add_argument("--opaque", action="store_true", help="film on all glass")
+    parser.add_argument("--seeds", type=int, default=2, help="robots in each building with each lidar")
+    parser.add_argument("--first-seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--verbose", action="store_true", help="tell each step")
+    parser.add_argument("--out", type=Path, help="file for all figures, json")
+    arguments = parser.parse_args()
+    jobs = [Job(building, name, arguments.opaque, seed, arguments.verbose)
+            for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
+            for building in arguments.buildings for name in arguments.lidars]
+    runs: List[Dict[str, Any]] = []
+    with ProcessPoolExecutor(arguments.jobs) as pool:
+        for found in pool.map(run, jobs):
+            runs.append(found)
+            print(f"{found['building']} {found['lidar']} seed {found['seed']}: {found['state']}"
+                  f"{', right' if found['right'] else ', WRONG' if found['wrong'] else ''} after {found['edges']} edges, "
+                  f"{found['search_s']:.0f} s; {found['collisions']} collisions; legs {found.get('legs', '-')}, tracking "
+                  f"{found.get('tracking_m', math.nan):.3f} m; failures {found['failures']}; {found['cpu_s']:.0f} s CPU",
+                  file=sys.stderr, flush=True)
+            if arguments.out:
+                arguments.out.write_text(json.dumps(runs, indent=1))
+    print("| building | robots | right | wrong | others | edges | search, s | with a collision | error, m | tracking, m "
+          "| legs |\n|---|---|---|---|---|---|---|---|---|---|---|")
+    for name in arguments.buildings:
+        print(line(name, [each for each in runs if each["building"] == name]))
+    print(line("all", runs))
+
+
+if __name__ == "__main__":
+    main()
