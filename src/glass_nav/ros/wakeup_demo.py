@@ -45,7 +45,8 @@ from glass_nav.topology.observations import turn_name
 RIGHT_M, RIGHT_RAD = 0.5, 0.35  # a pose that is handed over so near is right
 DONE = ("CONFIRMED", "AMBIGUOUS", "LOST")
 LEAST_ROOM_M = 0.5              # around nodes of the tour
-LEAST_LEG_M, MOST_LEG_M = 4.0, 12.0
+LEAST_LEG_M, LEG_M = 2.0, 8.0   # from node to node, at least and about
+LEG_CHOICES = 4                 # nodes of which one is drawn
 
 
 @dataclass(frozen=True)
@@ -237,9 +238,9 @@ class WakeupDemo:
         nodes: List[int] = []
         for _ in range(self._p.tour):
             away_m = np.hypot(*(position - position[at]).T)
-            fits = ((part == part[at]) & (atlas.nodes.r_m > LEAST_ROOM_M) & (away_m > LEAST_LEG_M)
-                    & (away_m < MOST_LEG_M))
-            choices = [node for node in np.flatnonzero(fits).tolist() if node not in nodes]
+            fits = (part == part[at]) & (atlas.nodes.r_m > LEAST_ROOM_M) & (away_m > LEAST_LEG_M)
+            fits[nodes] = False
+            choices = [node for node in np.argsort(np.abs(away_m - LEG_M)).tolist() if fits[node]][:LEG_CHOICES]
             if not choices:
                 break
             at = int(rng.choice(choices))
