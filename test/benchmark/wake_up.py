@@ -37,6 +37,7 @@ from glass_nav.driving.tasks import EdgeTask, GoTask, Moment, Task
 from glass_nav.geometry import angles, se2
 from glass_nav.localization.glass_mcl import GlassMcl
 from glass_nav.localization.glass_mcl_params import GlassMclParams
+from glass_nav.localization.scan_explanation import ScanExplanation
 from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings, start_place
 from glass_nav.simulation.simulation import Frame, Simulation
 from glass_nav.topology import atlas_file, shipped_atlases
@@ -57,6 +58,7 @@ class Job(NamedTuple):
     lidar: str
     opaque: bool
     seed: int
+    judge: bool  # candidates by the scans
     verbose: bool
 
 
@@ -72,7 +74,8 @@ class Trial:
         self.simulation = Simulation(building, lidar.preset(job.lidar), seed=job.seed, start=start)
         self.limits = BaseLimits()
         self.driver = EdgeDriver(EdgeDriverParams(limits=self.limits))
-        self.localizer = AtlasLocalizer(self.atlas, SearchParams())
+        self.localizer = AtlasLocalizer(self.atlas, SearchParams(),
+                                        ScanExplanation(self.grid_map).shares if job.judge else None)
         self.rng = np.random.default_rng([job.seed, 2])
         self.collisions = 0
         self.map_from_odom: Optional[np.ndarray] = None
@@ -214,6 +217,15 @@ def run(job: Job) -> Dict[str, Any]:
             "all_s": trial.now_s}
 
 
+def told(found: Dict[str, Any]) -> str:
+    """One run in one line."""
+    verdict = ", right" if found["right"] else ", WRONG" if found["wrong"] else ""
+    return (f"{found['building']} {found['lidar']} seed {found['seed']}: {found['state']}{verdict} after "
+            f"{found['edges']} edges, {found['search_s']:.0f} s; {found['collisions']} collisions; legs "
+            f"{found.get('legs', '-')}, tracking {found.get('tracking_m', math.nan):.3f} m; failures "
+            f"{found['failures']}; {found['cpu_s']:.0f} s CPU")
+
+
 def line(name: str, runs: List[Dict[str, Any]]) -> str:
     """One row of the table."""
     right = [each for each in runs if each["right"]]
@@ -231,31 +243,28 @@ def line(name: str, runs: List[Dict[str, Any]]) -> str:
 def main() -> None:
     """Run all, print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--buildings", nargs="+", default=[name for name in shipped_buildings.shipped()])
+    parser.add_argument("--buildings", nargs="+", default=list(shipped_buildings.shipped()))
     parser.add_argument("--lidars", nargs="+", default=["sensitive"], choices=list(lidar.PRESETS))
     parser.add_argument("--opaque", action="store_true", help="film on all glass")
     parser.add_argument("--seeds", type=int, default=2, help="robots in each building with each lidar")
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--no-scans", action="store_true", help="candidates are not judged by scans")
     parser.add_argument("--verbose", action="store_true", help="tell each step")
     parser.add_argument("--out", type=Path, help="file for all figures, json")
     arguments = parser.parse_args()
-    jobs = [Job(building, name, arguments.opaque, seed, arguments.verbose)
+    jobs = [Job(building, name, arguments.opaque, seed, not arguments.no_scans, arguments.verbose)
             for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
             for building in arguments.buildings for name in arguments.lidars]
     runs: List[Dict[str, Any]] = []
     with ProcessPoolExecutor(arguments.jobs) as pool:
         for found in pool.map(run, jobs):
             runs.append(found)
-            print(f"{found['building']} {found['lidar']} seed {found['seed']}: {found['state']}"
-                  f"{', right' if found['right'] else ', WRONG' if found['wrong'] else ''} after {found['edges']} edges, "
-                  f"{found['search_s']:.0f} s; {found['collisions']} collisions; legs {found.get('legs', '-')}, tracking "
-                  f"{found.get('tracking_m', math.nan):.3f} m; failures {found['failures']}; {found['cpu_s']:.0f} s CPU",
-                  file=sys.stderr, flush=True)
+            print(told(found), file=sys.stderr, flush=True)
             if arguments.out:
                 arguments.out.write_text(json.dumps(runs, indent=1))
-    print("| building | robots | right | wrong | others | edges | search, s | with a collision | error, m | tracking, m "
-          "| legs |\n|---|---|---|---|---|---|---|---|---|---|---|")
+    print("| building | robots | right | wrong | others | edges | search, s | with a collision | error, m | "
+          "tracking, m | legs |\n|---|---|---|---|---|---|---|---|---|---|---|")
     for name in arguments.buildings:
         print(line(name, [each for each in runs if each["building"] == name]))
     print(line("all", runs))

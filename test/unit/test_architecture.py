@@ -20,9 +20,10 @@ MAY_IMPORT = {
     "driving": "geometry world sensing localization topology",
     "recording": "geometry world sensing",
     "simulation": "geometry world sensing",
+    "checkup": "geometry world sensing localization recording",
     "evaluation": "geometry",
-    "cli": "geometry world sensing localization topology driving recording simulation evaluation",
-    "ros": "geometry world sensing localization topology driving recording simulation evaluation",
+    "cli": "geometry world sensing localization topology driving recording simulation evaluation checkup",
+    "ros": "geometry world sensing localization topology driving recording simulation evaluation checkup",
 }
 FOR_ALL = {"amcl_parameters", "params"}  # modules of no room
 ONLY_BY = {  # compiled modules, each behind its face; and what is heavy, where it is needed

@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import Any, Dict, List, Optional
 
-DONE, USAGE, BAD_INPUT, INTERRUPTED = 0, 2, 3, 130
+DONE, FAILED, USAGE, BAD_INPUT, INTERRUPTED = 0, 1, 2, 3, 130
 
 
 def main(argv: Optional[List[str]] = None) -> int:
@@ -16,18 +16,19 @@ def main(argv: Optional[List[str]] = None) -> int:
         argv: arguments without the program's name; those of the process when not given.
 
     Returns:
-        0 done, 2 wrong usage, 3 bad input (a line on stderr says what), 130 interrupted.
+        0 done, 1 done and found wanting (a limit missed, a fault found), 2 wrong usage, 3 bad input (a line on stderr
+        says what), 130 interrupted.
     """
     try:
-        from glass_nav.cli import atlas, landmarks, replay, simulate
+        from glass_nav.cli import atlas, doctor, landmarks, locate, params, replay, simulate
     except ImportError as err:
         if not str(err.name).startswith("glass_nav"):
             raise
         print(f"glass_nav: {err.name or err} is not there: build the package and source its setup.bash",
               file=sys.stderr)
         return BAD_INPUT
-    modules: Dict[str, Any] = {"atlas": atlas, "landmarks": landmarks, "replay": replay,
-                               "simulate": simulate}  # each: see replay.py
+    modules: Dict[str, Any] = {"atlas": atlas, "doctor": doctor, "landmarks": landmarks, "locate": locate,
+                               "params": params, "replay": replay, "simulate": simulate}  # each: see replay.py
     parser = argparse.ArgumentParser(prog="glass_nav", description="Localization in buildings of glass: offline tools.")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     commands.required = True  # as an attribute: the argument came with Python 3.7 only for some callers
@@ -47,14 +48,13 @@ def _run(program: str, module: Any, arguments: argparse.Namespace) -> int:
         print(f"{program}: {wrong}", file=sys.stderr)
         return USAGE
     try:
-        module.main(arguments)
+        return DONE if module.main(arguments) is not False else FAILED
     except (ValueError, OSError) as err:  # RecordingError, MapError, ParamError and others are ValueErrors
         print(f"{program}: {_one_line(err)}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
         print(f"{program}: interrupted, nothing written", file=sys.stderr)
         return INTERRUPTED
-    return DONE
 
 
 def _one_line(err: Exception) -> str:

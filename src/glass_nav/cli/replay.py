@@ -11,13 +11,14 @@ from typing import Any, Callable, Dict, List, Optional, Tuple
 import numpy as np
 
 from glass_nav import params
-from glass_nav.cli import replay_params, replay_run
+from glass_nav.cli import replay_bag, replay_params, replay_run
 from glass_nav.cli.progress import Progress
 from glass_nav.cli.replay_params import Frames, ReplayParams
 from glass_nav.cli.replay_run import Window
-from glass_nav.evaluation import pictures, replay_result
+from glass_nav.evaluation import pictures, replay_result, thresholds
 from glass_nav.evaluation.case_scores import CASE_NAMES, NEAR_M
 from glass_nav.evaluation.replay_result import ReplayResult
+from glass_nav.evaluation.thresholds import Threshold
 from glass_nav.localization.glass_mcl import GlassMcl
 from glass_nav.localization.start_pose import StartPose
 from glass_nav.recording.log_file import open_log
@@ -34,9 +35,16 @@ simulated ones do, also the scores of the cases and cases.png. Needs no roscore.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the subcommand."""
-    parser.add_argument("log", metavar="LOG", type=Path, help="ROS bag, or MRPT .rawlog")
+    parser.add_argument("log", metavar="LOG", type=Path, nargs="+",
+                        help="bag of ROS 1 or ROS 2, or MRPT .rawlog; several bags: the parts of one run")
     parser.add_argument("--map", required=True, type=Path, help="map_server .yaml, or MRPT .gridmap[.gz]")
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for the results")
+    parser.add_argument("--bag", type=Path, metavar="BAG",
+                        help="also write a bag for rviz and PlotJuggler: map, tf, scans, poses, particles, status, "
+                             "cases, cloud and glass map, on the topics of the node")
+    parser.add_argument("--fail-if", action="append", default=[], metavar="METRIC>LIMIT",
+                        help="exit with 1 if a figure of metrics.json is beyond a limit, such as 'position_p95_m>0.3'; "
+                             "may be repeated")
     parser.add_argument("--ground-truth", metavar="TOPIC_OR_FILE",
                         help="poses in the map: a PoseStamped, PoseWithCovarianceStamped or Odometry topic, a TUM "
                              "file, or MRPT's _GT.txt; default: /ground_truth of a bag, LOG_GT.txt beside a "
@@ -79,13 +87,17 @@ def usage_error(arguments: argparse.Namespace) -> Optional[str]:
         return "--global and --initial-pose exclude each other"
     try:
         _window(arguments)
+        _thresholds(arguments)
     except ValueError as err:
         return str(err)
     return None
 
 
-def main(arguments: argparse.Namespace) -> None:
+def main(arguments: argparse.Namespace) -> bool:
     """Open, run, write.
+
+    Returns:
+        whether the run keeps to the limits of --fail-if.
 
     Raises:
         RecordingError, MapError, ParamError, ValueError, OSError: bad input; one line.
@@ -105,10 +117,15 @@ def main(arguments: argparse.Namespace) -> None:
     window = _window(arguments)
     progress = Progress("replay", window.expected(len(recording)))
     try:
-        result = replay_run.run(recording, mcl, start, arguments.seed, window, progress.step)
+        if arguments.bag is None:
+            result = replay_run.run(recording, mcl, start, arguments.seed, window, progress.step)
+        else:
+            arguments.bag.parent.mkdir(parents=True, exist_ok=True)
+            with replay_bag.listener(arguments.bag, recording, mcl, grid_map) as listen:
+                result = replay_run.run(recording, mcl, start, arguments.seed, window, progress.step, listen)
     finally:
         progress.finish()
-    about = {"log": str(arguments.log), "map": str(arguments.map), "start": origin, "notes": notes,
+    about = {"log": " ".join(map(str, arguments.log)), "map": str(arguments.map), "start": origin, "notes": notes,
              "params": params.as_mapping(settings.mcl), "versions": versions()}
     replay_result.write(result, arguments.out, about)
     glass = GridMap(mcl.glass_map.occupancy(), grid_map.resolution_m, grid_map.map_from_grid)
@@ -121,7 +138,12 @@ def main(arguments: argparse.Namespace) -> None:
     for reason, count in result.refusals.most_common():
         _say(f"{count} scans refused: {reason}")
     print(table(result))
-    print(f"written to {arguments.out}")
+    print(f"written to {arguments.out}" + ("" if arguments.bag is None else f" and {arguments.bag}"))
+    metrics = result.metrics()
+    failures = [failure for failure in (each.failure(metrics) for each in _thresholds(arguments)) if failure]
+    for failure in failures:
+        _say(failure)
+    return not failures
 
 
 def versions() -> Dict[str, str]:
@@ -177,6 +199,10 @@ def _figure(value: Optional[float], digits: int = 3) -> str:
 
 def _metres(value: Optional[float]) -> str:
     return "infinite" if value is None else f"{value:.3f} m"
+
+
+def _thresholds(arguments: argparse.Namespace) -> List[Threshold]:
+    return [thresholds.parse(text) for text in arguments.fail_if]
 
 
 def _window(arguments: argparse.Namespace) -> Window:

@@ -14,7 +14,7 @@ from glass_nav.evaluation.case_scores import CaseScores, SurfaceScores
 from glass_nav.evaluation.replay_result import NO_BEAM, BeamExample, ReplayResult
 from glass_nav.geometry import se2
 from glass_nav.localization.glass_mcl import Estimate, GlassMcl
-from glass_nav.recording.recording import BeamTruth, Entry, Recording, RecordingError, Refusal
+from glass_nav.recording.recording import BeamTruth, Entry, Recording, RecordingError, Refusal, Step
 from glass_nav.sensing.scan import Scan, ScanError
 
 EXAMPLES = 3  # scans whose beams are kept for the picture, spread over the log
@@ -69,7 +69,8 @@ class Window:
 
 
 def run(recording: Recording, mcl: GlassMcl, start: Callable[[int], None], seed: int,
-        window: Optional[Window] = None, step_done: Callable[[], None] = lambda: None) -> ReplayResult:
+        window: Optional[Window] = None, step_done: Callable[[], None] = lambda: None,
+        listen: Callable[[Step, Estimate], None] = lambda step, estimate: None) -> ReplayResult:
     """Replay a recording.
 
     Args:
@@ -79,6 +80,7 @@ def run(recording: Recording, mcl: GlassMcl, start: Callable[[int], None], seed:
         seed: what the filter's random numbers were seeded with; for the result.
         window: the part of the log, all of it when not given.
         step_done: called after each scan.
+        listen: called with each scan that the filter took, and what it said of it.
 
     Raises:
         RecordingError: not one scan of the log can be used.
@@ -99,6 +101,7 @@ def run(recording: Recording, mcl: GlassMcl, start: Callable[[int], None], seed:
                 estimate = mcl.update(entry.scan, entry.odom_from_base)
                 cpu_ms = 1e3 * (time.process_time() - before)
                 rows.append(_Row(entry.odom_from_base, estimate, cpu_ms, scores.take(entry.scan, estimate)))
+                listen(entry, estimate)
             except ScanError as err:
                 refusals[str(err).partition(": ")[2]] += 1
         step_done()

@@ -19,13 +19,14 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from glass_nav.driving import braking, edge_report, pursuit
+from glass_nav.driving import braking, edge_report, pursuit, velocity
 from glass_nav.driving.base_limits import BaseLimits
 from glass_nav.driving.edge_report import Node, Trace
 from glass_nav.driving.local_graph import LocalGraph
 from glass_nav.driving.local_pose import LocalPose
 from glass_nav.driving.local_map import LocalMap, LocalMapParams
-from glass_nav.geometry import angles, se2
+from glass_nav.geometry import angles, polyline, se2
+from glass_nav.geometry.polyline import Polyline
 from glass_nav.sensing.scan import Scan
 from glass_nav.topology.observations import Meetpoint, Traversal, refuse_rank
 from glass_nav.topology.voronoi_graph import VoronoiParams
@@ -44,6 +45,9 @@ _DRIVING = (SEEKING, FOLLOWING, HOMING, RETURNING)
 # why it FAILED
 NO_GRAPH, BLOCKED = "NO_GRAPH", "BLOCKED"
 
+_LOOKAHEAD_M = 0.35
+_TURN_FIRST_RAD = 0.7    # a point further to the side is turned to on the spot
+_AT_END_M = 0.02
 _GRAPH_PERIOD_NS = 300_000_000  # between two graphs
 _LEAST_SCANS = 3         # before the first graph
 _LOOKS = 4               # graphs that must agree on a meetpoint: over a second, people walk on
@@ -94,6 +98,25 @@ class Progress:
 class EdgeDriver:
     """see() every scan, ask for a command() at every control step; seek(), leave(), go_back() and stop() say what."""
 
+    # Of what it does just now; _begin() sets them all.
+    _phase: str
+    _reason: str
+    _failure: str
+    _way: Optional[Polyline]       # that it drives along; None: none known yet
+    _trace: Optional[Trace]        # of the edge so far; None: no edge that began at a meetpoint
+    _rank: int                     # by which the edge left
+    _near_start_m: float           # nodes so near to its beginning are that
+    _target: np.ndarray            # (2,) the node that it homes to
+    _looking: bool                 # it stands there, or brakes, and looks
+    _looks: int                    # graphs since then
+    _nodes: List[Node]             # what was there in these
+    _dismissed: List[np.ndarray]   # (2,) places that turned out to be no nodes
+    _swept: bool                   # it has turned round once to see more
+    _sweep_rad: float              # what is left of that turn
+    _yaw: float                    # at the last command
+    _blocked_s: float
+    _lost_since_ns: int            # no graph has had its line since then; 0: the last one has
+
     def __init__(self, p: EdgeDriverParams = EdgeDriverParams()) -> None:
         self._p = p
         self._map, self._at = LocalMap(p.local_map), LocalPose()
@@ -108,6 +131,7 @@ class EdgeDriver:
         self._graph: Optional[LocalGraph] = None
         self._graph_ns = 0
         self._scans = 0
+        self._scan: Optional[Scan] = None   # the last one
         self._points_m = np.zeros((0, 2))   # of the last scan, in odom
         self._walls_m = np.zeros((0, 2))    # of the local map near the robot, in odom
         self._pose = np.zeros(3)
@@ -115,7 +139,7 @@ class EdgeDriver:
         self._velocity = np.zeros(3)
         self._node: Optional[Node] = None   # where it stands, or began
         self._arrival: Optional[Arrival] = None
-        self._halted: Optional[Tuple[str, Optional[Trace], int, np.ndarray]] = None
+        self._halted: Optional[Tuple[str, Optional[Trace], int, Optional[Polyline]]] = None
         self._begin(IDLE, "nothing to do")
 
     # -- what to do
@@ -138,9 +162,10 @@ class EdgeDriver:
         refuse_rank(rank, self._node.degree)
         self._begin(FOLLOWING, f"along edge {rank} of {self._node.degree}")
         self._rank = rank
-        self._way = self._node.branches[rank].way_m
+        self._way = _line(self._node.branches[rank].way_m)
         self._trace = Trace(self._node.position_m)
-        self._near_start_m = _SAME_NODE_M if pursuit.length(self._way) < _SHORT_EDGE_M else _SPLIT_M
+        short = self._way is None or self._way.length < _SHORT_EDGE_M
+        self._near_start_m = _SAME_NODE_M if short else _SPLIT_M
 
     def go_back(self) -> None:
         """Return to the meetpoint that the robot left last.
@@ -153,7 +178,7 @@ class EdgeDriver:
         self._trace.cut_back(self._pose[:2])
         way = np.concatenate([self._pose[None, :2], self._trace.way_m[::-1]])
         self._begin(RETURNING, "back to the meetpoint that it left")
-        self._way = way
+        self._way = _line(way)
 
     def stop(self) -> None:
         """Stand, whatever was asked for. resume() goes on with it, seek() begins anew, go_back() returns."""
@@ -178,6 +203,7 @@ class EdgeDriver:
         self._pose, self._stamp_ns = self._at.correct(scan, odom_from_base), scan.stamp_ns
         self._map.add(scan, self._pose)
         self._scans += 1
+        self._scan = scan
         self._points_m = _steady_points(scan, self._pose)
         due = self._stamp_ns - self._graph_ns >= _GRAPH_PERIOD_NS
         if self._phase in _DRIVING and self._sweep_rad <= 0.0 and (due or self._graph is None):
@@ -217,7 +243,7 @@ class EdgeDriver:
     @property
     def way_m(self) -> np.ndarray:
         """(n, 2) that it drives along, in odom; n = 0: none."""
-        return self._way
+        return np.zeros((0, 2)) if self._way is None else self._way.points
 
     def local_from_base(self, odom_from_base: np.ndarray) -> np.ndarray:
         """(3,) pose of the robot in the frame of map, graph and way, which is odom without its drift."""
@@ -253,28 +279,32 @@ class EdgeDriver:
                 self._sweep_rad -= turned
                 if self._scans >= _LEAST_SCANS:
                     wanted[2] = self._p.limits.max_turn_rad_s
-            elif len(self._way) and not self._looking:
-                wanted = self._along_way(pose)
+            elif self._way is not None and not self._looking:
+                wanted = self._along_way(self._way, pose)
                 safe = braking.allowed(wanted, self._obstacles_at(pose), self._p.limits)
                 self._note_blocked(wanted, safe, dt_s)
                 wanted = safe
-        self._velocity = pursuit.accelerated(self._velocity, wanted, dt_s, self._p.limits)
-        if wanted[0] < self._velocity[0]:  # brakes harder than it speeds up
-            self._velocity[0] = max(wanted[0], self._velocity[0] - self._p.limits.max_acceleration_m_s2 * dt_s)
-        return self._velocity.copy()
+        command = velocity.limited(wanted, self._velocity, self._p.limits, dt_s)
+        if wanted[0] < command[0]:  # brakes twice as hard as it speeds up
+            most = 2.0 * self._p.limits.max_acceleration_m_s2 * dt_s
+            command[0] = max(float(wanted[0]), float(self._velocity[0]) - most)
+        self._velocity = command
+        return command.copy()
 
-    def _along_way(self, pose: np.ndarray) -> np.ndarray:
-        foot = pursuit.foot(self._way, pose[:2])
-        if self._phase == HOMING and float(np.hypot(*(pose[:2] - self._target))) < _AT_NODE_M:
-            self._begin_looking()
-            return np.zeros(3)
-        if foot.remaining_m < 0.02:
+    def _along_way(self, way: Polyline, pose: np.ndarray) -> np.ndarray:
+        passed_m = way.nearest(pose[:2])
+        at_node = self._phase == HOMING and float(np.hypot(*(pose[:2] - self._target))) < _AT_NODE_M
+        if at_node or way.length - passed_m < _AT_END_M:
             if self._phase == HOMING:
                 self._begin_looking()
             elif self._phase == RETURNING:
                 self._begin(ARRIVED, "back at the meetpoint that it left")
             return np.zeros(3)
-        return pursuit.velocity(self._way, foot.passed_m, pose, self._p.limits)
+        ahead = se2.transform_points(se2.inverse(pose), way.at(passed_m + _LOOKAHEAD_M))
+        bearing = math.atan2(ahead[1], ahead[0])
+        if abs(bearing) > _TURN_FIRST_RAD:
+            return pursuit.on_the_spot(bearing, self._p.limits)
+        return pursuit.along_arc(ahead, self._p.limits, way.length - passed_m)
 
     def _note_blocked(self, wanted: np.ndarray, safe: np.ndarray, dt_s: float) -> None:
         stuck = wanted[0] > 0.02 and safe[0] < 0.03
@@ -283,13 +313,14 @@ class EdgeDriver:
                 np.hypot(*(self._pose[:2] - self._target))) < _ALMOST_M:
             self._begin_looking()
         elif self._blocked_s > _BLOCKED_S:
-            ahead = pursuit.foot(self._way, self._pose[:2])
-            if self._phase == FOLLOWING and ahead.remaining_m < _ALMOST_M:
-                self._home(self._way[-1])
+            assert self._way is not None
+            remaining_m = self._way.length - self._way.nearest(self._pose[:2])
+            if self._phase == FOLLOWING and remaining_m < _ALMOST_M:
+                self._home(self._way.points[-1], self._way.points)
                 self._begin_looking()
             else:
-                self._fail(BLOCKED, f"something stands in the way, {ahead.remaining_m:.1f} m before the end of what is "
-                                    "seen of the edge")
+                self._fail(BLOCKED, f"something stands in the way, {remaining_m:.1f} m before the end of what is seen "
+                                    "of the edge")
 
     # -- thinking, once for each graph
 
@@ -319,47 +350,47 @@ class EdgeDriver:
     def _follow(self) -> None:
         graph, here = self._graph, self._pose[:2]
         assert graph is not None
-        if not len(self._way):
+        if self._way is None:
             if not self._join_graph(graph, here):
                 self._without_line("no edge is near that can be reached straight on")
             return
-        found = self._line_now(graph, here)
+        found = self._line_now(graph, self._way, here)
         if found is None:
             self._without_line("the edge is no longer seen")
             return
         self._lost_since_ns = 0
         way, node, behind = found
-        on_way = pursuit.foot(way, here)
-        position = graph.graph.position_m
-        if on_way.passed_m < _BEHIND_M and self._counts(graph)[behind] and not self._is_start(graph, behind):
+        passed_m, position = way.nearest(here), graph.graph.position_m
+        if passed_m < _BEHIND_M and self._counts(graph)[behind] and not self._is_start(graph, behind):
             if self._trace is not None:
                 self._trace.cut_back(position[behind])
-            self._home(position[behind], pursuit.part(way, 0.0, on_way.passed_m)[::-1])
+            self._home(position[behind], way.part(passed_m, 0.0))
             return
-        if self._trace is not None and on_way.passed_m > 0.0:
-            self._trace.add(on_way.at_m)
+        if self._trace is not None and passed_m > 0.0:
+            self._trace.add(way.at(passed_m))
         self._way = way
-        if on_way.remaining_m < 2.0 * pursuit.LOOKAHEAD_M and not self._is_start(graph, node):
-            self._home(position[node], pursuit.part(way, on_way.passed_m, math.inf))
+        if way.length - passed_m < 2.0 * _LOOKAHEAD_M and not self._is_start(graph, node):
+            self._home(position[node], way.part(passed_m, way.length))
 
-    def _line_now(self, graph: LocalGraph, here: np.ndarray) -> Optional[Tuple[np.ndarray, int, int]]:
+    def _line_now(self, graph: LocalGraph, way: Polyline, here: np.ndarray) -> Optional[Tuple[Polyline, int, int]]:
         """The edge that the robot follows as the graph has it now: its line, the node ahead and the one behind.
 
         Looked up a little ahead of the robot: beside a node all its edges are near.
         """
-        passed = pursuit.foot(self._way, here)
-        at = passed.passed_m + min(_AHEAD_M, 0.5 * passed.remaining_m)
-        there = pursuit.foot(self._way, pursuit.point_at(self._way, at), at, 0.0)
-        foot = graph.foot(there.at_m, _FOOT_M, there.along)
+        passed_m = way.nearest(here)
+        at = passed_m + min(_AHEAD_M, 0.5 * (way.length - passed_m))
+        along = way.direction(at)
+        foot = graph.foot(way.at(at), _FOOT_M, along)
         if foot is None:
             return None
-        ahead = graph.ahead(foot, there.along)
+        ahead = graph.ahead(foot, along)
         counts = self._counts(graph)
         if self._trace is not None and self._node is not None and self._trace.length_m < _BEHIND_M:
             away = np.hypot(*(graph.graph.position_m - self._node.position_m).T)
             counts = counts & (away > self._near_start_m)
-        way, node = graph.walk(ahead, counts)
-        return np.concatenate([ahead.back_m[:0:-1], way]), node, ahead.back_node
+        onward, node = graph.walk(ahead, counts)
+        line = _line(np.concatenate([ahead.back_m[:0:-1], onward]))
+        return None if line is None else (line, node, ahead.back_node)
 
     def _join_graph(self, graph: LocalGraph, here: np.ndarray) -> bool:
         foot = graph.foot(here, _TO_GRAPH_M)
@@ -370,9 +401,8 @@ class EdgeDriver:
         for along in (heading, -heading):
             way, node = graph.walk(graph.ahead(foot, along), self._counts(graph))
             doubtful = graph.graph.doubt_m[node] > _DOUBT_M
-            ways.append((doubtful, float(np.hypot(*np.diff(way, axis=0).T).sum()) if len(way) > 1 else 0.0, way))
-        _, _, way = min(ways, key=lambda found: found[:2])
-        self._way = np.concatenate([here[None], way])
+            ways.append((doubtful, len(way), way))  # its points are evenly apart
+        self._way = _line(np.concatenate([here[None], min(ways, key=lambda found: found[:2])[2]]))
         self._reason = "to the nearest meetpoint"
         return True
 
@@ -401,10 +431,12 @@ class EdgeDriver:
 
     # -- homing
 
-    def _home(self, target_m: np.ndarray, way_m: Optional[np.ndarray] = None) -> None:
+    def _home(self, target_m: np.ndarray, way_m: np.ndarray) -> None:
         self._phase, self._reason = HOMING, "to the meetpoint"
         self._target = np.array(target_m, float)
-        self._way = np.stack([self._pose[:2], target_m]) if way_m is None or len(way_m) < 2 else way_m
+        self._way = _line(way_m)
+        if self._way is None:
+            self._way = _line(np.stack([self._pose[:2], target_m]))
         self._blocked_s = 0.0
         self._looking, self._looks, self._nodes = False, 0, []
 
@@ -427,13 +459,16 @@ class EdgeDriver:
             return
         self._looks = 0
         self._target = graph.graph.position_m[node]
-        found = self._line_now(graph, self._pose[:2])
+        here, way = self._pose[:2], self._way
+        assert way is not None
+        found = self._line_now(graph, way, here)
         if found is not None and found[1] == node:
-            self._way = found[0]
+            way = found[0]
         else:
-            self._way = np.concatenate([self._way[:-1], self._target[None]])
+            way = _line(np.concatenate([way.points[:-1], self._target[None]])) or way
+        self._way = way
         if self._trace is not None:
-            self._trace.add(pursuit.foot(self._way, self._pose[:2]).at_m)
+            self._trace.add(way.at(way.nearest(here)))
 
     def _look_again(self) -> None:
         if not self._standing:
@@ -478,8 +513,8 @@ class EdgeDriver:
         driven = None
         if self._trace is not None:
             driven = edge_report.traversal(self._trace.line_m(node.position_m), self._rank, self._grid)
-        self._arrival = Arrival(self._stamp_ns, self._pose, edge_report.meetpoint(node, self._pose, self._stamp_ns),
-                                driven)
+        seen = replace(edge_report.meetpoint(node, self._pose, self._stamp_ns), scan=self._scan)
+        self._arrival = Arrival(self._stamp_ns, self._pose, seen, driven)
         self._node = node
         self._begin(ARRIVED, f"at a meetpoint of degree {node.degree}, {node.r_m:.2f} m from its obstacles")
 
@@ -487,14 +522,12 @@ class EdgeDriver:
 
     def _begin(self, phase: str, reason: str) -> None:
         self._phase, self._reason, self._failure = phase, reason, ""
-        self._way = np.zeros((0, 2))
-        self._trace: Optional[Trace] = None
+        self._way, self._trace = None, None
         self._rank = 0
         self._near_start_m = _SAME_NODE_M
         self._target = np.zeros(2)
         self._looking, self._looks = False, 0
-        self._nodes: List[Node] = []
-        self._dismissed: List[np.ndarray] = []
+        self._nodes, self._dismissed = [], []
         self._swept = False
         self._sweep_rad = 0.0
         self._yaw = float(self._pose[2])
@@ -514,6 +547,12 @@ class EdgeDriver:
         trace = self._trace
         self._begin(phase, reason)
         self._trace = trace
+
+
+def _line(points_m: np.ndarray) -> Optional[Polyline]:
+    """The line through points (n, 2); None if they are all one."""
+    points = polyline.distinct(points_m)
+    return Polyline(points) if len(points) > 1 else None
 
 
 def _steady_points(scan: Scan, local_from_base: np.ndarray) -> np.ndarray:

@@ -1,10 +1,10 @@
 """Scans, odometry -> a small grid of what is around the robot, in which glass stands.
 
 A single scan shows a pane only where beams meet it almost at right angles, and what lies behind everywhere else. So
-each cell counts by the direction of the beams how many ended in it and how many passed it, and stands if they end there
-from any one direction: beams that pass a pane at a flat angle do not contradict those that came back from it, beams
-from about where others came back do (somebody who walked on). As a robot drives along a pane it sees every piece of it that
-way, and the piece next to it always: the nearest point of a plane is met at right angles.
+each cell counts by the direction of the beams how many ended in it and how many passed it, and stands if they end
+there from any one direction: beams that pass a pane at a flat angle do not contradict those that came back from it,
+beams from about where others came back do (somebody who walked on). As a robot drives along a pane it sees every
+piece of it that way, and the piece next to it always: the nearest point of a plane is met at right angles.
 
 Between and beside such pieces there is more of the pane, most likely: they are extended along their line until
 something stands there, or beams have passed there about as directly as they would have to to be sent back.

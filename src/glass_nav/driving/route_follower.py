@@ -12,15 +12,13 @@ from typing import Optional
 
 import numpy as np
 
-from glass_nav.driving import velocity
+from glass_nav.driving import pursuit
 from glass_nav.driving.base_limits import BaseLimits
-from glass_nav.geometry import polyline
+from glass_nav.geometry import polyline, se2
 from glass_nav.geometry.polyline import Polyline
 
 TURN_FIRST_RAD = 0.8   # a point farther off to the side is turned to on the spot ...
 TURNED_RAD = 0.1       # ... until it is so near
-CREEP_M_S = 0.03       # so that braking arrives
-LATERAL_M_S2 = 0.3     # slower in bends
 
 
 @dataclass(frozen=True)
@@ -81,16 +79,12 @@ class RouteFollower:
         return self._pursuit(ahead - position, yaw)
 
     def _pursuit(self, to_point: np.ndarray, yaw: float) -> np.ndarray:
-        distance_m = max(float(np.hypot(*to_point)), 1e-6)
-        bearing = math.remainder(math.atan2(to_point[1], to_point[0]) - yaw, 2.0 * math.pi)
+        ahead = se2.transform_points(np.array([0.0, 0.0, -yaw]), to_point)
+        bearing = math.atan2(ahead[1], ahead[0])
         self._turning = abs(bearing) > (TURNED_RAD if self._turning else TURN_FIRST_RAD)
         if self._turning:
-            return np.array([0.0, 0.0, self._turn(bearing)])
-        curvature = 2.0 * math.sin(bearing) / distance_m
-        bend = max(abs(curvature), 1e-6)
-        speed = min(self._limits.max_speed_m_s, self._limits.max_turn_rad_s / bend, math.sqrt(LATERAL_M_S2 / bend),
-                    velocity.braking_speed(self.remaining_m, self._limits.max_acceleration_m_s2) + CREEP_M_S)
-        return np.array([speed, 0.0, speed * curvature])
+            return pursuit.on_the_spot(bearing, self._limits)
+        return pursuit.along_arc(ahead, self._limits, self.remaining_m)
 
     def _final_turn(self, yaw: float) -> np.ndarray:
         if self._final_yaw_rad is None:
@@ -98,9 +92,4 @@ class RouteFollower:
             return np.zeros(3)
         off = math.remainder(self._final_yaw_rad - yaw, 2.0 * math.pi)
         self.done = self.done or abs(off) < self._p.goal_tolerance_rad
-        return np.zeros(3) if self.done else np.array([0.0, 0.0, self._turn(off)])
-
-    def _turn(self, angle_rad: float) -> float:
-        """Turn rate that can still be braked within the angle."""
-        rate = velocity.braking_speed(abs(angle_rad), self._limits.max_turn_acceleration_rad_s2) + CREEP_M_S
-        return math.copysign(min(rate, self._limits.max_turn_rad_s), angle_rad)
+        return np.zeros(3) if self.done else pursuit.on_the_spot(off, self._limits)

@@ -65,6 +65,29 @@ def fit(points: np.ndarray) -> np.ndarray:
     return np.concatenate([centre + along.min() * direction, centre + along.max() * direction])
 
 
+def weighted_fit(points: np.ndarray, variance: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """As fit(), each point with the variance (N,) of its distance from the line.
+
+    Returns:
+        (4,) the segment, and the covariance (2, 2) of its line's heading [rad] and offset, the offset being the
+        coordinate of the line along its normal to the left: errors of the points are independent, and the line turns
+        about their weighted centre.
+    """
+    weight = 1.0 / variance
+    total = float(weight.sum())
+    centre = weight @ points / total
+    x, y = (points - centre).T
+    angle = 0.5 * np.arctan2(2.0 * (weight @ (x * y)), weight @ (x * x - y * y))
+    direction = np.array([np.cos(angle), np.sin(angle)])
+    if (points[-1] - points[0]) @ direction < 0.0:
+        direction = -direction
+    along = (points - centre) @ direction
+    turn = np.array([1.0, -(direction @ centre)])  # of heading and offset, by a turn about the centre
+    spread = max(float(weight @ along**2), 1e-300)
+    covariance = np.outer(turn, turn) / spread + np.diag([0.0, 1.0 / total])
+    return np.concatenate([centre + along.min() * direction, centre + along.max() * direction]), covariance
+
+
 def _line(points: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """A point (2,) and the direction (2,) of the line through points, from the first to the last."""
     centre = points.mean(axis=0)

@@ -7,7 +7,7 @@ the beams that are understood. GlassMcl.update() reads as the document does.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Dict, List, Optional, Set, Tuple
 
 import numpy as np
@@ -25,6 +25,7 @@ from glass_nav.localization.range_residuals import RangeResiduals
 from glass_nav.localization.reference_ranges import LEAST_COS, ReferenceRanges
 from glass_nav.localization.scan_alignment import Alignment
 from glass_nav.localization.scan_anchor import ScanAnchor
+from glass_nav.localization.segment_polish import SegmentPolish
 from glass_nav.localization.surface_scan import SurfaceScan
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
@@ -113,6 +114,7 @@ class GlassMcl:
             self._search = self._new_search() if grid_map.free.any() else None
         self._residuals = RangeResiduals(0.5, self._params.mixture.laser_sigma_hit)
         self._glass_map = GlassMap(grid_map, self._params.glass)
+        self._polish = SegmentPolish(grid_map) if self._params.polish.polish_with_segments else None
         self._up_to_date = set()
 
     def reconfigure(self, params: GlassMclParams) -> None:
@@ -124,6 +126,10 @@ class GlassMcl:
         self._watch.decide_by(params.search)
         if self._search is not None:
             self._search.decide_by(params.search)
+        if not params.polish.polish_with_segments:
+            self._polish = None
+        elif self._polish is None:
+            self._polish = SegmentPolish(self._grid_map)
         self._params = params
 
     @property
@@ -250,6 +256,9 @@ class GlassMcl:
         """The scan places the particles, and the best cluster of them is the pose."""
         cases = self._correct(scan, predicted, odom_from_base)
         self._best = pose_estimate.of(self._particles, self._weights)
+        if self._polish is not None and self._is_one_place(self._best):
+            ends_m = scan.points_in_base()[beam_weights.known_ends(cases.case)]
+            self._best = replace(self._best, map_from_base=self._polish.pose(self._best, ends_m))
         self._resample()
         return cases
 

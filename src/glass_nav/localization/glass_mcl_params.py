@@ -16,6 +16,7 @@ from glass_nav.localization.pose_quality import QualityLimits
 from glass_nav.localization.preliminary_samples import PreliminarySamples
 from glass_nav.localization.proposal import Proposal
 from glass_nav.localization.resampling import ParticleCount
+from glass_nav.localization.segment_polish import Polish
 
 
 @dataclass(frozen=True)
@@ -66,3 +67,4 @@ class GlassMclParams:
     quality: QualityLimits = field(default_factory=QualityLimits)
     search: SearchParams = field(default_factory=SearchParams)
     bearings: BearingMixture = field(default_factory=BearingMixture)
+    polish: Polish = field(default_factory=Polish)

@@ -1,7 +1,8 @@
-"""A bag -> Recording, through rosbags: no ROS needed, and the same for its versions 0.9.23 and later.
+"""A bag of ROS 1 or ROS 2 -> Recording, through rosbags: no ROS needed, and the same for its versions 0.9.23 and later.
 
 The bag is read twice: first everything but the scans (small), then scan by scan while the replay runs,
-so that a long log does not have to fit into memory.
+so that a long log does not have to fit into memory. Several bags of ROS 1 are read as the one run that `rosbag
+record --split` cut them from: merged by the time of recording.
 """
 
 from __future__ import annotations
@@ -10,12 +11,12 @@ import itertools
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Optional, Tuple
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
 from glass_nav.geometry.trajectory import Trajectory
-from glass_nav.recording import frames, trajectory_file
+from glass_nav.recording import frames, messages, trajectory_file
 from glass_nav.recording.frames import FrameError, FrameTree, Transform
 from glass_nav.recording.recording import (BeamTruth, Entry, LogOptions, Recording, RecordingError, Refusal, Step,
                                            trajectory_from_samples)
@@ -32,14 +33,17 @@ BASE_FRAMES = ("base_link", "base_footprint")  # tried in this order when no bas
 LEVEL = math.cos(math.radians(20.0))  # a scan plane tilted further does not show the plan of a floor
 
 
-def open_log(path: Path, options: LogOptions) -> Recording:
+def open_log(paths: Sequence[Path], options: LogOptions) -> Recording:
     """The recorded robot.
+
+    Args:
+        paths: one bag, or all parts of a run that was recorded in parts, in any order.
 
     Raises:
         RecordingError: not a whole bag, or a topic or transform that is needed is missing.
     """
     notes: List[str] = []
-    with _Bag(path) as bag:
+    with Bag(paths) as bag:
         try:
             scan_topic = _scan_topic(bag, options.scan_topic, notes)
             tree = _frame_tree(bag)
@@ -54,32 +58,37 @@ def open_log(path: Path, options: LogOptions) -> Recording:
             raise (RecordingError(f"{err}; {bag.damage}") if bag.damage else err) from err
         if bag.damage:
             notes.append(bag.damage)
-    entries = _Entries(path, scan_topic, tree, odometry, base_frame, options)
-    beam_truth = None if truth_topic is None else _TrueBeams(path, truth_topic)
-    return Recording(path.name, scan_count, entries, truth, notes, beam_truth)
+    entries = _Entries(paths, scan_topic, tree, odometry, base_frame, options)
+    beam_truth = None if truth_topic is None else _TrueBeams(paths, truth_topic)
+    name = paths[0].name if len(paths) == 1 else f"{paths[0].name} and {len(paths) - 1} more"
+    return Recording(name, scan_count, entries, truth, notes, beam_truth, odometry.frame or "odom", base_frame)
 
 
-class _Bag:
+class Bag:
     """What we use of rosbags, its errors as RecordingError."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self.paths = [_rosbag2_folder(path) for path in paths]
+        self.path = ", ".join(str(path) for path in paths)  # what a line is about
         self.damage = ""  # where reading had to stop, in words
         self._reader: Any = None
 
-    def __enter__(self) -> "_Bag":
-        if not self.path.exists():
-            raise RecordingError(f"{self.path}: does not exist")
+    def __enter__(self) -> "Bag":
+        for path in self.paths:
+            if not path.exists():
+                raise RecordingError(f"{path}: does not exist")
+        if len({path.resolve() for path in self.paths}) < len(self.paths):
+            raise RecordingError(f"{self.path}: a bag is named twice")
         try:
             from rosbags.highlevel import AnyReader
         except ImportError as err:
             raise RecordingError(f"{self.path}: reading bags needs the Python package rosbags "
                                  f"(pip install rosbags): {err}") from err
         try:
-            self._reader = AnyReader([self.path])
+            self._reader = AnyReader(self.paths, default_typestore=messages.ros2_store())
             self._reader.open()
         except Exception as err:  # rosbags lets errors of struct, asserts and codecs through
-            raise RecordingError(f"{self.path}: {_why_unreadable(self.path, err)}") from err
+            raise RecordingError(_why_unreadable(self.paths, err)) from err
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -100,6 +109,11 @@ class _Bag:
 
     def messages(self, *topics: str) -> "Iterator[Tuple[str, Any]]":
         """Topic and message in the order they were recorded; ends where the bag is damaged, see `damage`."""
+        for connection, _, message in self.recorded(*topics):
+            yield connection.topic, message
+
+    def recorded(self, *topics: str) -> "Iterator[Tuple[Any, int, Any]]":
+        """Connection of rosbags, time of recording [ns] and message, as messages()."""
         connections = [connection for connection in self._reader.connections if connection.topic in topics]
         if not connections:
             return
@@ -107,7 +121,7 @@ class _Bag:
         messages = self._reader.messages(connections=connections)
         while True:
             try:
-                connection, _, raw = next(messages)
+                connection, recorded_ns, raw = next(messages)
                 message = self._reader.deserialize(raw, connection.msgtype)
             except StopIteration:
                 return
@@ -116,7 +130,7 @@ class _Bag:
                                f" ({_first_line(err)})")
                 return
             count += 1
-            yield connection.topic, message
+            yield connection, recorded_ns, message
 
     def check_topic(self, topic: str, *kinds: str) -> str:
         """The topic as the bag spells it, if it is there with one of these types."""
@@ -147,7 +161,7 @@ class _Odometry:
         return self.trajectory.at(np.int64(stamp_ns))
 
 
-def _scan_topic(bag: _Bag, wanted: Optional[str], notes: List[str]) -> str:
+def _scan_topic(bag: Bag, wanted: Optional[str], notes: List[str]) -> str:
     if wanted is not None:
         return bag.check_topic(wanted, SCAN)
     found = bag.topics_of(SCAN)
@@ -158,7 +172,7 @@ def _scan_topic(bag: _Bag, wanted: Optional[str], notes: List[str]) -> str:
     return topic
 
 
-def _only_or_usual(bag: _Bag, found: List[str], usual: str, what: str, option: str) -> str:
+def _only_or_usual(bag: Bag, found: List[str], usual: str, what: str, option: str) -> str:
     """Of the topics found, at least one, the only one or the one that is usual."""
     if len(found) == 1:
         return found[0]
@@ -167,7 +181,7 @@ def _only_or_usual(bag: _Bag, found: List[str], usual: str, what: str, option: s
     return usual
 
 
-def _frame_tree(bag: _Bag) -> FrameTree:
+def _frame_tree(bag: Bag) -> FrameTree:
     tree = FrameTree()
     for topic, message in bag.messages(*bag.topics_of(*TF)):
         for stamped in message.transforms:
@@ -178,7 +192,7 @@ def _frame_tree(bag: _Bag) -> FrameTree:
     return tree
 
 
-def _odometry(bag: _Bag, tree: FrameTree, options: LogOptions, notes: List[str]) -> _Odometry:
+def _odometry(bag: Bag, tree: FrameTree, options: LogOptions, notes: List[str]) -> _Odometry:
     """From tf, unless a topic is asked for or tf has no odometry."""
     odom_frame = (options.odom_frame or "odom").lstrip("/")
     bases = BASE_FRAMES if options.base_frame is None else (options.base_frame.lstrip("/"),)
@@ -208,7 +222,7 @@ def _odometry(bag: _Bag, tree: FrameTree, options: LogOptions, notes: List[str])
     return _Odometry(trajectory=trajectory, child_frame=child_frame)
 
 
-def _base_frame(bag: _Bag, tree: FrameTree, odometry: _Odometry, options: LogOptions) -> str:
+def _base_frame(bag: Bag, tree: FrameTree, odometry: _Odometry, options: LogOptions) -> str:
     if options.base_frame is not None:
         return options.base_frame.lstrip("/")
     if odometry.frame is not None:
@@ -216,7 +230,7 @@ def _base_frame(bag: _Bag, tree: FrameTree, odometry: _Odometry, options: LogOpt
     return odometry.child_frame or next((frame for frame in BASE_FRAMES if frame in tree.frames), BASE_FRAMES[0])
 
 
-def _check_laser(bag: _Bag, scan_topic: str, tree: FrameTree, base_frame: str, options: LogOptions) -> None:
+def _check_laser(bag: Bag, scan_topic: str, tree: FrameTree, base_frame: str, options: LogOptions) -> None:
     """Refuse at once a bag that does not say where the laser is: every scan would be refused."""
     if options.laser_pose is not None:
         return
@@ -232,7 +246,7 @@ def _check_laser(bag: _Bag, scan_topic: str, tree: FrameTree, base_frame: str, o
         return
 
 
-def _turn_notes(bag: _Bag, scan_topic: str, straighten: bool) -> List[str]:
+def _turn_notes(bag: Bag, scan_topic: str, straighten: bool) -> List[str]:
     """What the first scans tell of the time that the lidar takes for its beams."""
     for _, message in itertools.islice(bag.messages(scan_topic), 3):
         beams, step_s = len(message.ranges), float(message.time_increment)
@@ -245,7 +259,7 @@ def _turn_notes(bag: _Bag, scan_topic: str, straighten: bool) -> List[str]:
     return []
 
 
-def _ground_truth(bag: _Bag, source: Optional[str], notes: List[str]) -> Optional[Trajectory]:
+def _ground_truth(bag: Bag, source: Optional[str], notes: List[str]) -> Optional[Trajectory]:
     if source == "none":
         return None
     if source is None:
@@ -262,7 +276,7 @@ def _ground_truth(bag: _Bag, source: Optional[str], notes: List[str]) -> Optiona
     return _trajectory(bag, topic)[0]
 
 
-def _true_beams_topic(bag: _Bag, wanted: Optional[str], notes: List[str]) -> Optional[str]:
+def _true_beams_topic(bag: Bag, wanted: Optional[str], notes: List[str]) -> Optional[str]:
     if wanted == "none":
         return None
     if wanted is not None:
@@ -277,7 +291,7 @@ def _true_beams_topic(bag: _Bag, wanted: Optional[str], notes: List[str]) -> Opt
     return topic
 
 
-def _trajectory(bag: _Bag, topic: str) -> "Tuple[Trajectory, str]":
+def _trajectory(bag: Bag, topic: str) -> "Tuple[Trajectory, str]":
     """The poses on a topic, and the frame that they place (Odometry says it)."""
     stamps: List[int] = []
     poses: List[Tuple[float, float, float]] = []
@@ -297,14 +311,14 @@ def _trajectory(bag: _Bag, topic: str) -> "Tuple[Trajectory, str]":
 class _Entries:
     """Iterates the scans of a bag, opening it anew each time."""
 
-    def __init__(self, path: Path, scan_topic: str, tree: FrameTree, odometry: _Odometry, base_frame: str,
+    def __init__(self, paths: Sequence[Path], scan_topic: str, tree: FrameTree, odometry: _Odometry, base_frame: str,
                  options: LogOptions) -> None:
-        self._path, self._scan_topic, self._tree, self._odometry = path, scan_topic, tree, odometry
+        self._paths, self._scan_topic, self._tree, self._odometry = paths, scan_topic, tree, odometry
         self._base_frame, self._laser_pose, self._deskew = base_frame, options.laser_pose, options.deskew
 
     def __iter__(self) -> Iterator[Entry]:
         latest_ns: Dict[str, int] = {}  # by frame: there may be several lidars
-        with _Bag(self._path) as bag:
+        with Bag(self._paths) as bag:
             for _, message in bag.messages(self._scan_topic):
                 stamp_ns, frame = _stamp_ns(message.header), message.header.frame_id
                 entry = self._entry(message, stamp_ns, latest_ns.get(frame, -1))
@@ -354,19 +368,19 @@ class _Entries:
 class _TrueBeams:
     """Iterates the truth of a bag, opening it anew each time."""
 
-    def __init__(self, path: Path, topic: str) -> None:
-        self._path, self._topic = path, topic
+    def __init__(self, paths: Sequence[Path], topic: str) -> None:
+        self._paths, self._topic = paths, topic
 
     def __iter__(self) -> Iterator[BeamTruth]:
-        with _Bag(self._path) as bag:
+        with Bag(self._paths) as bag:
             for _, message in bag.messages(self._topic):
                 stamp_ns, case = _stamp_ns(message.header), np.array(message.cases, np.uint8)
                 if case.size and case.max() > LAST_CASE:
-                    raise RecordingError(f"{self._path}: {self._topic} at {stamp_ns * 1e-9:.3f} s: cases must be 0 to "
+                    raise RecordingError(f"{bag.path}: {self._topic} at {stamp_ns * 1e-9:.3f} s: cases must be 0 to "
                                          f"{LAST_CASE}, got {case.max()}")
                 crossing = getattr(message, "crossing", None)
                 if crossing is not None and len(crossing) != len(case):
-                    raise RecordingError(f"{self._path}: {self._topic} at {stamp_ns * 1e-9:.3f} s: {len(case)} cases, "
+                    raise RecordingError(f"{bag.path}: {self._topic} at {stamp_ns * 1e-9:.3f} s: {len(case)} cases, "
                                          f"but {len(crossing)} crossings")
                 yield BeamTruth(stamp_ns, case, None if crossing is None else np.array(crossing, float))
 
@@ -384,21 +398,42 @@ def _transform(translation: Any, rotation: Any) -> Optional[Transform]:
     return offset, unit
 
 
-def _why_unreadable(path: Path, err: Exception) -> str:
+def _rosbag2_folder(path: Path) -> Path:
+    """The folder of a bag of ROS 2, where a file in it was named."""
+    beside = path.suffix in (".mcap", ".db3") and (path.parent / "metadata.yaml").is_file()
+    return path.parent if beside else path
+
+
+def _why_unreadable(paths: Sequence[Path], err: Exception) -> str:
+    """Which of the bags it is, and why."""
+    for path in paths if len(paths) > 1 else ():
+        try:
+            with Bag([path]):
+                pass
+        except RecordingError as alone:
+            return str(alone)
+    path = paths[0]
+    if len(paths) > 1:
+        return f"{', '.join(map(str, paths))}: cannot be read as one run: {_first_line(err)}"
     if path.is_dir():
-        return f"is a folder without a bag that can be read: {_first_line(err)}"
+        if (path / "metadata.yaml").is_file():
+            return f"{path}: cannot be read: {_first_line(err)}"
+        return f"{path}: is a folder without metadata.yaml, so no bag of ROS 2 (`ros2 bag reindex` writes it)"
     try:
         with path.open("rb") as file:
             head = file.read(13)
     except OSError as refused:
-        return f"cannot be read: {refused.strerror}"
+        return f"{path}: cannot be read: {refused.strerror}"
     if not head:
-        return "is empty"
+        return f"{path}: is empty"
+    if path.suffix in (".mcap", ".db3"):
+        return f"{path}: a bag of ROS 2 needs metadata.yaml beside it (`ros2 bag reindex` writes it)"
     if path.suffix == ".bag" or head.startswith(b"#ROSBAG"):
         if head != b"#ROSBAG V2.0\n":
-            return "is no ROS 1 bag"
-        return "cut short or never closed (its index is missing); `rosbag reindex` may save what it holds"
-    return f"cannot be read: {_first_line(err)}"
+            return f"{path}: is no ROS 1 bag"
+        return (f"{path}: cut short or never closed (its index is missing); `rosbag reindex {path}` may save what it "
+                "holds")
+    return f"{path}: cannot be read: {_first_line(err)}"
 
 
 def _first_line(err: Exception) -> str:

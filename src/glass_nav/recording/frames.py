@@ -62,6 +62,14 @@ class FrameTree:
             transform = compose(inverse(self._links[child].at(child, stamp_ns)), transform)
         return transform
 
+    def way(self, source: str, target: str) -> List[str]:
+        """Children of the links from source up to where the chains of both meet, the last one first.
+
+        Raises:
+            FrameError: no chain joins them.
+        """
+        return self._chain(target, source)[0][::-1]
+
     def _chain(self, target: str, source: str) -> "Tuple[List[str], List[str]]":
         """Children of the links from source up, and from target up, to their common ancestor."""
         from_source, from_target = self._ancestry(source), self._ancestry(target)

@@ -1,22 +1,27 @@
-"""A path -> Recording, by what the file is."""
+"""Paths -> Recording, by what the files are."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Union
+from typing import Sequence, Union
 
 from glass_nav.recording import bag_file, rawlog_file
-from glass_nav.recording.recording import LogOptions, Recording
+from glass_nav.recording.recording import LogOptions, Recording, RecordingError
+
+AnyPath = Union[str, "os.PathLike[str]"]
 
 
-def open_log(path: "Union[str, os.PathLike[str]]", options: LogOptions = LogOptions()) -> Recording:
-    """Open an MRPT rawlog (.rawlog, .rawlog.gz) or a bag (anything else).
+def open_log(path: "Union[AnyPath, Sequence[AnyPath]]", options: LogOptions = LogOptions()) -> Recording:
+    """Open an MRPT rawlog (.rawlog, .rawlog.gz) or a bag (anything else); of bags also several, as parts of one run.
 
     Raises:
         RecordingError: the log cannot be used; one line.
     """
-    path = Path(path)
-    if path.name.endswith((".rawlog", ".rawlog.gz")):
-        return rawlog_file.open_log(path, options)
-    return bag_file.open_log(path, options)
+    paths = [Path(path)] if isinstance(path, (str, os.PathLike)) else [Path(part) for part in path]
+    rawlogs = [part for part in paths if part.name.endswith((".rawlog", ".rawlog.gz"))]
+    if not rawlogs:
+        return bag_file.open_log(paths, options)
+    if len(paths) > 1:
+        raise RecordingError(f"{rawlogs[0]}: only bags can be parts of one run, got {len(paths)} logs")
+    return rawlog_file.open_log(paths[0], options)

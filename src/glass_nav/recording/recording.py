@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Iterable, Iterator, List, Optional, Tuple, Union
 
 import numpy as np
@@ -49,6 +49,8 @@ class Recording:
     ground_truth: Optional[Trajectory] = None  # map_from_base
     notes: List[str] = field(default_factory=list)  # what was chosen or found odd, a line each
     beam_truth: Optional[Iterable[BeamTruth]] = None  # by ascending stamps; read as it is iterated, like the entries
+    odom_frame: str = "odom"
+    base_frame: str = "base_link"
 
     def __len__(self) -> int:
         return self.scan_count
@@ -60,7 +62,7 @@ class Recording:
         """The same with all entries read, for more than one run over it."""
         entries = list(self.entries)
         truth = None if self.beam_truth is None else list(self.beam_truth)
-        return Recording(self.name, len(entries), entries, self.ground_truth, self.notes, truth)
+        return replace(self, scan_count=len(entries), entries=entries, beam_truth=truth)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,9 @@ from geometry_msgs.msg import Pose, Quaternion, Vector3
 from sensor_msgs.msg import PointCloud2, PointField
 from visualization_msgs.msg import Marker, MarkerArray
 
+from glass_nav.localization import beam_cloud as beam_points
 from glass_nav.localization.beam_cases import BeamCases
+from glass_nav.localization.beam_cloud import CASE_COLOURS
 from glass_nav.localization.surface_scan import SurfaceScan
 from glass_nav.ros import conversions
 from glass_nav.ros.packed_markers import PackedMarkerArray, colour, points_marker
@@ -18,11 +20,6 @@ from glass_nav.sensing.scan import Scan
 
 # Names of cases 0 to 4: the namespaces of the markers, and so the words beside rviz' checkboxes.
 CASE_NAMES = ("0 uncertain", "1 diffuse", "2 mirrored", "3 behind one pane", "4 behind two panes")
-
-# (5, 3) red, green, blue of cases 0 to 4: grey, green, magenta, light blue, dark blue. The hues of Okabe
-# and Ito, which stay apart for colour-blind eyes; blues are beams that went through.
-CASE_COLOURS = np.array([[150, 150, 150], [0, 158, 115], [204, 121, 167], [86, 180, 233], [0, 114, 178]],
-                        dtype=np.uint32)
 
 STATE_COLOURS = {"LOCALIZED": (0, 60, 35), "UNCERTAIN": (130, 60, 0), "LOST": (150, 0, 0),
                  "GLOBAL_SEARCH": (70, 20, 110), "UNKNOWN": (40, 40, 40)}  # dark on free and unknown cells alike
@@ -38,29 +35,18 @@ _REASON_WIDTH = 48      # letters of a line
 
 # -- cloud
 
-_CLOUD_FIELDS = ("x", "y", "z", "rgb", "case", "range", "expected", "residual", "weight")
-
 
 def beam_cloud(scan: Scan, cases: BeamCases, height_m: float, base_frame: str) -> PointCloud2:
     """End points of the beams that answered, in the robot's frame, coloured by case.
 
     All fields are float32, so that rviz' Select tool shows each of them for a picked beam.
     """
-    answered = scan.answered
-    red, green, blue = CASE_COLOURS[cases.case[answered]].T
-    ends = replace(scan, ranges_m=scan.ranges_m[answered], angles_rad=scan.angles_rad[answered], origins_m=None)
-    points = np.empty((len(ends), len(_CLOUD_FIELDS)), dtype="<f4")
-    points[:, :2] = ends.points_in_base()
-    points[:, 2] = height_m
-    points[:, 3] = (red << 16 | green << 8 | blue).astype("<u4").view("<f4")  # PCL's packing
-    for column, values in enumerate((cases.case, scan.ranges_m, cases.expected_m, cases.residual_m,
-                                     cases.weight), start=4):
-        points[:, column] = values[answered]
+    points = beam_points.points(scan, cases, height_m)
     msg = PointCloud2(header=conversions.header(scan.stamp_ns, base_frame), height=1, width=len(points),
                       is_dense=True)
     msg.fields = [PointField(name, 4 * index, PointField.FLOAT32, 1)
-                  for index, name in enumerate(_CLOUD_FIELDS)]
-    msg.point_step = 4 * len(_CLOUD_FIELDS)
+                  for index, name in enumerate(beam_points.FIELDS)]
+    msg.point_step = 4 * len(beam_points.FIELDS)
     msg.row_step = msg.point_step * len(points)
     msg.data = points.tobytes()
     return msg

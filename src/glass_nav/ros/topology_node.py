@@ -4,6 +4,8 @@ Wiring only; the answer comes from AtlasLocalizer. Callbacks store, one loop wor
 
 Subscribes: meetpoint (Meetpoint), edge_traversal (EdgeTraversal): of the driver, or by hand; in either order, the
     traversal and the meetpoint at its end belong together. map (OccupancyGrid, if ~check_map): the atlas must be its.
+    scan (LaserScan) and tf to the frame of the meetpoint, with map, if ~judge_by_scans: candidates from where the map
+    does not explain the scan of a meetpoint's stamp are ruled out.
 Publishes: turn_choice (TurnChoice): the answer to each meetpoint while there is something to find out;
     initialpose (PoseWithCovarianceStamped) once when CONFIRMED, with the stamp of the meetpoint;
     ~candidates (TopologyCandidates, latched), ~status (TopologyStatus, latched), ~markers (MarkerArray, latched):
@@ -30,13 +32,16 @@ from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 from visualization_msgs.msg import MarkerArray
 
 from glass_nav import params
+from glass_nav.localization.scan_explanation import ScanExplanation
 from glass_nav.msg import (EdgeTraversal, LocalizeGloballyAction, LocalizeGloballyFeedback, LocalizeGloballyGoal,
                            LocalizeGloballyResult, Meetpoint, TopologyCandidates, TopologyStatus, TurnChoice)
 from glass_nav.ros import action_status, conversions, endings, topology_displays, topology_messages
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Errand, Mailbox
+from glass_nav.ros.scan_memory import ScanMemory
 from glass_nav.ros.topology_params import TopologyParams
-from glass_nav.topology import atlas_file, shipped_atlases
+from glass_nav.sensing.scan import Scan
+from glass_nav.topology import atlas_file, observations, shipped_atlases
 from glass_nav.topology.atlas import AtlasError
 from glass_nav.topology.atlas_localizer import CONFIRMED, AtlasLocalizer, Estimate
 from glass_nav.topology.observations import ObservationError
@@ -52,6 +57,8 @@ class TopologyNode:
     def __init__(self, p: TopologyParams) -> None:
         self._p, self._search_params = p.node, p.search
         self._map_fingerprint: Optional[str] = None
+        self._explanation: Optional[ScanExplanation] = None  # None: there is no map
+        self._scans = ScanMemory() if p.node.judge_by_scans else None
         self._localizer: Optional[AtlasLocalizer] = self._loaded(p.node.atlas)
         self._show_atlas()
         self._state, self._reason = IDLE, "no search was asked for"
@@ -84,7 +91,7 @@ class TopologyNode:
                          tcp_nodelay=True)
         rospy.Subscriber("edge_traversal", EdgeTraversal, lambda msg: self._inbox.put("reports", msg), queue_size=10,
                          tcp_nodelay=True)
-        if self._p.check_map:
+        if self._p.check_map or self._p.judge_by_scans:
             rospy.Subscriber("map", OccupancyGrid,
                              lambda msg: self._inbox.put("commands", lambda: self._check_map(msg)), queue_size=1,
                              buff_size=2 ** 24)
@@ -172,7 +179,7 @@ class TopologyNode:
             except AtlasError as err:
                 raise AtlasError(f"{path}: {err}") from err
         rospy.loginfo(f"{path}: {len(atlas.nodes)} nodes, {len(atlas.edges)} edges")
-        return AtlasLocalizer(atlas, self._search_params)
+        return AtlasLocalizer(atlas, self._search_params, self._explained if self._p.judge_by_scans else None)
 
     def _show_atlas(self) -> None:
         """Work out its markers, which are sent with those of each step."""
@@ -194,7 +201,12 @@ class TopologyNode:
         """A map came: is the atlas one of it?"""
         topic = rospy.resolve_name("map")
         try:
-            self._map_fingerprint = conversions.map_from_msg(msg).fingerprint
+            grid_map = conversions.map_from_msg(msg)
+            if self._p.judge_by_scans:
+                self._explanation = ScanExplanation(grid_map)
+            if not self._p.check_map:
+                return
+            self._map_fingerprint = grid_map.fingerprint
             if self._localizer is not None:
                 self._localizer.atlas.refuse_other_map(self._map_fingerprint, f"that of topic {topic}")
             elif self._state == NO_ATLAS:
@@ -234,9 +246,25 @@ class TopologyNode:
         except ObservationError as err:
             self._log.warn(f"{kind} refused: {err}")
 
+    def _explained(self, scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
+        """(C,) share of the scan that the map explains from each pose (C, 3); NaN without a map."""
+        if self._explanation is None:
+            return np.full(len(map_from_base), np.nan)
+        return self._explanation.shares(scan, map_from_base)
+
+    def _with_scan(self, msg: Meetpoint) -> observations.Meetpoint:
+        """The meetpoint, with the scan of its stamp if that can be used."""
+        meetpoint = topology_messages.meetpoint_from_msg(msg)
+        if self._scans is None or self._explanation is None or not meetpoint.stamp_ns:
+            return meetpoint
+        scan, why_not = self._scans.at(msg.header.stamp, msg.header.frame_id)
+        if scan is None:
+            self._log.warn(f"candidates are not judged by the scan at this meetpoint: {why_not}")
+        return replace(meetpoint, scan=scan)
+
     def _start(self, msg: Meetpoint) -> None:
         assert self._localizer is not None
-        self._judge(self._localizer.start(topology_messages.meetpoint_from_msg(msg)), msg)
+        self._judge(self._localizer.start(self._with_scan(msg)), msg)
 
     def _step(self) -> None:
         """One edge through the search, once both of its reports are there."""
@@ -254,8 +282,7 @@ class TopologyNode:
         self._waiting_traversal = None
         try:
             estimate = self._localizer.update(
-                topology_messages.traversal_from_msg(traversal, self._estimate.choice),
-                topology_messages.meetpoint_from_msg(meetpoint))
+                topology_messages.traversal_from_msg(traversal, self._estimate.choice), self._with_scan(meetpoint))
         except ObservationError as err:  # whichever of the two came last; the meetpoint waits for another traversal
             self._log.warn(f"edge_traversal refused: {err}")
             return

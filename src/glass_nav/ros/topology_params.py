@@ -14,6 +14,7 @@ class TopologyNodeParams:
     atlas: str = ""                    # atlas.json, atlas.npz, the folder of one, or the name of a shipped one
     global_frame_id: str = "map"
     check_map: bool = True             # refuse the atlas if the topic map has another map
+    judge_by_scans: bool = True        # candidates by the scan at a meetpoint, where there are scans and a map
     search_at_start: bool = True       # with the first meetpoint; else when asked
     publish_initial_pose: bool = True
     initial_pose_sigma_m: float = 0.25    # of initialpose

@@ -8,15 +8,15 @@ ever, and answers LOST rather than guess.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import List, Optional, Set, Tuple
 
 import numpy as np
 
-from glass_nav.geometry import se2
 from glass_nav.topology import ambiguity, vote
 from glass_nav.topology.atlas import Atlas, Visits
-from glass_nav.topology.matching import Matcher, Tolerances
+from glass_nav.topology.edge_segments import SegmentTest
+from glass_nav.topology.matching import Explained, Matcher, Tolerances, poses_at
 from glass_nav.topology.observations import Meetpoint, Traversal, turn_name
 from glass_nav.topology.search_forest import SearchForest
 
@@ -34,6 +34,9 @@ class SearchParams:
     max_detection_errors: int = 2  # meetpoints missed or seen where there are none; not with vote_mode seed
     use_edge_angles: bool = True   # as evidence; not with vote_mode seed
     tolerances: Tolerances = field(default_factory=Tolerances)
+    segments: SegmentTest = field(default_factory=SegmentTest)
+    least_explained: float = 0.6   # share of a scan that the map must explain from a candidate; where scans are judged
+    searches: int = 6              # begun anew where nothing fits any more, before LOST; where scans are judged
 
     def __post_init__(self) -> None:
         if self.vote_mode not in VOTE_MODES:
@@ -42,6 +45,10 @@ class SearchParams:
             raise ValueError(f"~confirm_edges must be >= 0, got {self.confirm_edges}")
         if not 0 <= self.max_detection_errors <= 2:
             raise ValueError(f"~max_detection_errors must be 0, 1 or 2, got {self.max_detection_errors}")
+        if not 0.0 <= self.least_explained < 1.0:
+            raise ValueError(f"~least_explained must be in [0, 1), got {self.least_explained}")
+        if self.searches < 1:
+            raise ValueError(f"~searches must be >= 1, got {self.searches}")
 
     @property
     def document(self) -> bool:
@@ -79,13 +86,23 @@ class Estimate:
 class AtlasLocalizer:
     """One search at a time; start() and update() with what the robot reports, drive as the estimate says."""
 
-    def __init__(self, atlas: Atlas, params: SearchParams) -> None:
+    def __init__(self, atlas: Atlas, params: SearchParams, explained: Optional[Explained] = None) -> None:
+        """
+        Args:
+            atlas: of the building.
+            params: of the search.
+            explained: judges candidates by the scan of a meetpoint, if it has one; not with vote_mode seed.
+        """
         self._atlas = atlas
         self._params = params
-        self._matcher = Matcher(atlas, params.tolerances, params.use_edge_angles and not params.document)
+        self._matcher = Matcher(atlas, params.tolerances, params.use_edge_angles and not params.document,
+                                None if params.document else params.segments, None if params.document else explained,
+                                params.least_explained)
         self._forest = SearchForest(self._matcher, 0 if params.document else params.max_detection_errors)
         self._claim: Optional[_Claim] = None
         self._estimate: Optional[Estimate] = None
+        self._edges_before = 0  # driven in searches in which nothing fitted at last
+        self._search = 1
 
     @property
     def atlas(self) -> Atlas:
@@ -110,9 +127,8 @@ class AtlasLocalizer:
 
     def start(self, meetpoint: Meetpoint) -> Estimate:
         """Begin a search; what was known before is forgotten."""
-        self._claim = None
-        self._forest.begin(meetpoint)
-        return self._judged()
+        self._edges_before, self._search = 0, 1
+        return self._begin(meetpoint)
 
     def update(self, traversal: Traversal, meetpoint: Meetpoint) -> Estimate:
         """Take in an edge and the meetpoint at its end.
@@ -149,6 +165,11 @@ class AtlasLocalizer:
 
     # -- judgement
 
+    def _begin(self, meetpoint: Meetpoint) -> Estimate:
+        self._claim = None
+        self._forest.begin(meetpoint)
+        return self._judged()
+
     def _judged(self) -> Estimate:
         dart, errors = self._forest.candidates()
         if not len(dart):
@@ -158,6 +179,14 @@ class AtlasLocalizer:
             self._estimate = self._claimed(dart, errors)
         else:
             self._estimate = self._among_several(dart, errors)
+        self._estimate = replace(self._estimate, depth=self._edges_before + self._forest.depth)
+        judged = self._matcher.judges_scans and self._forest.meetpoints[-1].scan is not None
+        if self._estimate.state == LOST and judged and self._search < self._params.searches and self._forest.depth > 0:
+            self._search += 1
+            self._edges_before += self._forest.depth
+            begun = self._begin(self._forest.meetpoints[-1])
+            self._estimate = replace(begun, reason=f"search {self._search} of {self._params.searches}, nothing "
+                                                   f"fitted any more: {begun.reason}")
         return self._estimate
 
     def _without_candidates(self, dart: np.ndarray, errors: np.ndarray) -> Estimate:
@@ -266,13 +295,6 @@ class _Claim:
     def confirmed(self, driven: Set[int], depth: int) -> int:
         """Edges that have matched since then and were new; at most one for each step."""
         return min(len(driven - self.driven), depth - self.depth)
-
-
-def poses_at(atlas: Atlas, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
-    """(C, 3) poses in the frame map of a robot whose reference edges are darts (C,)."""
-    behind = float(meetpoint.bearings_rad[0]) if len(meetpoint.bearings_rad) else np.pi
-    base_from_dart = np.array([*meetpoint.centre_m, behind])
-    return se2.compose(atlas.map_from_dart(dart), se2.inverse(base_from_dart))
 
 
 def _straight_on(meetpoint: Meetpoint) -> int:

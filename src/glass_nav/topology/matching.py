@@ -11,14 +11,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Optional, Tuple
+from typing import Callable, Dict, Optional, Tuple
 
 import numpy as np
 
-from glass_nav.geometry import angles
+from glass_nav.geometry import angles, se2
+from glass_nav.sensing.scan import Scan
+from glass_nav.topology import edge_segments
 from glass_nav.topology.atlas import Atlas, twin
+from glass_nav.topology.edge_segments import Reach, SegmentTest
+from glass_nav.topology.edge_views import poses_along
 from glass_nav.topology.observations import Meetpoint, Traversal
 
+_MOST_JUDGED = 2000    # candidates by a scan: a tenth of a millisecond each
+_MOST_COMPARED = 100  # candidates by their walls: some milliseconds each
+_LOOKED_FROM_M = 0.5  # between points of a way
+_REMEMBERED = 64      # traversals whose comparisons are kept
 _TESTS_PER_EDGE = 7  # length, chord, its direction, turn; then r and two angles between edges of the node
 
 
@@ -56,11 +64,30 @@ class Tolerances:
         return self.length_sigma_m + self.length_sigma_share * length_m
 
 
+Explained = Callable[[Scan, np.ndarray], np.ndarray]  # scan, map_from_base (C, 3) -> (C,) share that the map explains
+
+
 class Matcher:
     """An atlas with what the tests need of it, by dart."""
 
-    def __init__(self, atlas: Atlas, tolerances: Tolerances, use_angles: bool) -> None:
+    def __init__(self, atlas: Atlas, tolerances: Tolerances, use_angles: bool,
+                 segments: Optional[SegmentTest] = None, explained: Optional[Explained] = None,
+                 least_explained: float = 0.0) -> None:
+        """
+        Args:
+            atlas: with the segments of its darts, if these are to be compared.
+            tolerances: of the tests on numbers.
+            use_angles: directions of edges are evidence.
+            segments: the test on the walls seen along an edge; None: they are no evidence.
+            explained: of scans at meetpoints; None: they are no evidence.
+            least_explained: share of a scan that the map must explain from where a candidate is.
+        """
+        self._explained = explained
+        self._least_explained = least_explained
+        self._judged: Dict[int, Tuple[Meetpoint, Dict[int, bool]]] = {}  # by identity of the meetpoint
         self.atlas = atlas
+        self._segments = segments if segments is not None and segments.match_segments else None
+        self._compared: Dict[int, Tuple[Traversal, Dict[int, bool]]] = {}  # by identity of the traversal
         self.tolerances = tolerances
         self.use_angles = use_angles
         self.z = tolerances.z
@@ -116,7 +143,8 @@ class Matcher:
         node = node[self._r_fits(node, meetpoint)]
         start = self.atlas.rings.offsets[node]
         dart = self.atlas.rings.values[(start[:, None] + np.arange(meetpoint.degree)).ravel()]
-        return np.sort(dart[self._angles_fit(dart, meetpoint)])
+        dart = np.sort(dart[self._angles_fit(dart, meetpoint)])
+        return dart[self._scan_fits(dart, meetpoint)]
 
     def at(self, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
         """(C,) bool: darts (C,) fit the reference edge of the meetpoint."""
@@ -124,7 +152,26 @@ class Matcher:
         fits = self._degree[node] == meetpoint.degree
         fits[fits] = self._r_fits(node[fits], meetpoint)
         fits[fits] = self._angles_fit(dart[fits], meetpoint)
+        fits[fits] = self._scan_fits(dart[fits], meetpoint)
         return fits
+
+    @property
+    def judges_scans(self) -> bool:
+        """Whether scans at meetpoints are evidence."""
+        return self._explained is not None
+
+    def _scan_fits(self, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
+        """(C,) bool: enough of the scan is explained if darts (C,) are the reference edge; of too many nothing is
+        asked."""
+        if self._explained is None or meetpoint.scan is None or not 0 < len(dart) <= _MOST_JUDGED:
+            return np.ones(len(dart), bool)
+        if id(meetpoint) not in self._judged and len(self._judged) >= _REMEMBERED:
+            self._judged.clear()
+        _, known = self._judged.setdefault(id(meetpoint), (meetpoint, {}))
+        new = [each for each in dart.tolist() if each not in known]
+        shares = self._explained(meetpoint.scan, poses_at(self.atlas, np.array(new, np.int64), meetpoint))
+        known.update(zip(new, (~(shares < self._least_explained)).tolist()))  # a scan that says nothing rules out none
+        return np.array([known[each] for each in dart.tolist()], bool)
 
     def sigma_r_m(self, meetpoint: Optional[Meetpoint] = None) -> float:
         """Of an equidistance measured, the atlas' part not included."""
@@ -182,7 +229,35 @@ class Matcher:
             fits &= np.abs(edges.chord_m[edge] - traversal.chord_m) <= self.z * np.hypot(
                 self.sigma_chord_m(traversal), edges.sigma_m[edge])
         fits[fits] = self._directions_fit(departure[fits], twin(departure[fits]), edges.sigma_m[edge[fits]], traversal)
+        fits[fits] = self._segments_fit(departure[fits], traversal)
         return kept[fits]
+
+    def _segments_fit(self, departure: np.ndarray, traversal: Traversal) -> np.ndarray:
+        """(C,) bool: the walls seen do not contradict those of the atlas along darts; of too many nothing is asked."""
+        if self._segments is None or not len(traversal.segments_m) or len(departure) > _MOST_COMPARED:
+            return np.ones(len(departure), bool)
+        if id(traversal) not in self._compared and len(self._compared) >= _REMEMBERED:
+            self._compared.clear()
+        _, known = self._compared.setdefault(id(traversal), (traversal, {}))
+        for dart in departure.tolist():
+            if dart not in known:
+                known[dart] = edge_segments.fits(*self.contradiction(dart, traversal), self._segments)
+        return np.array([known[dart] for dart in departure.tolist()], bool)
+
+    def contradiction(self, dart: int, traversal: Traversal) -> Tuple[float, float]:
+        """Share of the walls seen that stand in free space if the edge was that of a dart, and metres of them."""
+        seen = self.atlas.darts.segments_m[dart]
+        dart_from_map = se2.inverse(self.atlas.map_from_dart(np.array(dart)))
+        line = self.atlas.edges.polyline_m[dart >> 1]
+        if len(line) < 2:
+            line = self.atlas.nodes.position_m[self.atlas.darts.node[[dart & ~1, dart | 1]]]
+        way = poses_along(line, _LOOKED_FROM_M)[:, :2]
+        limits = self.tolerances
+        reach = Reach(self.z * math.hypot(limits.length_sigma_m, limits.r_sigma_m), self.z * limits.bearing_sigma_rad,
+                      self.z, limits.length_sigma_share)
+        return edge_segments.contradiction(traversal.segments_m,
+                                           se2.transform_points(dart_from_map, seen.reshape(-1, 2)).reshape(-1, 4),
+                                           se2.transform_points(dart_from_map, way), reach)
 
     def ways_along(self, departure: np.ndarray, arrival: np.ndarray, length_m: np.ndarray, sigma_m: np.ndarray,
                    traversal: Traversal) -> np.ndarray:
@@ -276,3 +351,10 @@ class Matcher:
         allowed_ahead = self.z * math.hypot(limits.bearing_sigma_rad, limits.turn_sigma_rad) + across
         return (np.abs(angles.wrap(turned)) <= allowed) & (
             (off_m >= chord) | (np.abs(angles.wrap(ahead)) <= allowed_ahead))
+
+
+def poses_at(atlas: Atlas, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
+    """(C, 3) poses in the frame map of a robot whose reference edges are darts (C,)."""
+    behind = float(meetpoint.bearings_rad[0]) if len(meetpoint.bearings_rad) else np.pi
+    base_from_dart = np.array([*meetpoint.centre_m, behind])
+    return se2.compose(atlas.map_from_dart(dart), se2.inverse(base_from_dart))

@@ -10,8 +10,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Optional
 
 import numpy as np
+
+from glass_nav.sensing.scan import Scan
 
 UNKNOWN = math.nan
 U_TURN, LEFT, RIGHT, FORWARD = "U_TURN", "LEFT", "RIGHT", "FORWARD"
@@ -31,6 +34,7 @@ class Meetpoint:
     # of the edges in the robot's frame, by rank
     centre_m: np.ndarray = field(default_factory=lambda: np.zeros(2))  # (2,) of the meetpoint in the robot's frame
     stamp_ns: int = 0
+    scan: Optional[Scan] = None  # that was seen there, for judging candidates by it
 
     def __post_init__(self) -> None:
         if self.degree < 1:
@@ -70,7 +74,7 @@ class Traversal:
     chord_bearing_rad: float = UNKNOWN  # direction of the chord, counterclockwise from that in which the edge left
     turn_rad: float = UNKNOWN  # direction of travel at the end, counterclockwise from that in which the edge left
     segments_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 4)))  # (n, 4) x1 y1 x2 y2 seen, in the frame
-    # at the start, x along the edge; kept for the feature maps, not matched
+    # at the start, x along the edge
 
     def __post_init__(self) -> None:
         if self.rank < 0:

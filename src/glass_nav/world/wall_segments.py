@@ -18,6 +18,7 @@ from glass_nav.geometry import se2, segments
 from glass_nav.world.grid_map import GridMap
 
 TOLERANCE_CELLS = 1.5   # a wall that a mapper left rough is still one
+FINE_TOLERANCE_CELLS = 1.0  # to place a scan on: what stands out of a wall shall not tilt it
 CLOSE_CELLS = 2         # of an occupied cell, an unknown one is wall
 LEAST_LENGTH_M = 0.3
 GAP_M = 0.3             # of unknown cells, within one wall
@@ -42,8 +43,8 @@ def walls_closed(grid_map: GridMap) -> GridMap:
     return GridMap(occupancy, grid_map.resolution_m, grid_map.map_from_grid)
 
 
-def extract(grid_map: GridMap) -> WallSegments:
-    """All walls of a map; without any, no segments."""
+def extract(grid_map: GridMap, tolerance_cells: float = TOLERANCE_CELLS) -> WallSegments:
+    """All walls of a map, no cell of a wall further from its line; without any, no segments."""
     grid_map = walls_closed(grid_map)
     resolution_m = grid_map.resolution_m
     cell, side = _faces(grid_map.free)
@@ -57,7 +58,7 @@ def extract(grid_map: GridMap) -> WallSegments:
     count = 0
     for loop in _loops(cell, side):
         for chain in _without_gaps(loop, wall, gap):
-            found, its = segments.split_and_merge(behind[chain] + 0.5, TOLERANCE_CELLS, LEAST_LENGTH_M / resolution_m)
+            found, its = segments.split_and_merge(behind[chain] + 0.5, tolerance_cells, LEAST_LENGTH_M / resolution_m)
             label[chain] = np.where(its >= 0, its + count, its)
             count += len(found)
             rows.append(found)

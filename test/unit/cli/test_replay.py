@@ -65,11 +65,16 @@ def test_a_replay_follows_the_robot_and_writes_everything(run, room_bag, tmp_pat
 
 def test_the_same_seed_gives_the_same_answer_and_another_one_another(run, room_bag, tmp_path):
     path = room_bag().write()
-    ways = []
+    ways, cases, glass = [], [], []
     for seed in (1, 1, 2):
         assert run(path, "--seed", seed, "--no-picture")[0] == 0
         ways.append((tmp_path / "out" / "trajectory.tum").read_text())
+        with np.load(tmp_path / "out" / "beam_cases.npz") as arrays:
+            cases.append(arrays["cases"].tobytes())
+        glass.append((tmp_path / "out" / "glass_map.png").read_bytes())
     assert ways[0] == ways[1] != ways[2]
+    assert cases[0] == cases[1]
+    assert glass[0] == glass[1]
     assert not (tmp_path / "out" / "trajectory.png").exists()
 
 
@@ -179,7 +184,7 @@ def test_bad_input_is_one_line_and_exit_code_3(run, room_bag, room_map, tmp_path
     (tmp_path / "cut.bag").write_bytes(path.read_bytes()[:-1])
     assert last_line(run, tmp_path / "cut.bag") == (
         "glass_nav replay: cut.bag: cut short or never closed (its index is missing); "
-        "`rosbag reindex` may save what it holds")
+        "`rosbag reindex cut.bag` may save what it holds")
     assert last_line(run, path, grid=tmp_path / "no.yaml") == (
         "glass_nav replay: no.yaml: cannot be read: No such file or directory")
     shutil.copy(room_map, tmp_path / "map.yaml")
@@ -210,11 +215,38 @@ def test_a_start_that_is_no_pose_is_refused(run, room_bag):
     (["--duration", "0"], "glass_nav replay: --duration must be > 0 s, got 0.0"),
     (["--global", "--initial-pose", "0", "0", "0"],
      "glass_nav replay: --global and --initial-pose exclude each other"),
+    (["--fail-if", "position_p95_m"], "glass_nav replay: --fail-if must be METRIC, one of >= <= > <, and a number, "
+                                      "such as position_p95_m>0.3, got 'position_p95_m'"),
     (["--seed", "x"], "glass_nav replay: error: argument --seed: invalid int value: 'x'")])
 def test_wrong_usage_is_exit_code_2(run, options, text):
     code, _, err = run("absent.bag", *options)
     assert code == 2
     assert err.splitlines()[-1] == text
+
+
+@pytest.mark.parametrize("options, code, line", [
+    (["--fail-if", "position_p95_m>0.3", "--fail-if", "lost_share > 0"], 0, None),
+    (["--fail-if", "position_p95_m>0.3", "--fail-if", "scans<1000"], 1,
+     "glass_nav replay: scans is 20: failed by --fail-if scans < 1000"),
+    (["--fail-if", "cases.accuracy<0.9"], 3, "glass_nav replay: --fail-if cases.accuracy < 0.9: this log gives no "
+                                             "cases.accuracy; it has no ground truth or no true cases for it")])
+def test_a_limit_on_a_figure_decides_the_exit_code(run, room_bag, tmp_path, options, code, line):
+    told, _, err = run(room_bag().write(), "--no-picture", *options)
+    assert told == code
+    assert figures(tmp_path)["scans"] == 20  # the results are there whatever they are
+    if line is not None:
+        assert err.splitlines()[-1] == line
+
+
+def test_two_parts_of_a_run_replay_as_one(room_bag, room_map, tmp_path, capsys):
+    first = room_bag(scans=8).write()
+    first.rename(tmp_path / "a_0.bag")
+    second = room_bag(scans=20, scan_fields=lambda index, fields: fields if index >= 8 else None).write()
+    assert cli.main(["replay", str(tmp_path / "a_0.bag"), str(second), "--map", str(room_map), "--out",
+                     str(tmp_path / "out"), "--no-picture"]) == 0
+    assert "20 scans, " in capsys.readouterr().out
+    assert figures(tmp_path)["scans"] == 20
+    assert figures(tmp_path)["log"] == f"{tmp_path / 'a_0.bag'} {second}"
 
 
 def test_help_and_no_command(capsys):

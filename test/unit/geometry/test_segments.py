@@ -79,3 +79,20 @@ def test_points_that_make_no_line_make_no_segment(points):
 def test_a_closed_line_has_its_corners():
     points = along((0, 0), (2, 0), (2, 1), (0, 1), (0, 0))
     assert points[segments.corners(points, 0.05)].round(9).tolist() == [[0, 0], [2, 0], [2, 1], [0, 1], [0, 0]]
+
+
+def test_equal_variances_give_the_plain_fit_and_the_textbook_covariance():
+    """Points along x, 1 apart, at y = 2: the heading's variance is s^2 / sum x^2 about the middle, the offset's there
+    s^2 / N; seen from x = 0 the turn adds its lever."""
+    points = np.column_stack([np.arange(3.0, 8.0), np.full(5, 2.0)])
+    found, covariance = segments.weighted_fit(points, np.full(5, 0.04))
+    np.testing.assert_allclose(found, segments.fit(points), atol=1e-12)
+    heading = 0.04 / 10.0
+    np.testing.assert_allclose(covariance, [[heading, -5.0 * heading], [-5.0 * heading, 0.04 / 5 + 25 * heading]],
+                               rtol=1e-9)
+
+
+def test_a_point_that_is_hardly_known_hardly_moves_the_line():
+    points = np.column_stack([np.arange(5.0), [0, 0, 0, 0, 1.0]])
+    found, _ = segments.weighted_fit(points[::-1], np.array([1e6, 1.0, 1.0, 1.0, 1.0]))
+    np.testing.assert_allclose(found, [4, 0, 0, 0], atol=1e-4)

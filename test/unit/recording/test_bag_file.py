@@ -226,8 +226,10 @@ def test_a_bag_that_lacks_something_is_refused_in_one_line(room_bag, fields, opt
 @pytest.mark.parametrize("keep, text", [
     (0, "room.bag: is empty"),
     (7, "room.bag: is no ROS 1 bag"),
-    (3000, "room.bag: cut short or never closed (its index is missing); `rosbag reindex` may save what it holds"),
-    (-1, "room.bag: cut short or never closed (its index is missing); `rosbag reindex` may save what it holds")])
+    (3000, "room.bag: cut short or never closed (its index is missing); `rosbag reindex room.bag` may save what it "
+           "holds"),
+    (-1, "room.bag: cut short or never closed (its index is missing); `rosbag reindex room.bag` may save what it "
+         "holds")])
 def test_a_bag_cut_short_is_refused_in_one_line(room_bag, keep, text):
     path = room_bag().write()
     path.write_bytes(path.read_bytes()[:keep])
@@ -238,7 +240,7 @@ def test_files_that_are_no_bags_are_refused_in_one_line(tmp_path):
     (tmp_path / "notes.txt").write_text("not a bag")
     assert refusal(tmp_path / "notes.txt").startswith("notes.txt: cannot be read: ")
     assert refusal(tmp_path / "absent.bag") == "absent.bag: does not exist"
-    assert refusal(tmp_path).startswith(f"{tmp_path.name}: is a folder without a bag that can be read: ")
+    assert refusal(tmp_path).startswith(f"{tmp_path.name}: is a folder without metadata.yaml")
 
 
 def test_a_damaged_bag_gives_what_comes_before_the_damage(room_bag):

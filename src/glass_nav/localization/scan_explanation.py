@@ -1,0 +1,71 @@
+"""A scan, poses that it may come from -> how much of it the map explains from each, glass and all.
+
+A beam is explained if it ended at one of the ranges that the five cases offer: the first surface on its way, the next
+ones behind it if the walls before are thin enough for glass, or the mirrored one (seed document
+glass_localization.txt). So a candidate in a building of glass is not ruled out by beams that went through panes, nor
+believed because a wall is somewhere. Each pose may slide to where the scan fits best first, for it is known to a
+decimetre or so.
+"""
+
+from __future__ import annotations
+
+from typing import List
+
+import numpy as np
+
+from glass_nav.geometry import angles, se2
+from glass_nav.localization import scan_alignment
+from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.raycast import RayCaster
+from glass_nav.sensing.scan import Scan
+from glass_nav.world.grid_map import GridMap
+
+_BEAMS = 120        # of a scan that are asked
+_NEAR_CELLS = 3.0   # a beam that ends so near to a range that the map offers is explained
+_MOST_THICK_M = 0.3  # a thicker wall is no glass
+_SLIDES_M, _SLIDES_RAD = 0.5, np.radians(15.0)  # a pose that would slide further stays where it was said to be
+_AT_ONCE = 64       # poses
+_LEAST_BEAMS = 10
+
+
+class ScanExplanation:
+    """For one map."""
+
+    def __init__(self, grid_map: GridMap) -> None:
+        self._caster = RayCaster(grid_map)
+        self._field = DistanceField(grid_map)
+        self._near_m = _NEAR_CELLS * grid_map.resolution_m
+
+    def shares(self, scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
+        """Of the beams that came back, those that the map explains.
+
+        Args:
+            scan: as it was measured.
+            map_from_base: (C, 3) poses.
+
+        Returns:
+            (C,) shares in [0, 1]; NaN if hardly any beam came back.
+        """
+        answered = np.flatnonzero(scan.answered)
+        if len(answered) < _LEAST_BEAMS:
+            return np.full(len(map_from_base), np.nan)
+        beams = answered[np.linspace(0, len(answered) - 1, min(_BEAMS, len(answered))).astype(int)]
+        points = scan.points_in_base()[beams]
+        found: List[np.ndarray] = [np.zeros(0)]
+        for first in range(0, len(map_from_base), _AT_ONCE):
+            poses = map_from_base[first:first + _AT_ONCE]
+            found.append(self._explained(scan, beams, self._slid(points, poses)))
+        return np.concatenate(found)
+
+    def _slid(self, points_m: np.ndarray, poses: np.ndarray) -> np.ndarray:
+        slid = scan_alignment.align(self._field, points_m, poses, last_scale_m=0.1).poses
+        off = slid - poses
+        kept = (np.hypot(off[:, 0], off[:, 1]) < _SLIDES_M) & (np.abs(angles.wrap(off[:, 2])) < _SLIDES_RAD)
+        return np.where(kept[:, None], slid, poses)
+
+    def _explained(self, scan: Scan, beams: np.ndarray, poses: np.ndarray) -> np.ndarray:
+        hits = self._caster.cast_surfaces(se2.compose(poses, scan.base_from_laser), scan.angles_rad[beams],
+                                          scan.range_max_m, max_thickness_m=_MOST_THICK_M)
+        measured = scan.ranges_m[beams]
+        offered = np.stack([hits.first_m, hits.second_m, hits.third_m, hits.mirrored_m])  # (4, P, B)
+        return (np.abs(offered - measured) <= self._near_m).any(axis=0).mean(axis=1)

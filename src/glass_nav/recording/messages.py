@@ -1,0 +1,20 @@
+"""Definitions of our messages, and of those that bags of ROS 2 may not bring along; for rosbags 0.9.23 and later."""
+
+from __future__ import annotations
+
+from typing import Any
+
+TRUE_BEAMS = "Header header\nuint8[] cases\nfloat32[] exact\nfloat32[] crossing\n"  # msg/*.msg, bare
+BEAM_CASES = "Header header\nuint8[] cases\nfloat32[] expected\nfloat32[] residual\nfloat32[] weight\n"
+STATUS = ("uint8 UNKNOWN=0\nuint8 GLOBAL_SEARCH=1\nuint8 LOCALIZED=2\nuint8 UNCERTAIN=3\nuint8 LOST=4\n"
+          "Header header\nuint8 state\nstring state_name\nstring reason\nfloat32 used_share\nfloat32 reliability\n")
+
+
+def ros2_store() -> Any:
+    """Types of ROS 2 Humble and ours: older sqlite3 bags name types without defining them."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    store.register(get_types_from_msg(TRUE_BEAMS, "glass_nav/msg/TrueBeams"))
+    store.register(get_types_from_msg(BEAM_CASES, "glass_nav/msg/BeamCases"))
+    return store
