@@ -17,8 +17,8 @@ from glass_nav.sensing.deskew import Deskew
 
 # Of localization_node, beside AMCL's: without a meaning for the replay of a log.
 NODE_ONLY = frozenset(["transform_wait_s", "random_seed", "glass_map_period_s", "scan_topics",
-                       "publish_tf_before_localized", "start_without_guess", "wait_for_initialpose", "pose_file", "pose_file_max_age_s",
-                       "pose_file_max_speed_m_s", "landmark_file"])
+                       "publish_tf_before_localized", "start_without_guess", "wait_for_initialpose", "pose_file",
+                       "pose_file_max_age_s", "pose_file_max_speed_m_s", "landmark_file"])
 
 
 @dataclass(frozen=True)

@@ -245,6 +245,10 @@ class EdgeDriver:
         """(n, 2) that it drives along, in odom; n = 0: none."""
         return np.zeros((0, 2)) if self._way is None else self._way.points
 
+    def local_from_base(self, odom_from_base: np.ndarray) -> np.ndarray:
+        """(3,) pose of the robot in the frame of map, graph and way, which is odom without its drift."""
+        return self._at.now(odom_from_base)
+
     def obstacles_m(self, odom_from_base: np.ndarray) -> np.ndarray:
         """(K, 2) what stands near the robot at that pose (3,), in its frame: the last scan, the walls of the local map.
         """

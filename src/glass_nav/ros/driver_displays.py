@@ -14,6 +14,7 @@ from geometry_msgs.msg import Pose, Quaternion, Vector3
 from visualization_msgs.msg import Marker, MarkerArray
 
 from glass_nav.driving.edge_driver import EdgeDriver
+from glass_nav.geometry import se2
 from glass_nav.ros import conversions
 from glass_nav.ros.packed_markers import PackedMarkerArray, colour, points_marker
 
@@ -29,7 +30,7 @@ def driver_markers(driver: EdgeDriver, route_m: Optional[np.ndarray], odom_from_
     """All of them; namespaces without anything are cleared.
 
     Args:
-        driver: with its graph, meetpoint and way, in odom.
+        driver: with its graph, meetpoint and way, in a frame of its own.
         route_m: (M, 2) in the map; None: none.
         odom_from_base: (3,) where the words go.
         text: state and reason.
@@ -44,16 +45,19 @@ def driver_markers(driver: EdgeDriver, route_m: Optional[np.ndarray], odom_from_
         for branch in node.branches:
             direction = np.array([np.cos(branch.bearing_rad), np.sin(branch.bearing_rad)])
             arms.append(np.stack([node.position_m, node.position_m + _ARM_M * direction]))
+    odom_from_local = se2.compose(odom_from_base, se2.inverse(driver.local_from_base(odom_from_base)))
     header, in_map = conversions.header(0, odom_frame), conversions.header(0, map_frame)  # stamp 0: for every time
 
     def line(namespace: str, points: np.ndarray, width_m: float, rgb: "tuple[int, int, int]") -> Marker:
         of = in_map if namespace == "route" else header
+        points = points if namespace == "route" else se2.transform_points(odom_from_local, points)
         return points_marker(of, namespace, 0, Marker.LINE_LIST, points, _HEIGHT_M, width_m, colour(np.array(rgb)))
 
     route = [] if route_m is None else [route_m]
     return PackedMarkerArray([
         line("local_edges", _pairs(lines), 0.03, EDGE_RGB),
-        points_marker(header, "local_nodes", 0, Marker.POINTS, nodes, _HEIGHT_M, 0.12, colour(np.array(NODE_RGB))),
+        points_marker(header, "local_nodes", 0, Marker.POINTS, se2.transform_points(odom_from_local, nodes), _HEIGHT_M,
+                      0.12, colour(np.array(NODE_RGB))),
         line("meetpoint", _pairs(arms), 0.08, MEETPOINT_RGB),
         line("way", _pairs([driver.way_m]), 0.06, WAY_RGB),
         line("route", _pairs(route), 0.06, ROUTE_RGB),

@@ -5,6 +5,7 @@ to goto_node, one after the other, prints the errors against the simulator's tru
 
 Subscribes: meetpoint, edge_traversal, turn_choice, topology_status, topology_candidates, initialpose, amcl_pose,
     localization_status, ground_truth, map.
+Calls: restart_search (Trigger), when the search is LOST.
 Parameters: WakeupDemoParams. Exit code: 0 if the place was right and the tour was driven, 1 if not, 2 for a parameter
     that cannot be used.
 """
@@ -25,6 +26,7 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
+from std_srvs.srv import Trigger
 
 from glass_nav import params
 from glass_nav.evaluation import pose_errors, wake_up_picture
@@ -43,7 +45,8 @@ from glass_nav.topology.observations import turn_name
 RIGHT_M, RIGHT_RAD = 0.5, 0.35  # a pose that is handed over so near is right
 DONE = ("CONFIRMED", "AMBIGUOUS", "LOST")
 LEAST_ROOM_M = 0.5              # around nodes of the tour
-LEAST_LEG_M, MOST_LEG_M = 4.0, 12.0
+LEAST_LEG_M, LEG_M = 2.0, 8.0   # from node to node, at least and about
+LEG_CHOICES = 4                 # nodes of which one is drawn
 
 
 @dataclass(frozen=True)
@@ -51,9 +54,10 @@ class WakeupDemoParams:
     """Private parameters of the node."""
     atlas: str = ""              # of the building
     picture: str = ""            # file of the picture; empty: none
+    searches: int = 3            # a robot that is LOST begins anew where it stands, so often at most
     tour: int = 4                # nodes to be driven to
     seed: int = 0                # of which
-    search_limit_s: float = 900.0  # simulated, for the search
+    search_limit_s: float = 900.0  # simulated, for one search
     tour_limit_s: float = 300.0    # simulated, for each node
     start_limit_s: float = 60.0    # of the wall clock, until something is heard
 
@@ -62,6 +66,8 @@ class WakeupDemoParams:
             raise ValueError("~atlas must be a file, a folder or the name of a shipped atlas, got ''")
         if self.tour < 0 or self.seed < 0:
             raise ValueError(f"~tour and ~seed must be >= 0, got {self.tour} and {self.seed}")
+        if self.searches < 1:
+            raise ValueError(f"~searches must be >= 1, got {self.searches}")
         for name in ("search_limit_s", "tour_limit_s", "start_limit_s"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ValueError(f"~{name} must be > 0 and finite, got {getattr(self, name)}")
@@ -106,12 +112,16 @@ class WakeupDemo:
         start = self._truth[min(self._truth)]
         self._print(f"wakes up at x {start[0]:.2f} m, y {start[1]:.2f} m, yaw {math.degrees(start[2]):.0f} degrees, "
                     "which it does not know")
-        if not self._wait(lambda: self._status is not None and self._status.state_name in DONE,
-                          simulated_s=self._p.search_limit_s):
-            self._print(f"the search did not end within {self._p.search_limit_s:g} s")
-            self._draw("still searching")
-            return 1
-        assert self._status is not None
+        for searches_left in reversed(range(self._p.searches)):
+            if not self._wait(lambda: self._status is not None and self._status.state_name in DONE,
+                              simulated_s=self._p.search_limit_s):
+                if not self._is_ending():
+                    self._print(f"the search did not end within {self._p.search_limit_s:g} s")
+                self._draw("still searching")
+                return 1
+            assert self._status is not None
+            if self._status.state_name != "LOST" or not searches_left or not self._search_anew():
+                break
         right = self._tell_outcome(self._status)
         toured = self._drive_tour() if right else False
         self._draw(self._status.state_name)
@@ -143,13 +153,29 @@ class WakeupDemo:
                     "the truth")
         return right
 
+    def _search_anew(self) -> bool:
+        """Whether there will be another search, from the meetpoint where the robot stands."""
+        assert self._status is not None
+        try:
+            rospy.ServiceProxy("restart_search", Trigger)()
+        except rospy.ServiceException as err:
+            self._print(f"no new search: {err}")
+            return False
+        if not self._wait(lambda: self._status is not None and self._status.state_name != "LOST", wall_s=10.0):
+            return False
+        self._print("LOST: it forgets the search and begins anew where it stands")
+        return True
+
     def _tell_depth(self, status: TopologyStatus) -> None:
         """One row of the search forest: the match edge, the match node, what is left, the turn."""
         stamp_ns = conversions.ns_from_stamp(status.header.stamp)
-        self._wait(lambda: stamp_ns in self._meetpoints and stamp_ns in self._candidates, wall_s=2.0, nested=True)
+        self._wait(lambda: stamp_ns in self._meetpoints and stamp_ns in self._candidates
+                   and self._candidates[stamp_ns].total == status.candidates, wall_s=2.0, nested=True)
         meetpoint, candidates = self._meetpoints.get(stamp_ns), self._candidates.get(stamp_ns)
         if meetpoint is None or candidates is None:
             return
+        if status.depth == 0:
+            self._depths = []
         self._print(f"search depth {status.depth}")
         traversal = self._traversals.get(stamp_ns)
         if traversal is not None and status.depth:
@@ -185,6 +211,8 @@ class WakeupDemo:
             self._client.send_goal(GotoNodeGoal(node=node))
             ended = self._wait(lambda: self._client.get_state() not in (GoalStatus.PENDING, GoalStatus.ACTIVE),
                                simulated_s=self._p.tour_limit_s)
+            if self._is_ending():
+                return False
             if not ended:
                 self._client.cancel_goal()
                 self._print(f"goto_node {node}: not there within {self._p.tour_limit_s:g} s")
@@ -210,9 +238,9 @@ class WakeupDemo:
         nodes: List[int] = []
         for _ in range(self._p.tour):
             away_m = np.hypot(*(position - position[at]).T)
-            fits = ((part == part[at]) & (atlas.nodes.r_m > LEAST_ROOM_M) & (away_m > LEAST_LEG_M)
-                    & (away_m < MOST_LEG_M))
-            choices = [node for node in np.flatnonzero(fits).tolist() if node not in nodes]
+            fits = (part == part[at]) & (atlas.nodes.r_m > LEAST_ROOM_M) & (away_m > LEAST_LEG_M)
+            fits[nodes] = False
+            choices = [node for node in np.argsort(np.abs(away_m - LEG_M)).tolist() if fits[node]][:LEG_CHOICES]
             if not choices:
                 break
             at = int(rng.choice(choices))
@@ -239,7 +267,7 @@ class WakeupDemo:
               nested: bool = False) -> bool:
         """Take in what comes until the condition holds, or too much time has passed."""
         began_s, wall_began_s = self._simulated_s(), time.monotonic()
-        while not (rospy.is_shutdown() or self._ending.is_set()):
+        while not self._is_ending():
             if condition():
                 return True
             if self._simulated_s() - began_s > simulated_s or time.monotonic() - wall_began_s > wall_s:
@@ -256,6 +284,9 @@ class WakeupDemo:
                 self._tell_depth(rows.pop(0))
                 rows, self._waiting_rows = self._waiting_rows + rows, []
         return False
+
+    def _is_ending(self) -> bool:
+        return bool(rospy.is_shutdown() or self._ending.is_set())
 
     def _hear(self, topic: str, msg: Any) -> Optional[TopologyStatus]:
         """A row of the search, if the message is one."""
