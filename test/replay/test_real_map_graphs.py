@@ -22,7 +22,8 @@ def real_map(request, data_dir):
 
 
 def clearance_cells(grid_map):
-    return max(VoronoiParams().robot_radius_m / grid_map.resolution_m, SEPARATION_CELLS / 2.0)
+    robot = VoronoiParams()
+    return max((robot.robot_radius_m + robot.passage_margin_m) / grid_map.resolution_m, SEPARATION_CELLS / 2.0)
 
 
 @pytest.mark.parametrize("smallest_obstacle_m", [0.0, VoronoiParams().smallest_obstacle_m])
