@@ -169,8 +169,9 @@ class Matcher:
             self._judged.clear()
         _, known = self._judged.setdefault(id(meetpoint), (meetpoint, {}))
         new = [each for each in dart.tolist() if each not in known]
-        shares = self._explained(meetpoint.scan, poses_at(self.atlas, np.array(new, np.int64), meetpoint))
-        known.update(zip(new, (~(shares < self._least_explained)).tolist()))  # a scan that says nothing rules out none
+        if new:
+            shares = self._explained(meetpoint.scan, poses_at(self.atlas, np.array(new, np.int64), meetpoint))
+            known.update(zip(new, (~(shares < self._least_explained)).tolist()))  # one that says nothing rules out none
         return np.array([known[each] for each in dart.tolist()], bool)
 
     def sigma_r_m(self, meetpoint: Optional[Meetpoint] = None) -> float:

@@ -68,7 +68,9 @@ def test_check_says_which_places_are_indistinguishable(tmp_path: Path, capsys: A
 
 def test_check_tries_as_many_places_as_it_is_told(capsys: Any) -> None:
     assert run("check", "glass_bridge", "--starts", "7", "--map", str(REPO / "maps" / "glass_bridge" / "map.yaml")) == 0
-    assert "a robot that wakes up (7 of 64 places)" in capsys.readouterr().out
+    places = len(atlas_file.load(shipped_atlases.find("glass_bridge")).darts)
+    assert places > 7
+    assert f"a robot that wakes up (7 of {places} places)" in capsys.readouterr().out
 
 
 def test_check_refuses_the_atlas_of_another_map(capsys: Any) -> None:

@@ -10,8 +10,8 @@ from sensor_msgs.msg import LaserScan
 from tf2_msgs.msg import TFMessage
 
 from glass_nav.msg import TrueBeams
-from glass_nav.recording import bag_writer
 from glass_nav.recording.bag_writer import BagWriter
+from glass_nav.recording.messages import TRUE_BEAMS
 from glass_nav.ros import conversions, frame_messages
 from glass_nav.ros.conversions import Mounting
 from glass_nav.ros.frame_messages import FrameNames
@@ -97,8 +97,9 @@ def test_bags_name_the_message_as_ros_does():
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC)
-    store.register(get_types_from_msg(bag_writer.TRUE_BEAMS, bag_writer.KINDS["/true_beams"]))
-    assert store.generate_msgdef(bag_writer.KINDS["/true_beams"])[1] == TrueBeams._md5sum
+    kind = BagWriter.KINDS["/true_beams"]
+    store.register(get_types_from_msg(TRUE_BEAMS, kind))
+    assert store.generate_msgdef(kind)[1] == TrueBeams._md5sum
 
 
 def transform(parent, child, parent_from_child):

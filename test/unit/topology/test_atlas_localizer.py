@@ -13,6 +13,7 @@ from glass_nav.topology.atlas import Atlas
 from glass_nav.topology.atlas_localizer import (AMBIGUOUS, CONFIRMED, LOST, SEARCHING, TENTATIVE, AtlasLocalizer,
                                                 SearchParams, poses_at)
 from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
+from glass_nav.sensing.scan import Scan
 
 DOCUMENT = SearchParams(vote_mode="seed", confirm_edges=0)
 
@@ -206,8 +207,91 @@ def test_the_pose_is_where_the_robot_says_it_stands_at_the_meetpoint() -> None:
 @pytest.mark.parametrize("fields, line", [
     ({"vote_mode": "majority"}, "~vote_mode must be best or seed, got 'majority'"),
     ({"confirm_edges": -1}, "~confirm_edges must be >= 0, got -1"),
-    ({"max_detection_errors": 3}, "~max_detection_errors must be 0, 1 or 2, got 3")])
+    ({"max_detection_errors": 3}, "~max_detection_errors must be 0, 1 or 2, got 3"),
+    ({"least_explained": 1.0}, "~least_explained must be in [0, 1), got 1.0"),
+    ({"least_explained": float("nan")}, "~least_explained must be in [0, 1), got nan"),
+    ({"searches": 0}, "~searches must be >= 1, got 0")])
 def test_parameters_that_mean_nothing_are_refused(fields: Dict[str, Any], line: str) -> None:
     with pytest.raises(ValueError) as refused:
         SearchParams(**fields)
     assert str(refused.value) == line
+
+
+SCAN = Scan(0, np.ones(3), np.zeros(3), 0.1, 10.0, np.zeros(3))
+
+
+def west(scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
+    """A judge to whom a scan fits at x < 50 only."""
+    return np.where(map_from_base[:, 0] < 50.0, 0.9, 0.1)
+
+
+def nowhere(scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
+    return np.full(len(map_from_base), 0.1)
+
+
+def twins() -> Atlas:
+    """Two equal rows of places, 100 m apart in x."""
+    xy = [(x + shift, y) for shift in (0.0, 100.0) for x, y in ((0, 0), (6, 0), (14, 0), (6, 5))]
+    ends = [(row + a, row + b) for row in (0, 4) for a, b in ((0, 1), (1, 2), (1, 3))]
+    return made_atlases.corridors(xy, [0.5, 1.3, 1.1, 1.7] * 2, ends)
+
+
+def driven_in_the_first_row(localizer: AtlasLocalizer, scan: "Scan | None") -> "list[Any]":
+    """From its west end east, back and into the side corridor."""
+    told = [localizer.start(Meetpoint(1, 0.5, scan=scan))]
+    for rank, length_m, degree, r_m in ((0, 6.0, 3, 1.3), (2, 8.0, 1, 1.1), (0, 8.0, 3, 1.3)):
+        if told[-1].done:
+            break
+        told.append(localizer.update(Traversal(rank, length_m, length_m), Meetpoint(degree, r_m, scan=scan)))
+    return told
+
+
+def test_what_nothing_else_can_tell_apart_scans_do() -> None:
+    plain = driven_in_the_first_row(AtlasLocalizer(twins(), SearchParams(use_edge_angles=False)), None)
+    assert [len(each.dart) for each in plain][:2] == [2, 2] and plain[-1].state != CONFIRMED
+    judged = driven_in_the_first_row(AtlasLocalizer(twins(), SearchParams(use_edge_angles=False), west), SCAN)
+    assert {len(each.dart) for each in judged} == {1}
+    assert judged[0].state == TENTATIVE and judged[-1].state == CONFIRMED
+
+
+def test_without_scans_a_judge_changes_nothing() -> None:
+    plain = driven_in_the_first_row(AtlasLocalizer(twins(), SearchParams()), None)
+    for judge, scan in ((nowhere, None), (None, SCAN)):
+        other = driven_in_the_first_row(AtlasLocalizer(twins(), SearchParams(), judge), scan)
+        assert [(each.state, each.reason, each.depth, each.dart.tolist()) for each in other] == [
+            (each.state, each.reason, each.depth, each.dart.tolist()) for each in plain]
+
+
+def test_the_procedure_of_the_document_asks_no_scans() -> None:
+    localizer = AtlasLocalizer(example(), DOCUMENT, nowhere)
+    assert localizer.start(Meetpoint(3, 1.5, scan=SCAN)).state == SEARCHING and nodes(localizer) == [0, 1]
+    assert localizer.update(Traversal(0, 30.0, 30.0), Meetpoint(3, 1.5, scan=SCAN)).state == LOST
+
+
+def test_where_nothing_fits_any_more_the_search_begins_anew_and_counts_on() -> None:
+    localizer = AtlasLocalizer(twins(), SearchParams(max_detection_errors=0, searches=3), west)
+    told = [localizer.start(Meetpoint(1, 0.5, scan=SCAN))]
+    wrong = Traversal(0, 30.0, 30.0)  # no edge is so long
+    told.append(localizer.update(wrong, Meetpoint(3, 1.3, scan=SCAN)))
+    assert told[-1].state != LOST and told[-1].depth == 1
+    assert told[-1].reason.startswith("search 2 of 3, nothing fitted any more: ")
+    assert nodes(localizer) == [1] and localizer.forest.depth == 0
+    told.append(localizer.update(Traversal(0, 6.0, 6.0), Meetpoint(1, 0.5, scan=SCAN)))  # goes on with what it is
+    assert told[-1].depth == 2 and "search" not in told[-1].reason.split(":")[0] and nodes(localizer) == [0]
+    told.append(localizer.update(wrong, Meetpoint(3, 1.3, scan=SCAN)))
+    assert told[-1].reason.startswith("search 3 of 3, ") and told[-1].depth == 3
+    told.append(localizer.update(Traversal(0, 31.0, 31.0), Meetpoint(1, 0.5, scan=SCAN)))
+    assert told[-1].state == LOST and told[-1].choice is None and told[-1].depth == 4
+    assert localizer.start(Meetpoint(1, 0.5, scan=SCAN)).depth == 0  # all is new
+    assert localizer.update(wrong, Meetpoint(3, 1.3, scan=SCAN)).reason.startswith("search 2 of 3, ")
+
+
+def test_a_robot_that_fits_nowhere_at_once_is_lost_and_without_scans_there_is_one_search() -> None:
+    params = SearchParams(max_detection_errors=0, searches=3)
+    assert AtlasLocalizer(twins(), params, nowhere).start(Meetpoint(1, 0.5, scan=SCAN)).state == LOST
+    localizer = AtlasLocalizer(twins(), params, west)
+    localizer.start(Meetpoint(1, 0.5))
+    assert localizer.update(Traversal(0, 30.0, 30.0), Meetpoint(3, 1.3)).state == LOST
+    single = AtlasLocalizer(twins(), SearchParams(max_detection_errors=0, searches=1), west)
+    single.start(Meetpoint(1, 0.5, scan=SCAN))
+    assert single.update(Traversal(0, 30.0, 30.0), Meetpoint(3, 1.3, scan=SCAN)).state == LOST

@@ -111,6 +111,20 @@ def test_doors_are_passed_if_the_robot_fits():
     assert degrees(closed) == [0, 4, 0, 0, 0] and closed.components()[0] == 2
 
 
+@pytest.mark.parametrize("margin_m, parts", [(0.0, 1), (0.06, 1), (0.12, 2)])
+def test_a_door_is_passed_if_the_margin_is_there_on_both_sides(margin_m, parts):
+    """0.8 m of free cells, 0.85 m between the middles of its jambs: 0.125 m on either side of a robot of 0.3 m."""
+    door = ROOMS[:1] + [(1, 7.2, 7, 11), (3.6, 7, 4.4, 7.2)]
+    room_m = 0.5 * 0.85 - 0.3
+    for off_m in (-0.02, 0.02):
+        graph = voronoi_graph.build(floor(22, 13, door), VoronoiParams(robot_radius_m=0.3,
+                                                                       passage_margin_m=room_m + off_m))
+        assert graph.components()[0] == (1 if off_m < 0.0 else 2)
+    graph = voronoi_graph.build(floor(22, 13, door), VoronoiParams(robot_radius_m=0.3 + room_m - 0.1,
+                                                                   passage_margin_m=margin_m))
+    assert graph.components()[0] == parts
+
+
 def test_posts_that_the_robot_can_pass_make_no_meetpoints_but_narrow_the_way():
     post = [(5.9, 6.0, 6.0, 6.1)]
     graph = voronoi_graph.build(floor(12, 8, STRAIGHT, post))
