@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import List, Optional
+from typing import Dict, List, Optional
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from glass_nav.topology.voronoi_graph import VoronoiParams
 
 _SAME_NODE_M = 0.3    # a node moves by no more from one graph to the next
 _STILL_M, _STILL_RAD = 0.02, 0.05  # a robot that moved less since the last graph sees nothing new
-_AGREE = 5            # graphs next to the nearest point of the way whose word counts
+_AGREE = 5            # graphs next to the nearest point of the way whose word counts: some before, some after
 _FOOT_M = 1.0         # the robot follows an edge if it is no further away than this
 
 
@@ -40,7 +40,7 @@ class PassingParams:
     graph_period_s: float = 0.3   # of the log, between two graphs,
     graph_step_m: float = 0.15    # unless the robot moved so far
     least_looks: int = 3          # graphs that must have a node
-    least_share: float = 0.5      # of those made from the first that had it to the last
+    least_share: float = 0.5      # of those made next to the nearest point of the way
     most_doubt_m: float = 0.15    # its obstacles are no further from any wall: the driver would look around first
     graph: VoronoiParams = field(default_factory=VoronoiParams)  # as the atlas was built with
     local_map: LocalMapParams = field(default_factory=LocalMapParams)
@@ -75,7 +75,7 @@ class PassedNode:
     r_m: float
     doubt_m: float
     looks: int                  # graphs that had it
-    share: float                # of those made from first_ns to last_ns
+    share: float                # of those next to the nearest point of the way, from first_ns on
 
 
 @dataclass(frozen=True)
@@ -97,6 +97,24 @@ class _Look:
     doubt_m: float
 
 
+class _Track:
+    """A node while the robot is about."""
+
+    def __init__(self, look: _Look) -> None:
+        self.looks = [look]
+        self.away_m: Dict[int, float] = {}  # of the robot at each graph since then, whether that has the node or not
+
+    @property
+    def last(self) -> _Look:
+        return self.looks[-1]
+
+    def share(self) -> float:
+        """Of the graphs next to the nearest point of the way, those that have it."""
+        nearest = min(self.away_m, key=lambda number: self.away_m[number])
+        beside = [number for number in self.away_m if abs(number - nearest) <= _AGREE // 2]
+        return sum(look.number in beside for look in self.looks) / len(beside)
+
+
 class PassingObserver:
     """see() every scan of a drive in its order, then finish()."""
 
@@ -104,7 +122,7 @@ class PassingObserver:
         self._p = p
         self._map, self._at = LocalMap(p.local_map), LocalPose()
         self._graph_params = local_graph.params_beside(p.graph)
-        self._open: List[List[_Look]] = []  # nodes that the robot is about
+        self._open: List[_Track] = []  # nodes that the robot is about
         self._graphs = 0
         self._last_ns = 0
         self._last_pose: Optional[np.ndarray] = None  # at the last graph
@@ -132,8 +150,8 @@ class PassingObserver:
 
     def finish(self) -> List[PassedNode]:
         """The drive is over: all nodes, those that the robot is still near to as well."""
-        for looks in self._open:
-            self._close(looks)
+        for track in self._open:
+            self._close(track)
         self._open = []
         self.passed.sort(key=lambda node: node.stamp_ns)
         return self.passed
@@ -155,13 +173,13 @@ class PassingObserver:
         for look in self._looks(graph, stamp_ns, pose):
             self._follow(look)
         about = []
-        for looks in self._open:
-            last = looks[-1]
-            away_m = float(np.hypot(*(last.position_m - pose[:2])))
-            if away_m > float(self._p.near(np.array(last.r_m))) + self._p.linger_m:
-                self._close(looks)
+        for track in self._open:
+            away_m = float(np.hypot(*(track.last.position_m - pose[:2])))
+            if away_m > float(self._p.near(np.array(track.last.r_m))) + self._p.linger_m:
+                self._close(track)
             else:
-                about.append(looks)
+                track.away_m[self._graphs] = away_m
+                about.append(track)
         self._open = about
         foot = graph.foot(pose[:2], _FOOT_M)
         self.way.append(WayPoint(stamp_ns, pose[:2].copy() if foot is None else graph.point(foot)))
@@ -178,14 +196,15 @@ class PassingObserver:
 
     def _follow(self, look: _Look) -> None:
         """To the node that it shows, which no other look of this graph showed; a new one if there is none."""
-        free = [looks for looks in self._open if looks[-1].number < look.number]
-        off = [float(np.hypot(*(looks[-1].position_m - look.position_m))) for looks in free]
+        free = [track for track in self._open if track.last.number < look.number]
+        off = [float(np.hypot(*(track.last.position_m - look.position_m))) for track in free]
         if off and min(off) <= _SAME_NODE_M:
-            free[int(np.argmin(off))].append(look)
+            free[int(np.argmin(off))].looks.append(look)
         else:
-            self._open.append([look])
+            self._open.append(_Track(look))
 
-    def _close(self, looks: List[_Look]) -> None:
+    def _close(self, track: _Track) -> None:
+        looks = track.looks
         nearest = min(looks, key=lambda look: look.away_m)
         agree = sorted(looks, key=lambda look: abs(look.number - nearest.number))[:_AGREE]
         degree = Counter(look.degree for look in agree).most_common(1)[0][0]
@@ -194,7 +213,7 @@ class PassingObserver:
             nearest.stamp_ns, looks[0].stamp_ns, looks[-1].stamp_ns, local_m,
             se2.transform_points(se2.inverse(nearest.local_from_base), local_m), nearest.away_m, degree,
             float(np.median([look.r_m for look in agree])), float(np.median([look.doubt_m for look in agree])),
-            len(looks), len(looks) / (looks[-1].number - looks[0].number + 1)))
+            len(looks), track.share()))
 
     def line_between(self, first: PassedNode, second: PassedNode) -> np.ndarray:
         """(n, 2) in the frame local: the edge that the robot followed from one node to the next."""

@@ -13,6 +13,7 @@ from glass_nav.evaluation.pictures import MapImage, draw_map
 MARGIN_M = 2.0
 COLOURS = {SEEN: "#2ca02c", MISSED: "#d62728", INVENTED: "#ff8c00"}
 _MARKS = {SEEN: "o", MISSED: "X", INVENTED: "D"}
+_SIZES = {SEEN: 9.0, MISSED: 5.0, INVENTED: 5.0}  # a node seen once and missed once shows both
 _WAY_COLOUR, _EDGE_COLOUR, _NODE_COLOUR = "#1f77b4", "#b9b9b9", "#8a8a8a"
 
 
@@ -67,7 +68,7 @@ def _draw_meetings(axes: Any, score: TopologyScore, verdict: str) -> None:
     places = np.array([score.known.position_m[each.visit.node] if each.visit is not None
                        else score.seen[each.seen].position_m for each in meetings  # type: ignore[index]
                        ])
-    axes.plot(*places.T, _MARKS[verdict], color=COLOURS[verdict], markersize=6.0, markeredgecolor="white",
+    axes.plot(*places.T, _MARKS[verdict], color=COLOURS[verdict], markersize=_SIZES[verdict], markeredgecolor="white",
               markeredgewidth=0.5, linestyle="none", zorder=4 + (verdict != SEEN), label=f"{len(meetings)} {verdict}")
     for place, each in zip(places, meetings):
         if each.visit is None or each.seen is None:
