@@ -153,10 +153,10 @@ def visits(known: KnownNodes, stamps_ns: np.ndarray, map_from_base: np.ndarray, 
         passing: what counts.
     """
     found: List[Visit] = []
-    at = map_from_base[:, :2]
+    at = np.where(np.isfinite(map_from_base[:, :2]), map_from_base[:, :2], np.inf)  # nowhere near
     for node, (position, near_m) in enumerate(zip(known.position_m, passing.near(known.r_m).tolist())):
         away = np.hypot(*(at - position).T)
-        about = np.flatnonzero(away <= near_m + passing.linger_m)  # NaN is not
+        about = np.flatnonzero(away <= near_m + passing.linger_m)
         for rows in np.split(about, np.flatnonzero(np.diff(about) > 1) + 1):
             near = rows[away[rows] <= near_m]
             in_sight = [row for row in near[np.argsort(away[near], kind="stable")].tolist()

@@ -66,8 +66,8 @@ def test_a_meetpoint_on_the_way_is_seen_and_told(run, tmp_path):
 
 def test_an_atlas_may_be_given_and_figures_of_it_may_decide_the_exit_code(run, drive, tmp_path):
     assert cli.main(["atlas", "build", str(drive / "run.map.yaml"), "--out", str(tmp_path / "t")]) == 0
-    code, _, err = run("--topology", tmp_path / "t", "--no-picture", "--ground-truth", "none", "--initial-pose", -3.2, 0,
-                       0, "--fail-if", "topology.seen>0")
+    code, _, err = run("--topology", tmp_path / "t", "--no-picture", "--ground-truth", "none", "--initial-pose", -3.2,
+                       0, 0, "--fail-if", "topology.seen>0")
     assert code == 1, err
     assert "topology.seen is 1: failed by --fail-if topology.seen > 0" in err
     assert not (tmp_path / "out" / "topology.png").exists()

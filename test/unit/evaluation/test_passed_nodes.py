@@ -150,7 +150,7 @@ def test_the_picture_shows_each_verdict_in_its_colour(tmp_path):
     grid = MapImage(np.zeros((40, 160), np.int8), 0.1, np.array([-3.0, -2.0, 0.0]))
     passed_nodes_picture.draw(path, grid, [KNOWN.position_m[[0, 1]]], along(WAY_M)[:, :2],
                               score([seen(0.3, degree=4), seen(7.5)]), "a drive")
-    pixels = image.imread(path)[..., :3]
+    pixels = image.imread(str(path))[..., :3]
     for colour in passed_nodes_picture.COLOURS.values():
         wanted = [int(colour[at:at + 2], 16) / 255.0 for at in (1, 3, 5)]
         assert (np.abs(pixels - wanted).max(axis=-1) < 0.02).sum() > 20
