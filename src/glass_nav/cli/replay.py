@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import platform
 import sys
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Optional, Tuple
@@ -12,7 +13,7 @@ from typing import Any, Callable, Dict, List, Optional, Tuple
 import numpy as np
 
 from glass_nav import params
-from glass_nav.cli import replay_bag, replay_params, replay_run
+from glass_nav.cli import replay_bag, replay_params, replay_run, replay_topology
 from glass_nav.cli.progress import Progress
 from glass_nav.cli.replay_params import Frames, ReplayParams
 from glass_nav.cli.replay_run import Window
@@ -26,6 +27,8 @@ from glass_nav.recording.log_file import open_log
 from glass_nav.recording.recording import LogOptions, Recording, Step
 from glass_nav.world import map_file
 from glass_nav.world.grid_map import GridMap
+
+Listener = Callable[[Step, Estimate], None]
 
 HELP = "run the localization on a recorded log"
 DESCRIPTION = """Runs the localization on a recorded log, every scan of it, and writes metrics.json,
@@ -43,6 +46,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--bag", type=Path, metavar="BAG",
                         help="also write a bag for rviz and PlotJuggler: map, tf, scans, poses, particles, status, "
                              "cases, cloud and glass map, on the topics of the node")
+    parser.add_argument("--topology", nargs="?", const=replay_topology.BUILD, metavar="ATLAS",
+                        help="also tell which nodes of an atlas the robot passed, and which of them it saw with lidar "
+                             "and odometry alone, as the driver does: a table, topology.csv and topology.png; an atlas "
+                             "file, its folder, or the name of a shipped one; default: made from the map")
     parser.add_argument("--fail-if", action="append", default=[], metavar="METRIC>LIMIT",
                         help="exit with 1 if a figure of metrics.json is beyond a limit, such as 'position_p95_m>0.3'; "
                              "may be repeated")
@@ -111,38 +118,45 @@ def main(arguments: argparse.Namespace) -> bool:
         whether the run keeps to the limits of --fail-if.
 
     Raises:
-        RecordingError, MapError, ParamError, ValueError, OSError: bad input; one line.
+        RecordingError, MapError, AtlasError, ParamError, ValueError, OSError: bad input; one line.
     """
     ready = prepare(arguments)
     recording, mcl, grid_map = ready.recording, ready.mcl, ready.grid_map
+    watch = None if arguments.topology is None else replay_topology.Watch(
+        replay_topology.atlas_of(arguments.topology, arguments.map, grid_map), grid_map)
     arguments.out.mkdir(parents=True, exist_ok=True)
     for note in ready.notes:
         _say(note)
     progress = Progress("replay", ready.expected_scans)
     try:
-        if arguments.bag is None:
-            result = ready.run(progress.step)
-        else:
-            arguments.bag.parent.mkdir(parents=True, exist_ok=True)
-            with replay_bag.listener(arguments.bag, recording, mcl, grid_map) as listen:
-                result = ready.run(progress.step, listen)
+        with ExitStack() as stack:
+            listeners: List[Listener] = [] if watch is None else [watch.listen]
+            if arguments.bag is not None:
+                arguments.bag.parent.mkdir(parents=True, exist_ok=True)
+                listeners.append(stack.enter_context(replay_bag.listener(arguments.bag, recording, mcl, grid_map)))
+            result = ready.run(progress.step, _all_of(listeners))
     finally:
         progress.finish()
-    about = {"log": " ".join(map(str, arguments.log)), "map": str(arguments.map), "start": ready.origin,
+    image = pictures.MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid)
+    topology = None if watch is None else watch.finish(result)
+    about: Dict[str, Any] = {"log": " ".join(map(str, arguments.log)), "map": str(arguments.map), "start": ready.origin,
              "notes": ready.notes, "params": params.as_mapping(ready.settings.mcl), "versions": versions()}
+    if watch is not None and topology is not None:
+        about["topology"] = topology.metrics()
+        replay_topology.write(arguments.out, topology, watch.atlas, None if arguments.no_picture else image,
+                              replay_topology.poses(result)[:, :2], recording.name)
     replay_result.write(result, arguments.out, about)
     glass = GridMap(mcl.glass_map.occupancy(), grid_map.resolution_m, grid_map.map_from_grid)
     map_file.save(glass, arguments.out / "glass_map.yaml", image_suffix=".png")
     if not arguments.no_picture:
-        image = pictures.MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid)
         pictures.draw_trajectory(arguments.out / "trajectory.png", image, result, recording.name)
         if result.case_scores is not None:
             pictures.draw_cases(arguments.out / "cases.png", image, result, recording.name)
     for reason, count in result.refusals.most_common():
         _say(f"{count} scans refused: {reason}")
-    print(table(result))
+    print("\n".join([table(result), *([] if topology is None else replay_topology.table(topology.metrics()))]))
     print(f"written to {arguments.out}" + ("" if arguments.bag is None else f" and {arguments.bag}"))
-    metrics = result.metrics()
+    metrics = {**result.metrics(), **({} if topology is None else {"topology": topology.metrics()})}
     failures = [failure for failure in (each.failure(metrics) for each in _thresholds(arguments)) if failure]
     for failure in failures:
         _say(failure)
@@ -279,6 +293,14 @@ def _start(mcl: GlassMcl, recording: Recording, arguments: argparse.Namespace,
     if truth is not None and len(truth):
         return lambda stamp_ns: mcl.set_pose(truth.at(np.int64(stamp_ns)), covariance), "the ground truth's first pose"
     return lambda stamp_ns: mcl.set_pose(defaults.pose, covariance), "initial_pose_* of the parameters"
+
+
+def _all_of(listeners: List[Listener]) -> Listener:
+    def listen(step: Step, estimate: Estimate) -> None:
+        for each in listeners:
+            each(step, estimate)
+
+    return listen
 
 
 def _say(text: str) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from glass_nav.driving import braking, edge_report, pursuit, velocity
+from glass_nav.driving import braking, edge_report, local_graph, pursuit, velocity
 from glass_nav.driving.base_limits import BaseLimits
 from glass_nav.driving.edge_report import Node, Trace
 from glass_nav.driving.local_graph import LocalGraph
@@ -64,7 +64,6 @@ _BEHIND_M = 1.0          # a node that shows only once the robot is past it
 _DOUBT_M = 0.15          # an obstacle that is further from any wall: look around first
 _BLOCKED_S = 4.0
 _LOST_LINE_S = 3.0       # driven on along the last line, without a graph that has it
-_THICKER_M = 0.03      # walls of the local map than those of a drawn one: noise of the ranges
 _SEEN_M = 0.12          # a wall of the map beside a point of the scan is the same
 _NEAR_M = 2.0            # obstacles further away are not braked for
 
@@ -120,7 +119,7 @@ class EdgeDriver:
     def __init__(self, p: EdgeDriverParams = EdgeDriverParams()) -> None:
         self._p = p
         self._map, self._at = LocalMap(p.local_map), LocalPose()
-        self._graph_params = replace(p.graph, passage_margin_m=max(p.graph.passage_margin_m - _THICKER_M, 0.0))
+        self._graph_params = local_graph.params_beside(p.graph)
         self.reset()
 
     def reset(self) -> None:

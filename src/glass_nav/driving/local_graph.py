@@ -6,7 +6,7 @@ Coordinates are those of the grid, odom. A way (n, 2) runs from where the robot 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import List, Optional, Tuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from glass_nav.topology import atlas_builder, voronoi_graph
 from glass_nav.topology.voronoi_graph import VoronoiGraph, VoronoiParams
 from glass_nav.world.grid_map import GridMap
 
+_THICKER_M = 0.03   # walls of the local map than those of a drawn one: noise of the ranges
 _ALONG_COS = 0.35   # an edge that turns away by more than 70 degrees is another one
 
 
@@ -34,6 +35,20 @@ class Branch:
     """A way that leaves a node."""
     bearing_rad: float  # as in the atlas, from the node to the point BEARING_AT_M along
     way_m: np.ndarray   # (n, 2) from the node on
+
+
+def params_beside(atlas: VoronoiParams) -> VoronoiParams:
+    """What the graph of a local map is made with, beside an atlas that was made with those."""
+    return replace(atlas, passage_margin_m=max(atlas.passage_margin_m - _THICKER_M, 0.0))
+
+
+def in_sight(grid: GridMap, from_m: np.ndarray, to_m: np.ndarray) -> bool:
+    """Whether nothing of a map stands on the straight way between two points (2,) in it."""
+    count = int(np.hypot(*(to_m - from_m)) / (0.5 * grid.resolution_m)) + 2
+    points = from_m + np.linspace(0.0, 1.0, count)[:, None] * (to_m - from_m)
+    rows, columns = grid.cells(points)
+    inside = grid.contains(rows, columns)
+    return bool(inside.all()) and not grid.occupied[rows, columns].any()
 
 
 class LocalGraph:
@@ -72,13 +87,13 @@ class LocalGraph:
                 return int(index)
         return None
 
+    def point(self, foot: int) -> np.ndarray:
+        """(2,) of the graph, by its index."""
+        return self._points[foot]
+
     def sees(self, from_m: np.ndarray, to_m: np.ndarray) -> bool:
         """Whether nothing stands on the straight way."""
-        count = int(np.hypot(*(to_m - from_m)) / (0.5 * self._grid.resolution_m)) + 2
-        points = from_m + np.linspace(0.0, 1.0, count)[:, None] * (to_m - from_m)
-        rows, columns = self._grid.cells(points)
-        inside = self._grid.contains(rows, columns)
-        return bool(inside.all()) and not self._grid.occupied[rows, columns].any()
+        return in_sight(self._grid, from_m, to_m)
 
     def ahead(self, foot: int, along: np.ndarray) -> Ahead:
         """From a point of the graph on, in that direction (2,)."""

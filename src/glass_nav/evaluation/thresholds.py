@@ -18,7 +18,9 @@ KNOWN = (*ERRORS, "scans", "scans_refused", "updates", "scans_without_ground_tru
          "cpu_ms_per_update", "log_duration_s", "wall_s", "times_real_time",
          *(f"state_share.{state}" for state in STATES), *(f"case_share.{case}" for case in range(5)),
          "cases.accuracy", "cases.accuracy_answered", "cases.macro_f1", "cases.used_share",
-         "scan_surfaces.cut_at_pane_share", "scan_surfaces.cut_wrongly_share", "scan_surfaces.trusted_share")
+         "scan_surfaces.cut_at_pane_share", "scan_surfaces.cut_wrongly_share", "scan_surfaces.trusted_share",
+         *(f"topology.{figure}" for figure in ("passed", "seen", "missed", "invented", "degree_right", "seen_share",
+                                               "degree_right_share")))
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ class Threshold:
         value = _value(metrics, self.metric)
         if value is None:
             raise ValueError(f"--fail-if {self}: this log gives no {self.metric}; it has no ground truth or no true "
-                             "cases for it")
+                             "cases for it, or --topology was not given")
         if not COMPARISONS[self.comparison](value, self.limit):
             return None
         return f"{self.metric} is {value:.4g}: failed by --fail-if {self}"

@@ -229,7 +229,8 @@ def test_wrong_usage_is_exit_code_2(run, options, text):
     (["--fail-if", "position_p95_m>0.3", "--fail-if", "scans<1000"], 1,
      "glass_nav replay: scans is 20: failed by --fail-if scans < 1000"),
     (["--fail-if", "cases.accuracy<0.9"], 3, "glass_nav replay: --fail-if cases.accuracy < 0.9: this log gives no "
-                                             "cases.accuracy; it has no ground truth or no true cases for it")])
+                                             "cases.accuracy; it has no ground truth or no true cases for it, "
+                                             "or --topology was not given")])
 def test_a_limit_on_a_figure_decides_the_exit_code(run, room_bag, tmp_path, options, code, line):
     told, _, err = run(room_bag().write(), "--no-picture", *options)
     assert told == code
