@@ -84,7 +84,7 @@ def main(arguments: argparse.Namespace) -> None:
         _say(f"{each.job}: {each.reason}")
     if failed and not made:
         raise ValueError(f"none of {len(failed)} runs could be made; the first: {failed[0].reason}")
-    names = [each.name for each in everyone]
+    names = [each.name for each in everyone if any(run.contestant == each.name for run in runs)]
     compared = comparison.of(runs, names, list(maps))
     for note in compared.notes:
         _say(note)

@@ -195,13 +195,19 @@ def jobs(everyone: Sequence[Contestant], over: Sequence[Log], seeds: Sequence[in
 
 def replay_arguments(arguments: argparse.Namespace, contestant: Contestant, log: Log,
                      seed: Optional[int]) -> argparse.Namespace:
-    """As if `glass_nav replay` had been given them."""
+    """As if `glass_nav replay` had been given them; whole paths, as who runs it may be in another folder."""
     given = argparse.Namespace(**vars(arguments))
-    given.log, given.map, given.params, given.seed = list(log.paths), log.map, contestant.params, seed or 0
-    given.ground_truth = log.ground_truth if log.ground_truth is not None else arguments.ground_truth
+    given.log, given.map, given.seed = [_whole(path) for path in log.paths], _whole(log.map), seed or 0
+    given.params = None if contestant.params is None else _whole(contestant.params)
+    truth = log.ground_truth if log.ground_truth is not None else arguments.ground_truth
+    given.ground_truth = truth if truth is None or not Path(truth).is_file() else str(_whole(Path(truth)))
     given.initial_pose = list(log.initial_pose) if log.initial_pose is not None else arguments.initial_pose
     given.fail_if = []
     return given
+
+
+def _whole(path: Path) -> Path:
+    return Path(os.path.abspath(path))
 
 
 def check(everyone: Sequence[Contestant]) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Callable, Iterator, List, Optional, Sequence, Union
 
 POLL_S = 0.2
-CONNECT_S = 20.0
+CONNECT_S = 10.0
 
 
 class EngineError(ValueError):
@@ -138,7 +138,7 @@ def _on_dask(jobs: Sequence[Any], work: Work, step_done: Callable[[int], None], 
     except ImportError as err:
         raise EngineError(f"--scheduler needs the Python package distributed (pip install distributed): {err}") from err
     try:
-        client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
+        client = distributed.Client(address, timeout=CONNECT_S)
     except (OSError, ValueError) as err:
         raise EngineError(f"no Dask scheduler answers at {address}: {' '.join(str(err).split())}") from err
     with client:
