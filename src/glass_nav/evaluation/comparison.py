@@ -41,7 +41,7 @@ FIGURES = (
     Figure("lost_share", "more than 0.5 m off", "%", 100.0, 2, -1),
     Figure("localized_share", "says LOCALIZED", "%", 100.0, 1, 1),
     Figure("case_accuracy", "beam cases right", "%", 100.0, 2, 1),
-    Figure("apart_mean_m", "from the first, mean", "m", 1.0, 3, 0),
+    Figure("apart_mean_m", "distance from the first", "m", 1.0, 3, 0),
     Figure("cpu_ms_per_scan", "CPU per scan", "ms", 1.0, 1, -1, timing=True),
 )
 BY_NAME = {figure.name: figure for figure in FIGURES}
@@ -212,9 +212,10 @@ def text(figure: Figure, interval: Optional[Interval], signed: bool = False) -> 
         return "infinite"
     sign, digits = "+" if signed else "", figure.digits
     width = interval.half_width
-    if width:  # so many digits that the interval's first one shows, but not without end
-        digits = min(max(digits, -math.floor(math.log10(figure.scale * width))), digits + 2)
-    mean = f"{figure.scale * interval.mean:{sign}.{digits}f}"
+    if width and figure.scale * width >= 10.0 ** -(digits + 2):  # as many digits as show the first one of the interval
+        digits = max(digits, -math.floor(math.log10(figure.scale * width)))
+    shown = round(figure.scale * interval.mean, digits) or 0.0  # no minus before a zero
+    mean = f"{shown:{sign}.{digits}f}"
     return mean if width is None else f"{mean} ± {figure.scale * width:.{digits}f}"
 
 
@@ -222,6 +223,8 @@ def judged(figure: Figure, difference: Optional[Interval]) -> str:
     """In words, of a difference to the first."""
     if figure.better == 0 or difference is None or difference.half_width is None:
         return ""
+    if difference == Interval(0.0, 0.0):
+        return "equal"
     return {0: "not told apart", figure.better: "better", -figure.better: "worse"}[difference.sign]
 
 

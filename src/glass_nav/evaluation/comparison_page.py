@@ -52,17 +52,22 @@ def headline(compared: Comparison) -> str:
     first, *others = compared.contestants
     figure = compared.figures[0]
     value = comparison.text(figure, compared.interval(first, figure))
+    if figure.better == 0:  # nobody knows more than that
+        return f"{figure.title[0].upper()}{figure.title[1:]}: " + "; ".join(
+            f"{name} {comparison.text(figure, compared.interval(name, figure))} {figure.unit}" for name in others)
     words = []
     for name in others:
         difference = compared.difference(name, figure)
         told = comparison.judged(figure, difference)
-        if told:
-            words.append(f"{name} is {told} than {first}" if told in ("better", "worse")
-                         else f"{name} and {first} are not told apart")
-        elif difference is not None:
-            words.append(f"{name} against {first}, without an interval")
-    said = "; ".join(f"{word} ({comparison.text(figure, compared.difference(name, figure), signed=True)} {figure.unit})"
-                     for word, name in zip(words, others)) or f"{first}: {value} {figure.unit}"
+        if told in ("better", "worse"):
+            words.append(f"{name} is {told} than {first}")
+        elif told:
+            words.append(f"{name} and {first} are {told}")
+        else:
+            words.append(f"{name} against {first}")
+        if difference is not None:
+            words[-1] += f" ({comparison.text(figure, difference, signed=True)} {figure.unit})"
+    said = "; ".join(words) or f"{first} {value} {figure.unit}"
     return f"{figure.title[0].upper()}{figure.title[1:]}: {said}"
 
 

@@ -65,7 +65,7 @@ def _panel(axes: Any, compared: Comparison, each: Figure, named: bool) -> None:
                       markeredgewidth=0)
         interval = compared.interval(name, each)
         if interval is None or not math.isfinite(interval.mean):
-            word = "not known" if interval is None else "infinite"
+            word = "infinite" if interval is not None else "is the first" if each.better == 0 else "not known"
             axes.annotate(word, (0.02, row), xycoords=("axes fraction", "data"), va="center", fontsize=8)
             continue
         axes.errorbar(each.scale * interval.mean, row, xerr=each.scale * (interval.half_width or 0.0), fmt="s",
@@ -75,6 +75,8 @@ def _panel(axes: Any, compared: Comparison, each: Figure, named: bool) -> None:
     if each.unit in ("m", "deg") and len(shown) and shown.max() > _WIDE * max(shown.min(), _LEAST_M):
         axes.set_xscale("symlog", linthresh=_LEAST_M, linscale=0.3)  # from zero on, as poses of the truth have it
         axes.set_xlim(left=0.0)
+    else:
+        axes.locator_params(axis="x", nbins=5)
     axes.set_ylim(count - 0.5, -0.5)
     axes.set_yticks(range(count))
     axes.set_yticklabels(compared.contestants if named else [""] * count, fontsize=9)

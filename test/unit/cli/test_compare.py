@@ -73,7 +73,7 @@ def test_what_another_localization_left_in_the_bag_is_measured_as_ours_is(run, r
     assert (amcl["scans"], tf["scans"], ours["scans"]) == ("15", "16", "20")
     assert (amcl["seed"], amcl["localized_share"], ours["seed"]) == ("", "", "0")
     assert float(ours["position_mean_m"]) < 0.1
-    assert "without an interval" in (tmp_path / "out" / "compare.html").read_text()
+    assert "default against amcl (-0.1" in (tmp_path / "out" / "compare.html").read_text()
 
 
 def test_results_of_replays_are_compared_as_new_runs_are(run, room_bag, room_map, few, tmp_path):

@@ -37,6 +37,8 @@ def test_seeds_are_compared_in_pairs():
     assert comparison.judged(MEAN, difference) == "not told apart"
     assert comparison.judged(MEAN, Interval(-0.0133, 0.01)) == "better"
     assert comparison.judged(BY_NAME["localized_share"], Interval(-0.2, 0.1)) == "worse"
+    assert comparison.judged(MEAN, Interval(0.0, 0.0)) == "equal"
+    assert comparison.judged(BY_NAME["apart_mean_m"], Interval(1.0, 0.1)) == ""
     assert found.interval("old", MEAN).half_width > 0.5
 
 
@@ -109,7 +111,7 @@ def test_a_filter_that_diverged_is_infinitely_far_off_and_no_interval_is_told():
 
 @pytest.mark.parametrize("interval, text", [
     (Interval(0.1234, 0.0456), "0.123 ± 0.046"), (Interval(0.1234, None), "0.123"), (None, "–"),
-    (Interval(0.12345, 0.00012), "0.1235 ± 0.0001"), (Interval(0.5, 1e-9), "0.50000 ± 0.00000")])
+    (Interval(-0.00001, 0.01), "0.000 ± 0.010"), (Interval(0.12345, 0.00012), "0.1235 ± 0.0001"), (Interval(0.5, 1e-9), "0.500 ± 0.000")])
 def test_digits_go_as_far_as_the_interval(interval, text):
     assert comparison.text(MEAN, interval) == text
 
