@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 import os
 import time
+from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from glass_nav.evaluation import comparison, pose_errors, replay_result
 from glass_nav.evaluation.comparison import Run
 from glass_nav.geometry import se2
 from glass_nav.geometry.trajectory import Trajectory
-from glass_nav.recording.recording import RecordingError, Step
+from glass_nav.recording.recording import Entry, RecordingError, Step
 
 DEFAULT = "default"
 RECORDED = ("topic:", "tf:")
@@ -242,19 +243,29 @@ def _recorded(job: Job, source: str, step_done: Callable[[], None]) -> Run:
     theirs.ground_truth = source[len("topic:"):] if source.startswith("topic:") else source
     poses = replay.open_recording(theirs, ours.settings).ground_truth
     assert poses is not None  # a topic that is asked for and not there is an error
-    entries = list(ours.recording)
-    steps = [entry for entry in entries if isinstance(entry, Step)]
-    if not steps:
-        raise RecordingError(f"{job.log}: none of its {len(entries)} scans can be used")
-    unique, first = np.unique([step.scan.stamp_ns for step in steps], return_index=True)
-    odometry = Trajectory(unique.astype(np.int64), np.array([steps[index].odom_from_base for index in first]))
-    wanted = {id(entry) for entry in ours.window.of(entries)}
-    stamps_ns = np.unique([step.scan.stamp_ns for step in steps if id(step) in wanted]).astype(np.int64)
-    found, map_from_base = carried(poses, odometry, stamps_ns)
+    at_ns: List[int] = []
+    odom_from_base: List[np.ndarray] = []
+
+    def noted() -> Iterator[Entry]:
+        for entry in ours.recording:
+            if isinstance(entry, Step):
+                at_ns.append(entry.scan.stamp_ns)
+                odom_from_base.append(entry.odom_from_base)
+            yield entry
+
+    entries, wanted = noted(), []
+    for entry in ours.window.of(entries):
+        if isinstance(entry, Step):
+            wanted.append(entry.scan.stamp_ns)
+        step_done()
+    deque(entries, maxlen=0)  # poses may belong to scans before and after those wanted
+    if not wanted:
+        raise RecordingError(f"{job.log}: none of its scans can be used")
+    unique, first = np.unique(np.array(at_ns, np.int64), return_index=True)
+    stamps_ns = np.unique(np.array(wanted, np.int64))
+    found, map_from_base = carried(poses, Trajectory(unique, np.array(odom_from_base)[first]), stamps_ns)
     if not found.any():
         raise RecordingError(f"{job.log}: {source} has no pose before the last scan")
-    for _ in range(ours.expected_scans):
-        step_done()
     errors = pose_errors.of(stamps_ns[found], map_from_base[found], ours.recording.ground_truth)
     return Run(job.contestant.name, job.log, None, stamps_ns[found], map_from_base[found], errors, None, None, None,
                time.perf_counter() - began, ours.recording.ground_truth)

@@ -76,6 +76,18 @@ def test_what_another_localization_left_in_the_bag_is_measured_as_ours_is(run, r
     assert "default against amcl (-0.1" in (tmp_path / "out" / "compare.html").read_text()
 
 
+def test_a_log_that_has_no_recorded_pose_in_time_is_told(run, room_bag, room_map, tmp_path):
+    path = room_bag(amcl_error_m=0.1).write()
+    options = ("compare", "topic:/amcl_pose", "--log", f"{path}={room_map}", "--out", tmp_path / "out")
+    code, _, err = run(*options, "--max-scans", 4)
+    assert (code, err.splitlines()[-1]) == (
+        3, "glass_nav compare: none of 1 runs could be made; the first: room.bag: topic:/amcl_pose has no pose before "
+           "the last scan")
+    assert run(*options, "--start", 60)[2].endswith("the first: room.bag: none of its scans can be used\n")
+    assert run(*options, "--start", 1.0, "--max-scans", 2)[0] == 0  # carried on from before
+    assert [row["scans"] for row in rows(tmp_path / "out")] == ["2"]
+
+
 def test_results_of_replays_are_compared_as_new_runs_are(run, room_bag, room_map, few, tmp_path):
     path = room_bag(scans=8, true_beams=(("/true_beams", "TrueBeams"),)).write()
     for seed in (0, 1):
