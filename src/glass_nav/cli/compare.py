@@ -100,7 +100,12 @@ def _run(jobs: List[Job], logs: List[Log], arguments: argparse.Namespace) -> "Tu
     """All jobs, with one progress over all of them."""
     if not jobs:
         return [], []
-    scans = {log.name: _expected_scans(log, jobs) for log in logs}
+    scans, opened = {}, []
+    for log in logs:
+        of_log = [job for job in jobs if job.log == log.name]
+        scans[log.name], placed = _opened(log, of_log)
+        opened += placed
+    jobs = opened
     progress = Progress("compare", sum(scans[job.log] for job in jobs))
     try:
         answers = engine.run(jobs, compare_runs.make, progress.step, arguments.jobs, arguments.scheduler)
@@ -110,12 +115,17 @@ def _run(jobs: List[Job], logs: List[Log], arguments: argparse.Namespace) -> "Tu
             [each for each in answers if isinstance(each, Failed)])
 
 
-def _expected_scans(log: Log, jobs: List[Job]) -> int:
-    """About how many; says what was chosen in the log, and refuses one that cannot be used before anything runs."""
-    ready = replay.prepare(next(job for job in jobs if job.log == log.name).arguments)
+def _opened(log: Log, jobs: List[Job]) -> "Tuple[int, List[Job]]":
+    """About how many scans it has, and the jobs with where they start; says what was chosen in the log, and refuses one
+    that cannot be used before anything runs."""
+    ready = replay.prepare(jobs[0].arguments)
+    jobs, start = compare_runs.started(jobs, ready)
     for note in ready.notes:
-        _say(f"{log.name}: {note}")
-    return ready.expected_scans
+        if not (start and note.startswith("start: ")):
+            _say(f"{log.name}: {note}")
+    if start:
+        _say(f"{log.name}: {start}")
+    return ready.expected_scans, jobs
 
 
 def _write(compared: Comparison, maps: Dict[str, Path], everyone: List[Contestant],

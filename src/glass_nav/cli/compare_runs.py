@@ -13,6 +13,7 @@ from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence, Tupl
 import numpy as np
 
 from glass_nav.cli import replay, replay_params
+from glass_nav.cli.replay import Prepared
 from glass_nav.evaluation import comparison, pose_errors, replay_result
 from glass_nav.evaluation.comparison import Run
 from glass_nav.geometry import se2
@@ -229,20 +230,63 @@ def make(job: Job, step_done: Callable[[], None]) -> Run:
         RecordingError, MapError, ParamError, ValueError, OSError: bad input; one line.
     """
     if job.contestant.recorded is not None:
-        return _recorded(job, job.contestant.recorded, step_done)
+        return _recorded(job, step_done)
     result = replay.prepare(job.arguments).run(step_done)
     accuracy = None if result.case_scores is None else result.case_scores.metrics()["accuracy"]
     return comparison.run_of(job.contestant.name, job.log, result, accuracy)
 
 
-def _recorded(job: Job, source: str, step_done: Callable[[], None]) -> Run:
-    """What another localization left in the log, at the stamp of every scan of ours."""
+def started(jobs_of_log: Sequence[Job], ready: Prepared) -> "Tuple[List[Job], str]":
+    """The jobs, and in words what was changed: where nobody says where the robot starts, ours start where recorded
+    poses that take part have it, not at the pose of the parameters, which is of another day.
+
+    Args:
+        jobs_of_log: all over one log.
+        ready: one of them, opened.
+
+    Raises:
+        RecordingError: the log cannot be used, or has no such poses.
+    """
+    given = jobs_of_log[0].arguments
+    recorded = next((job for job in jobs_of_log if job.contestant.recorded is not None), None)
+    if recorded is None or ready.recording.ground_truth is not None or given.everywhere or given.initial_pose:
+        return list(jobs_of_log), ""
+    way = _recorded_way(recorded, lambda: None)
+    first_ns, known_ns = way.wanted_ns[0], way.stamps_ns[0]
+    map_from_odom = se2.compose(way.map_from_base[0], se2.inverse(way.odometry.at(known_ns)))
+    start = se2.compose(map_from_odom, way.odometry.at(first_ns)).tolist()
+    for job in jobs_of_log:
+        job.arguments.initial_pose = start
+    return list(jobs_of_log), f"no ground truth: all start where {recorded.contestant.recorded} has the robot"
+
+
+@dataclass(frozen=True)
+class _Way:
+    """Poses that another localization left in a log."""
+    ours: Prepared
+    odometry: Trajectory       # odom_from_base, at all scans
+    wanted_ns: np.ndarray      # (W,) scans of the part of the log that is looked at
+    stamps_ns: np.ndarray      # (S,) those that have a pose
+    map_from_base: np.ndarray  # (S, 3)
+
+
+def _recorded(job: Job, step_done: Callable[[], None]) -> Run:
     began = time.perf_counter()
+    way = _recorded_way(job, step_done)
+    reference = way.ours.recording.ground_truth
+    errors = pose_errors.of(way.stamps_ns, way.map_from_base, reference)
+    return Run(job.contestant.name, job.log, None, way.stamps_ns, way.map_from_base, errors, None, None, None,
+               time.perf_counter() - began, reference)
+
+
+def _recorded_way(job: Job, step_done: Callable[[], None]) -> _Way:
+    """At the stamp of every scan of ours that has one."""
+    source = job.contestant.recorded or ""
     ours = replay.prepare(job.arguments)
     theirs = argparse.Namespace(**vars(job.arguments))
     theirs.ground_truth = source[len("topic:"):] if source.startswith("topic:") else source
     poses = replay.open_recording(theirs, ours.settings).ground_truth
-    assert poses is not None  # a topic that is asked for and not there is an error
+    assert poses is not None  # what is asked for and not there is an error
     at_ns: List[int] = []
     odom_from_base: List[np.ndarray] = []
 
@@ -262,13 +306,11 @@ def _recorded(job: Job, source: str, step_done: Callable[[], None]) -> Run:
     if not wanted:
         raise RecordingError(f"{job.log}: none of its scans can be used")
     unique, first = np.unique(np.array(at_ns, np.int64), return_index=True)
-    stamps_ns = np.unique(np.array(wanted, np.int64))
-    found, map_from_base = carried(poses, Trajectory(unique, np.array(odom_from_base)[first]), stamps_ns)
+    odometry, wanted_ns = Trajectory(unique, np.array(odom_from_base)[first]), np.unique(np.array(wanted, np.int64))
+    found, map_from_base = carried(poses, odometry, wanted_ns)
     if not found.any():
         raise RecordingError(f"{job.log}: {source} has no pose before the last scan")
-    errors = pose_errors.of(stamps_ns[found], map_from_base[found], ours.recording.ground_truth)
-    return Run(job.contestant.name, job.log, None, stamps_ns[found], map_from_base[found], errors, None, None, None,
-               time.perf_counter() - began, ours.recording.ground_truth)
+    return _Way(ours, odometry, wanted_ns, wanted_ns[found], map_from_base[found])
 
 
 def carried(poses: Trajectory, odometry: Trajectory, stamps_ns: np.ndarray) -> "Tuple[np.ndarray, np.ndarray]":

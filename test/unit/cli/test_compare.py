@@ -88,6 +88,21 @@ def test_a_log_that_has_no_recorded_pose_in_time_is_told(run, room_bag, room_map
     assert [row["scans"] for row in rows(tmp_path / "out")] == ["2"]
 
 
+def test_without_a_ground_truth_ours_start_where_the_recorded_poses_have_the_robot(run, room_bag, room_map, tmp_path):
+    """Known from scan 5 on, then 0.1 m too far: carried back to the first scan by odometry."""
+    path = room_bag(amcl_error_m=0.1, ground_truth=False).write()
+    options = ("compare", "amcl=topic:/amcl_pose", "default", "--log", f"{path}={room_map}", "--seeds", 1)
+    code, out, err = run(*options, "--out", tmp_path / "out")
+    assert code == 0
+    assert "glass_nav compare: room.bag: no ground truth: all start where topic:/amcl_pose has the robot\n" in err
+    assert "start: " not in err
+    found = {row["contestant"]: row for row in rows(tmp_path / "out")}
+    assert "position_mean_m" not in found["default"]
+    assert 0.1 < float(found["default"]["apart_mean_m"]) < 0.3  # ours is right; the other is 0.2 m off in the mean
+    code, _, err = run(*options, "--out", tmp_path / "other", "--initial-pose", 2.0, 1.2, 0.0)
+    assert (code, "start: --initial-pose" in err) == (0, True)
+
+
 def test_results_of_replays_are_compared_as_new_runs_are(run, room_bag, room_map, few, tmp_path):
     path = room_bag(scans=8, true_beams=(("/true_beams", "TrueBeams"),)).write()
     for seed in (0, 1):
