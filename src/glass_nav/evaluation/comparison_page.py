@@ -24,7 +24,7 @@ def write(path: Path, compared: Comparison, drawn: Sequence[Picture], about: Map
         *(f"<p>{escape(note)}</p>" for note in compared.notes), "</section>",
         '<h2 id="means">All logs</h2><div class="card">', report_page.table(head, rows, numbers=True),
         f"<p>{escape(_READING.format(first=compared.contestants[0]))}</p></div>",
-        report_page.framed(figures, lazy=False)]
+        '<h2 id="figures">In pictures</h2>', report_page.framed(figures, lazy=False)]
     if len(compared.logs) > 1:
         for log in compared.logs:
             head, *rows = summary(compared, log)

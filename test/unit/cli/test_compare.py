@@ -126,7 +126,7 @@ def test_results_of_replays_are_compared_as_new_runs_are(run, room_bag, room_map
 
 def test_several_logs_are_told_apart_and_together(run, room_bag, room_map, tmp_path):
     first = room_bag(scans=6).write().rename(tmp_path / "first.bag")
-    second = room_bag(scans=8, ground_truth=False).write().rename(tmp_path / "second.bag")
+    room_bag(scans=8, ground_truth=False).write().rename(tmp_path / "second.bag")
     x, y, yaw = room_bag().poses(room_bag().stamps_ns[:1])[0]
     (tmp_path / "logs.yaml").write_text(json.dumps(
         [{"log": "second.bag", "map": str(room_map), "initial_pose": [x, y, yaw]}]))
