@@ -13,10 +13,10 @@ import threading
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Callable, Iterator, List, Optional, Sequence, Union
+from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence, Union
 
 POLL_S = 0.2
-CONNECT_S = 10.0
+CONNECT_S, WORKER_S = 10.0, 60.0
 
 
 class EngineError(ValueError):
@@ -58,7 +58,7 @@ def _answered(work: Work, job: Any, step: Callable[[], None]) -> Any:
     try:
         return work(job, step)
     except (ValueError, OSError) as err:  # bad input, as the errors of this package are
-        return Failed(job, " ".join(str(err).split()) or type(err).__name__)
+        return Failed(job, _line(err) or type(err).__name__)
 
 
 def _on_cores(jobs: Sequence[Any], work: Work, step_done: Callable[[int], None], cores: int) -> List[Any]:
@@ -70,14 +70,21 @@ def _on_cores(jobs: Sequence[Any], work: Work, step_done: Callable[[int], None],
     with tempfile.TemporaryDirectory(prefix="glass_nav_") as folder:
         ticks = Path(folder) / "ticks"
         ticks.touch()
-        try:
-            # One thread for linear algebra in each: the cores are taken already.
-            with _Watched(ticks, step_done), _package_first(), joblib.parallel_backend(
-                    "loky", n_jobs=cores, inner_max_num_threads=1):
-                return list(joblib.Parallel()(joblib.delayed(_ticking)(work, job, str(ticks)) for job in jobs))
-        except BrokenProcessPool as err:
-            raise EngineError(f"a process of the {cores} ended on its own, out of memory? (fewer --jobs need less): "
-                              f"{str(err).partition('.')[0]}") from err
+        answers: List[Any] = []
+        # One thread for linear algebra in each: the cores are taken already.
+        with _Watched(ticks, step_done), _package_first(), joblib.parallel_backend(
+                "loky", n_jobs=cores, inner_max_num_threads=1):
+            try:
+                parallel = joblib.Parallel(return_as="generator")
+            except TypeError as err:
+                raise EngineError(f"joblib {joblib.__version__} is too old, 1.3 or later is needed") from err
+            try:
+                for answer in parallel(joblib.delayed(_ticking)(work, job, str(ticks)) for job in jobs):
+                    answers.append(answer)
+            except BrokenProcessPool:  # it ends them all, and does not say which job it was
+                answers += [Failed(job, "a process ended on its own, out of memory? (fewer --jobs need less)")
+                            for job in jobs[len(answers):]]
+        return answers
 
 
 @contextlib.contextmanager
@@ -139,15 +146,26 @@ def _on_dask(jobs: Sequence[Any], work: Work, step_done: Callable[[int], None], 
         raise EngineError(f"--scheduler needs the Python package distributed (pip install distributed): {err}") from err
     try:
         client = distributed.Client(address, timeout=CONNECT_S)
-    except (OSError, ValueError) as err:
-        raise EngineError(f"no Dask scheduler answers at {address}: {' '.join(str(err).split())}") from err
+    except (OSError, ValueError, distributed.TimeoutError) as err:
+        raise EngineError(f"no Dask scheduler answers at {address}: {_line(err)}") from err
     with client:
+        try:
+            client.wait_for_workers(1, timeout=WORKER_S)
+        except (OSError, distributed.TimeoutError) as err:
+            raise EngineError(f"no worker has joined the Dask scheduler at {address} within {WORKER_S:g} s") from err
         futures = [client.submit(_counted, work, job, pure=False) for job in jobs]
-        answers = {}
+        job_of = {future.key: job for future, job in zip(futures, jobs)}
+        answers: Dict[str, Any] = {}
         for future in distributed.as_completed(futures):
-            answers[future.key], steps = future.result()
+            error = future.exception()  # what _counted() lets through: a worker that was killed or lacks the package
+            answers[future.key], steps = (future.result() if error is None else
+                                          (Failed(job_of[future.key], f"{type(error).__name__}: {_line(error)}"), 0))
             step_done(steps)
         return [answers[future.key] for future in futures]
+
+
+def _line(err: BaseException) -> str:
+    return " ".join(str(err).split())
 
 
 def _counted(work: Work, job: Any) -> "tuple[Any, int]":

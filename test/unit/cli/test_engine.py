@@ -81,8 +81,33 @@ def test_more_than_one_core_means_other_processes():
 
 def test_a_process_that_is_killed_is_told_in_one_line():
     pytest.importorskip("joblib", reason="scripts/setup installs joblib")
-    with pytest.raises(EngineError, match=r"^a process of the 2 ended on its own, out of memory\? \(fewer --jobs"):
-        engine.run([1, 2], engine_jobs.ended, lambda count: None, cores=2)
+    answers = engine.run([1, 2], engine_jobs.ended, lambda count: None, cores=2)
+    assert [answer.job for answer in answers] == [1, 2]
+    assert {answer.reason for answer in answers} == {
+        "a process ended on its own, out of memory? (fewer --jobs need less)"}
+
+
+def test_what_a_worker_of_the_cluster_cannot_do_stops_no_other(scheduler):
+    done, failed = engine.run([2, "two"], engine_jobs.squared, lambda count: None, scheduler=scheduler)
+    assert done == 4
+    assert failed.job == "two" and failed.reason.startswith("TypeError: ")
+
+
+def test_a_joblib_too_old_is_told(monkeypatch):
+    joblib = pytest.importorskip("joblib", reason="scripts/setup installs joblib")
+    monkeypatch.setattr(joblib, "Parallel", lambda: None)  # as before 1.3: without return_as
+    with pytest.raises(EngineError, match="^joblib .* is too old, 1.3 or later is needed$"):
+        engine.run([1, 2], engine_jobs.squared, lambda count: None, cores=2)
+
+
+def test_a_scheduler_without_workers_is_told(monkeypatch):
+    distributed = pytest.importorskip("distributed", reason="scripts/setup --dev installs distributed")
+    monkeypatch.setattr(engine, "WORKER_S", 0.5)
+    with distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0", scheduler_port=0) as cluster:
+        address = cluster.scheduler_address
+        with pytest.raises(EngineError) as caught:
+            engine.run([1], engine_jobs.squared, lambda count: None, scheduler=address)
+    assert str(caught.value) == f"no worker has joined the Dask scheduler at {address} within 0.5 s"
 
 
 @pytest.mark.parametrize("package, options", [("joblib", {"cores": 2}), ("distributed", {"scheduler": "tcp://a:1"})])
