@@ -88,6 +88,8 @@ class RoomBag:
     scan_topics: Tuple[str, ...] = ("/scan",)
     frame_prefix: str = ""        # "/" as old drivers write it
     compressed: bool = False
+    amcl_error_m: Optional[float] = None  # another localization's, on /amcl_pose and tf map <- odom: at each fifth scan
+    #                                       but the first it is so much more too far along x
     true_beams: Tuple[Tuple[str, str], ...] = ()  # topics and their types, TrueBeams or BeamCases; all beams diffuse
     true_fields: Callable[[int, Dict[str, Any]], Optional[Dict[str, Any]]] = lambda index, fields: fields
     scan_fields: Callable[[int, Dict[str, Any]], Optional[Dict[str, Any]]] = lambda index, fields: fields
@@ -219,6 +221,13 @@ class RoomBag:
                     kind = f"glass_nav/msg/{name}"
                     send(topic, kind, stamp_ns, types[kind](
                         header=header(truth["stamp_ns"], "laser"), cases=np.asarray(truth["cases"], np.uint8), **rest))
+                if self.amcl_error_m is not None and index and index % 5 == 0:
+                    off = np.array([self.amcl_error_m * (index // 5), 0.0, 0.0])
+                    send_tf("/tf", stamp_ns, stamped(stamp_ns, "map", "odom", off + [*start[:2], 0.0]))
+                    kind = "geometry_msgs/msg/PoseWithCovarianceStamped"
+                    send("/amcl_pose", kind, stamp_ns, types[kind](
+                        header=header(stamp_ns, "map"), pose=types["geometry_msgs/msg/PoseWithCovariance"](
+                            pose=pose(true + off), covariance=np.zeros(36))))
                 if self.ground_truth:
                     there = pose(true)
                     if self.truth_type == "PoseWithCovarianceStamped":

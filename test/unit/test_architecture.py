@@ -29,6 +29,8 @@ FOR_ALL = {"amcl_parameters", "params"}  # modules of no room
 ONLY_BY = {  # compiled modules, each behind its face; and what is heavy, where it is needed
     "glass_nav._mrpt_grid": "sensing",
     "glass_nav._mrpt_io": "recording world",
+    "distributed": "cli",
+    "joblib": "cli",
     "matplotlib": "evaluation",
     "rosbags": "recording",
 }

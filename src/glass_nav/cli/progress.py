@@ -20,9 +20,9 @@ class Progress:
         self._start = self._shown = time.monotonic()
         self._done = 0
 
-    def step(self) -> None:
-        """One more is done."""
-        self._done += 1
+    def step(self, count: int = 1) -> None:
+        """So many more are done."""
+        self._done += count
         now = time.monotonic()
         if now - self._shown >= (BAR_PERIOD_S if self._tty else LINE_PERIOD_S):
             self._shown = now

@@ -68,9 +68,9 @@ def add_run_arguments(parser: argparse.ArgumentParser) -> None:
 def add_log_arguments(parser: argparse.ArgumentParser) -> None:
     """What is taken from a log, and where the robot starts in it: the same for all runs over it."""
     parser.add_argument("--ground-truth", metavar="TOPIC_OR_FILE",
-                        help="poses in the map: a PoseStamped, PoseWithCovarianceStamped or Odometry topic, a TUM "
-                             "file, or MRPT's _GT.txt; default: /ground_truth of a bag, LOG_GT.txt beside a "
-                             "rawlog; none: no ground truth")
+                        help="poses in the map: a PoseStamped, PoseWithCovarianceStamped or Odometry topic, tf:FRAME "
+                             "for what tf says in a bag, a TUM file, or MRPT's _GT.txt; default: /ground_truth of a "
+                             "bag, LOG_GT.txt beside a rawlog; none: no ground truth")
     parser.add_argument("--true-beams", metavar="TOPIC",
                         help="true cases: glass_nav/TrueBeams, or a glass_nav/BeamCases; default: the only topic of "
                              "the first, or true_cases of the second; none: do not score the cases")
@@ -199,12 +199,21 @@ def prepare(arguments: argparse.Namespace) -> Prepared:
     """
     settings, unused = (ReplayParams(), []) if arguments.params is None else replay_params.load(arguments.params)
     grid_map = map_file.load(arguments.map)
-    recording = open_log(arguments.log, _log_options(arguments, settings))
+    recording = open_recording(arguments, settings)
     mcl = GlassMcl(settings.mcl, grid_map, np.random.default_rng(arguments.seed))
     start, origin = _start(mcl, recording, arguments, settings.start)
     unused_note = [f"parameters that only a node uses: {', '.join(unused)}"] if unused else []
     return Prepared(settings, grid_map, recording, mcl, start, origin,
                     [*recording.notes, *unused_note, f"start: {origin}"], arguments.seed, _window(arguments))
+
+
+def open_recording(arguments: argparse.Namespace, settings: ReplayParams) -> Recording:
+    """The log, with the options of add_log_arguments().
+
+    Raises:
+        RecordingError: it cannot be used; one line.
+    """
+    return open_log(arguments.log, _log_options(arguments, settings))
 
 
 def versions() -> Dict[str, str]:

@@ -81,14 +81,14 @@ def write(path: Path, title: str, story: Story, pictures: Sequence[Picture], wor
         f"<p>{' '.join(escape(sentence) for sentence in story.sentences)}</p></section>",
         '<dl class="figures">', *(f"<div><dt>{escape(each.name)}</dt><dd><strong>{escape(each.value)}</strong>"
                                   f"<small>{escape(each.note)}</small></dd></div>" for each in story.figures), "</dl>",
-        '<div class="first">', _picture(first, lazy=False), "<div>", _happened(story.episodes), _moments(worst),
+        '<div class="first">', framed(first, lazy=False), "<div>", _happened(story.episodes), _moments(worst),
         "</div></div>",
         _contents(bool(worst)),
-        '<h2 id="run">The run in pictures</h2><div class="pictures">', *(_picture(each) for each in rest), "</div>"]
+        '<h2 id="run">The run in pictures</h2><div class="pictures">', *(framed(each) for each in rest), "</div>"]
     if worst:
         body += ['<h2 id="worst">The worst scans</h2><p>Each from another part of the log, the worst first; beams '
                  f"coloured by case: {_legend()}.</p>", '<div class="pictures">',
-                 *(_picture(each) for each in worst), "</div>"]
+                 *(framed(each) for each in worst), "</div>"]
     body += ['<h2 id="figures">All figures</h2>', table(["figure", "value"], _rows(metrics))]
     path.write_text(page(title, body), encoding="utf-8")
 
@@ -125,7 +125,8 @@ def picture(path: Path, alt: str, lazy: bool = True) -> str:
     return f'<img src="data:image/png;base64,{data}" alt="{escape(alt, quote=True)}"{loading}>'
 
 
-def _picture(each: Picture, lazy: bool = True) -> str:
+def framed(each: Picture, lazy: bool = True) -> str:
+    """A picture with its title and caption, its id the name of the file."""
     wide = "" if each.path.stem.startswith(("worst", "confusion")) else ' class="wide"'
     return (f'<figure{wide} id="{escape(each.path.stem)}">'
             f"<h3>{escape(each.title)}</h3>{picture(each.path, each.alt, lazy)}"

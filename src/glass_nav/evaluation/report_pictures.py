@@ -75,7 +75,7 @@ def draw_all(folder: Path, result: ReplayResult, ground: Ground, confusion: Opti
 def _way(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture]:
     low, high = bounds(result)
     width, height = high - low
-    figure = _figure(8.0, float(np.clip(8.0 * height / width + 0.4, 3.0, 5.4)))
+    figure = new_figure(8.0, float(np.clip(8.0 * height / width + 0.4, 3.0, 5.4)))
     axes = figure.subplots()
     draw_map(axes, ground.grid, low, high)
     errors = result.errors
@@ -92,10 +92,10 @@ def _way(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
                           bbox={"boxstyle": "circle,pad=0.25", "facecolor": "#333333", "edgecolor": "white"})
     axes.plot(*result.map_from_base[-1, :2], "s", color=TRUTH_COLOUR, markersize=7, markeredgecolor="white",
               label="last scan", zorder=7)
-    _frame(axes, low, high)
+    frame(axes, low, high)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.03), ncol=6, fontsize=9, frameon=False)
     shares = _state_shares(result)
-    return _save(folder, figure, "way", "Where it drove",
+    return save(folder, figure, "way", "Where it drove",
                  f"The robot's way over the map, coloured by the state that the filter told: {shares}.",
                  "Coloured: where the filter said the robot was, by what it said of itself. "
                  + ("Dashed: the ground truth. " if errors.matched.any() else "")
@@ -126,7 +126,7 @@ def _draw_states(axes: Any, result: ReplayResult) -> None:
 
 def _case_ribbon(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture]:
     edges, share = case_shares(result)
-    figure = _figure(10.0, 3.0)
+    figure = new_figure(10.0, 3.0)
     axes = figure.subplots()
     below = np.zeros(len(share))
     for case in (1, 3, 4, 2, 0):  # what is understood below, what is not on top
@@ -145,7 +145,7 @@ def _case_ribbon(folder: Path, result: ReplayResult, ground: Ground) -> Optional
     counts = np.bincount(result.cases.ravel(), minlength=256)[list(CASES)]
     total = max(int(counts.sum()), 1)
     words = ", ".join(f"{name[2:]} {100 * count / total:.1f} %" for name, count in zip(CASE_NAMES, counts))
-    return _save(folder, figure, "cases_over_time", "What the beams met",
+    return save(folder, figure, "cases_over_time", "What the beams met",
                  f"Share of the beams by case over time. Over the whole run: {words}.",
                  "Diffuse: the beam ended at the first mapped wall. Specular: it was mirrored there. Behind panes: it "
                  "went through one or two of them. Uncertain: nothing on the map explains it, or no answer came. The "
@@ -172,7 +172,7 @@ def _walls(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Pictu
     at = se2.transform_points(grid.map_from_grid, (np.stack([columns, rows], axis=1) + 0.5) * grid.resolution_m)
     low, high = at.min(axis=0) - 1.0, at.max(axis=0) + 1.0
     width, height = high - low
-    figure = _figure(10.0, float(np.clip(10.0 * height / width, 3.2, 8.0)))
+    figure = new_figure(10.0, float(np.clip(10.0 * height / width, 3.2, 8.0)))
     axes = figure.subplots()
     draw_map(axes, grid, low, high)
     kinds = percent < SOLID_BELOW, (percent >= SOLID_BELOW) & (percent < GLASS_FROM), percent >= GLASS_FROM
@@ -182,10 +182,10 @@ def _walls(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Pictu
         axes.scatter(*at[kind].T, s=dot if name != "glass" else max(dot, 5.0), marker="s", color=colour, linewidths=0,
                      label=f"{name}: {count} cells", zorder=3)
     axes.plot(*result.map_from_base[:, :2].T, color="#888888", linewidth=0.5, zorder=2)
-    _frame(axes, low, high)
+    frame(axes, low, high)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.03), ncol=3, fontsize=9, frameon=False,
                 markerscale=3 / np.sqrt(dot) + 1)
-    return _save(folder, figure, "glass", "How glassy each wall proved",
+    return save(folder, figure, "glass", "How glassy each wall proved",
                  f"The walls that beams tested: {counts[0]} cells proved solid, {counts[1]} are undecided, {counts[2]} "
                  "proved to be glass.",
                  f"Glass: at least {GLASS_FROM} % sure. Solid: at most {SOLID_BELOW} %. Walls left as they are on the "
@@ -195,10 +195,10 @@ def _walls(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Pictu
 def _errors(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture]:
     errors = result.errors
     known = bool(errors.matched.any())
-    figure = _figure(10.0, 3.4)
+    figure = new_figure(10.0, 3.4)
     if not known:
         draw_errors(figure.subplots(), result)
-        return _save(folder, figure, "errors", "What the filter claims",
+        return save(folder, figure, "errors", "What the filter claims",
                      "The standard deviations of position and heading that the filter claims, over time.",
                      "There is no ground truth to compare with.")
     left, beside = figure.subplots(1, 2, gridspec_kw={"width_ratios": [2.4, 1.0]})
@@ -211,7 +211,7 @@ def _errors(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Pict
     beside.set_xlabel("position error below [m]")
     beside.set_ylabel("scans [%]")
     beside.grid(True, linewidth=0.4, alpha=0.6)
-    return _save(folder, figure, "errors", "How far off it was",
+    return save(folder, figure, "errors", "How far off it was",
                  f"Position and heading error over time; median {metres(float(np.median(off)))}, at most "
                  f"{metres(float(off.max()))}.",
                  "Left: errors against the ground truth over time, and the state. Right: for how many scans the error "
@@ -221,19 +221,19 @@ def _errors(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Pict
 def _reliability(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture]:
     errors = result.errors
     if not errors.matched.any():
-        figure = _figure(10.0, 2.6)
+        figure = new_figure(10.0, 2.6)
         axes = figure.subplots()
         axes.plot(run_story.seconds_of(result), result.reliability, color="#1f77b4", linewidth=1.0)
         axes.set_ylim(0.0, 1.02)
         axes.set_xlabel("time since the first scan [s]")
         axes.set_ylabel("reliability")
         axes.grid(True, axis="y", linewidth=0.4, alpha=0.6)
-        return _save(folder, figure, "reliability", "How reliable it said it was",
+        return save(folder, figure, "reliability", "How reliable it said it was",
                      f"The chance that the pose is right, as the filter tells it, over time; median "
                      f"{np.median(result.reliability):.2f}.", "Without a ground truth nobody can say whether it is so.")
     told, off = result.reliability[errors.matched], errors.position_m[errors.matched]
     states, right = np.array(result.states)[errors.matched], run_story.right(errors)[errors.matched]
-    figure = _figure(10.0, 3.4)
+    figure = new_figure(10.0, 3.4)
     left, beside = figure.subplots(1, 2, gridspec_kw={"width_ratios": [1.6, 1.0]})
     for state in _present(states):
         here = states == state
@@ -254,7 +254,7 @@ def _reliability(folder: Path, result: ReplayResult, ground: Ground) -> Optional
     beside.set_ylim(0.0, 1.1)
     beside.set_xlabel("reliability told")
     beside.set_ylabel("share that was right")
-    return _save(folder, figure, "reliability", "Reliability told, and the truth",
+    return save(folder, figure, "reliability", "Reliability told, and the truth",
                  "Told reliability against the true error of each scan, and the share of right poses for each class of "
                  "reliability: " + ", ".join(f"{centre:.2f}: {height:.2f} of {count}" for centre, height, count in
                                              zip(centres, share, counts)) + ".",
@@ -283,7 +283,7 @@ def _candidates(folder: Path, result: ReplayResult, ground: Ground) -> Optional[
     seconds = run_story.seconds_of(result)[rows]
     errors = result.errors
     known = bool(errors.matched[rows].any())
-    figure = _figure(10.0, 3.6 if known else 2.6)
+    figure = new_figure(10.0, 3.6 if known else 2.6)
     panels = figure.subplots(2 if known else 1, 1, sharex=True, squeeze=False)[:, 0]
     panels[0].step(seconds, np.maximum(result.places[rows], 0.8), where="post", color=STATE_COLOURS["GLOBAL_SEARCH"],
                    linewidth=1.6)
@@ -302,7 +302,7 @@ def _candidates(folder: Path, result: ReplayResult, ground: Ground) -> Optional[
     most = int(result.places[rows].max())
     ending = "and it was never found" if after is None else (
         f"found after {run_story.duration(float(run_story.seconds_of(result)[after] - seconds[0]))}")
-    return _save(folder, figure, "candidates", "From anywhere to one place",
+    return save(folder, figure, "candidates", "From anywhere to one place",
                  f"Number of places that were possible over time: up to {most}, {ending}.",
                  "The green line is where the search ended." if after is not None else
                  "The search went on until the log ended.")
@@ -311,7 +311,7 @@ def _candidates(folder: Path, result: ReplayResult, ground: Ground) -> Optional[
 def _update_time(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture]:
     seconds = run_story.seconds_of(result)
     period_s = run_story.scan_period_s(result)
-    figure = _figure(10.0, 2.8)
+    figure = new_figure(10.0, 2.8)
     axes = figure.subplots()
     for rows, name, colour in ((~result.updated, "scan that moved nothing", "#9ecae1"),
                                (result.updated, "update of the particles", "#08519c")):
@@ -330,15 +330,15 @@ def _update_time(folder: Path, result: ReplayResult, ground: Ground) -> Optional
     axes.set_ylabel("CPU time [ms]")
     axes.grid(True, axis="y", linewidth=0.4, alpha=0.6)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.17), ncol=3, fontsize=8, frameon=False, markerscale=2.0)
-    return _save(folder, figure, "update_time", "Is it fast enough?",
+    return save(folder, figure, "update_time", "Is it fast enough?",
                  f"CPU time of each scan: median {np.median(result.cpu_ms):.1f} ms{words}.", caption)
 
 
 def _confusion(folder: Path, confusion: np.ndarray) -> Picture:
-    figure = _figure(5.6, 5.2)
+    figure = new_figure(5.6, 5.2)
     draw_confusion(figure.subplots(), confusion)
     right = np.trace(confusion) / max(int(confusion.sum()), 1)
-    return _save(folder, figure, "confusion", "Cases told, and the truth",
+    return save(folder, figure, "confusion", "Cases told, and the truth",
                  f"Confusion matrix of the beam cases: {100 * right:.1f} % of {int(confusion.sum())} beams were told "
                  "right.", "The log knows what each beam truly met. Rows: the truth; columns: what was told.")
 
@@ -350,7 +350,7 @@ def _worst(folder: Path, result: ReplayResult, ground: Ground, number: int, kept
     if errors.matched[row]:
         assert result.reference is not None
         poses.append(("where it was", result.reference.at(result.stamps_ns[row])))
-    figure = _figure(4.6 * len(poses), 4.4)
+    figure = new_figure(4.6 * len(poses), 4.4)
     cases = result.cases[row, :len(kept.points_m)]
     answered = np.isfinite(kept.points_m).all(axis=1) & (cases < len(CASE_NAMES))
     for axes, (name, pose) in zip(figure.subplots(1, len(poses), squeeze=False)[0], poses):
@@ -361,7 +361,7 @@ def _worst(folder: Path, result: ReplayResult, ground: Ground, number: int, kept
            if errors.matched[row] else f"reliability {result.reliability[row]:.2f}")
     counts = np.bincount(cases[answered], minlength=len(CASE_NAMES))
     words = ", ".join(f"{count} {name[2:]}" for name, count in zip(CASE_NAMES, counts) if count) or "none"
-    return _save(folder, figure, f"worst_{number:02d}", f"{number}. At {seconds:.1f} s: {off}",
+    return save(folder, figure, f"worst_{number:02d}", f"{number}. At {seconds:.1f} s: {off}",
                  f"Scan at {seconds:.1f} s over the map; beams that came back: {words}.",
                  f"{result.states[row]}: {result.reasons[row]}.")
 
@@ -391,7 +391,7 @@ def _draw_scan(axes: Any, grid: MapImage, pose: np.ndarray, kept: KeptScan, case
         heading = pose[:2] + 0.06 * (high - low)[0] * np.array([np.cos(pose[2]), np.sin(pose[2])])
         axes.plot(*pose[:2], "o", color=TRUTH_COLOUR, markersize=5, zorder=4)
         axes.plot([pose[0], heading[0]], [pose[1], heading[1]], color=TRUTH_COLOUR, linewidth=2.0, zorder=4)
-    _frame(axes, low, high)
+    frame(axes, low, high)
 
 
 def bounds(result: ReplayResult) -> "Tuple[np.ndarray, np.ndarray]":
@@ -402,11 +402,15 @@ def bounds(result: ReplayResult) -> "Tuple[np.ndarray, np.ndarray]":
     if errors.matched.any():
         assert result.reference is not None
         points.append(result.reference.at(result.stamps_ns)[errors.matched, :2])
-    all_points = np.concatenate(points)
-    all_points = all_points[np.isfinite(all_points).all(axis=1)]
-    if not len(all_points):
-        all_points = np.zeros((1, 2))
-    low, high = all_points.min(axis=0) - MARGIN_M, all_points.max(axis=0) + MARGIN_M
+    return bounds_of(np.concatenate(points))
+
+
+def bounds_of(points: np.ndarray) -> "Tuple[np.ndarray, np.ndarray]":
+    """Lower left and upper right corner (2,) [m] of what shows points (N, 2) with some space around them."""
+    points = points[np.isfinite(points).all(axis=1)]
+    if not len(points):
+        points = np.zeros((1, 2))
+    low, high = points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
     width, height = high - low
     size = np.array([max(width, 1.6 * height), max(height, width / 3.0)])  # fits the first screen of a report
     centre = (low + high) / 2.0
@@ -429,7 +433,8 @@ def _state_shares(result: ReplayResult) -> str:
     return ", ".join(f"{state} {run_story.percent(float(np.mean(states == state)))}" for state in _present(states))
 
 
-def _figure(width: float, height: float) -> Any:
+def new_figure(width: float, height: float) -> Any:
+    """An empty one [inch], without a display."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -438,14 +443,16 @@ def _figure(width: float, height: float) -> Any:
     return figure
 
 
-def _frame(axes: Any, low: np.ndarray, high: np.ndarray) -> None:
+def frame(axes: Any, low: np.ndarray, high: np.ndarray) -> None:
+    """Axes of a map from corner to corner (2,) [m]."""
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
     axes.tick_params(labelsize=7)
 
 
-def _save(folder: Path, figure: Any, name: str, title: str, alt: str, caption: str) -> Picture:
+def save(folder: Path, figure: Any, name: str, title: str, alt: str, caption: str) -> Picture:
+    """The figure as a PNG file."""
     path = folder / f"{name}.png"
     figure.savefig(path)
     return Picture(path, title, alt, caption)

@@ -15,6 +15,7 @@ from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
+from glass_nav.geometry import se2
 from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.recording import frames, messages, trajectory_file
 from glass_nav.recording.frames import FrameError, FrameTree, Transform
@@ -25,6 +26,7 @@ from glass_nav.sensing.scan import Scan, ScanError, scan_from_fields
 
 SCAN = "sensor_msgs/LaserScan"
 ODOMETRY = "nav_msgs/Odometry"
+TF_SOURCE = "tf:"  # of poses: the frame of the map follows
 TF = ("tf2_msgs/TFMessage", "tf/tfMessage")
 POSES = ("geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped", ODOMETRY)
 TRUE_BEAMS, BEAM_CASES = "glass_nav/TrueBeams", "glass_nav/BeamCases"
@@ -51,7 +53,9 @@ def open_log(paths: Sequence[Path], options: LogOptions) -> Recording:
             base_frame = _base_frame(bag, tree, odometry, options)
             _check_laser(bag, scan_topic, tree, base_frame, options)
             notes += _turn_notes(bag, scan_topic, options.deskew)
-            truth = _ground_truth(bag, options.ground_truth, notes)
+            truth = (_tf_truth(bag, tree, odometry, base_frame, scan_topic, options, notes)
+                     if (options.ground_truth or "").startswith(TF_SOURCE)
+                     else _ground_truth(bag, options.ground_truth, notes))
             truth_topic = _true_beams_topic(bag, options.true_beams, notes)
             scan_count = bag.count(scan_topic)
         except RecordingError as err:  # it may be missing because of the damage
@@ -257,6 +261,40 @@ def _turn_notes(bag: Bag, scan_topic: str, straighten: bool) -> List[str]:
         if turn_ns and straighten:
             return [f"the lidar turns for {turn_ns * 1e-6:.0f} ms: scans are straightened by odometry"]
     return []
+
+
+def _tf_truth(bag: Bag, tree: FrameTree, odometry: _Odometry, base_frame: str, scan_topic: str, options: LogOptions,
+              notes: List[str]) -> Trajectory:
+    """Where tf says the robot is in the map, at the stamp of each scan that it covers.
+
+    As tf answers afterwards: between two transforms map <- odom it interpolates.
+    """
+    map_frame = (options.ground_truth or "")[len(TF_SOURCE):].lstrip("/")
+    odom_frame = (options.odom_frame or odometry.frame or "odom").lstrip("/")
+    whole = tree.connected(map_frame, base_frame)  # else odometry has a topic of its own
+    if not whole and not (odometry.frame is None and tree.connected(map_frame, odom_frame)):
+        raise RecordingError(f"{bag.path}: no transform {map_frame} <- {base_frame}; frames in tf: "
+                             f"{', '.join(tree.frames) or 'none'}")
+    stamps: List[int] = []
+    poses: List[Tuple[float, float, float]] = []
+    for _, message in bag.messages(scan_topic):
+        stamp_ns = _stamp_ns(message.header)
+        try:
+            if whole:
+                pose = frames.planar(tree.lookup(map_frame, base_frame, stamp_ns))
+            else:
+                x, y, yaw = se2.compose(np.array(frames.planar(tree.lookup(map_frame, odom_frame, stamp_ns))),
+                                        odometry.at(tree, base_frame, stamp_ns))
+                pose = (float(x), float(y), float(yaw))
+        except FrameError:
+            continue  # before the first, after the last
+        stamps.append(stamp_ns)
+        poses.append(pose)
+    if not stamps:
+        raise RecordingError(f"{bag.path}: no scan on {scan_topic} is in the time of the transforms "
+                             f"{map_frame} <- {base_frame}")
+    notes.append(f"ground truth from tf {map_frame} <- {base_frame}")
+    return trajectory_from_samples(stamps, poses)
 
 
 def _ground_truth(bag: Bag, source: Optional[str], notes: List[str]) -> Optional[Trajectory]:

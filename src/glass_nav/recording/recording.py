@@ -73,7 +73,7 @@ class LogOptions:
     base_frame: Optional[str] = None
     odom_frame: Optional[str] = None
     laser_pose: Optional[Tuple[float, float, float]] = None  # base_from_laser instead of tf's
-    ground_truth: Optional[str] = None  # a topic or a file; "none": do not look for one
+    ground_truth: Optional[str] = None  # a topic, a file or "tf:FRAME"; "none": do not look for one
     true_beams: Optional[str] = None    # a topic; "none": do not look for one
     deskew: bool = True                 # make up for the robot's motion while the lidar turned, where the log tells
 

@@ -375,3 +375,26 @@ def test_truth_that_is_none_is_refused(room_bag, changes, text):
     with pytest.raises(RecordingError) as caught:
         list(recording.beam_truth)
     assert str(caught.value).replace(f"{bag.path.parent}/", "") == text
+
+
+@pytest.mark.parametrize("odometry", ["tf", "topic"])
+def test_tf_tells_where_another_localization_took_the_robot_to_be(room_bag, odometry):
+    bag = room_bag(odometry=odometry, amcl_error_m=0.1)
+    recording = open_log(bag.write(), LogOptions(ground_truth="tf:map"))
+    told = recording.ground_truth
+    assert recording.notes[-1] == "ground truth from tf map <- base_link"
+    # Known at the scans 5, 10 and 15 and between them; a transform may be 0.1 s old or new.
+    assert told.stamps_ns.tolist() == bag.stamps_ns[4:17].tolist()
+    error = 0.1 * np.clip(np.arange(4, 17) / 5.0, 1.0, 3.0)
+    np.testing.assert_allclose(told.poses, bag.poses(told.stamps_ns) + np.stack(
+        [error, 0.0 * error, 0.0 * error], axis=1), atol=1e-9)
+
+
+def test_a_frame_that_tf_does_not_place_the_robot_in_is_refused(room_bag):
+    assert refusal(room_bag().write(), LogOptions(ground_truth="tf:map")) == (
+        "room.bag: no transform map <- base_link; frames in tf: base_link, laser, odom")
+    room_bag().path.unlink()
+    early = room_bag(amcl_error_m=0.1, scan_fields=lambda index, fields: {
+        **fields, "stamp_ns": fields["stamp_ns"] - 10_000_000_000})
+    assert refusal(early.write(), LogOptions(ground_truth="tf:map")) == (
+        "room.bag: no scan on /scan is in the time of the transforms map <- base_link")
