@@ -171,7 +171,8 @@ class Matcher:
         new = [each for each in dart.tolist() if each not in known]
         if new:
             shares = self._explained(meetpoint.scan, poses_at(self.atlas, np.array(new, np.int64), meetpoint))
-            known.update(zip(new, (~(shares < self._least_explained)).tolist()))  # one that says nothing rules out none
+            shares = np.where(np.isnan(shares), 1.0, shares)  # a scan that says nothing rules out none
+            known.update(zip(new, (shares >= self._least_explained).tolist()))
         return np.array([known[each] for each in dart.tolist()], bool)
 
     def sigma_r_m(self, meetpoint: Optional[Meetpoint] = None) -> float:
