@@ -62,6 +62,7 @@ nav ul { display: flex; flex-wrap: wrap; gap: .2rem 1rem; list-style: none; padd
 table { border-collapse: collapse; font-size: .88rem; font-variant-numeric: tabular-nums; }
 th, td { text-align: left; padding: .2rem .8rem .2rem 0; border-bottom: 1px solid var(--line); vertical-align: top;
   overflow-wrap: anywhere; }
+table.numbers th, table.numbers td { overflow-wrap: normal; }
 th { font-weight: 600; } td.number, th.number { text-align: right; }
 @media print { :root { --page: #fff; --card: #fff; --text: #000; --dim: #444; --line: #bbb; --good: #1d7a3a;
   --fair: #7a5200; --bad: #b3261e; } body { font-size: 10pt; } main { max-width: none; padding: 0; }
@@ -115,7 +116,8 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: bool = Fa
     titles = "".join(f'<th scope="col"{kind if column else ""}>{escape(cell)}</th>' for column, cell in enumerate(head))
     lines = "".join(f'<tr><th scope="row">{escape(row[0])}</th>'
                     + "".join(f"<td{kind}>{escape(cell)}</td>" for cell in row[1:]) + "</tr>" for row in rows)
-    return (f'<div class="scroll"><table><thead><tr>{titles}</tr></thead><tbody>{lines}</tbody></table></div>')
+    whole = ' class="numbers"' if numbers else ""
+    return (f'<div class="scroll"><table{whole}><thead><tr>{titles}</tr></thead><tbody>{lines}</tbody></table></div>')
 
 
 def picture(path: Path, alt: str, lazy: bool = True) -> str:
