@@ -34,8 +34,8 @@ from glass_nav.evaluation.pictures import MapImage
 from glass_nav.evaluation.wake_up_picture import Depth, WakeUpStory
 from glass_nav.geometry import angles
 from glass_nav.geometry.trajectory import Trajectory
-from glass_nav.msg import (EdgeTraversal, GotoNodeAction, GotoNodeGoal, LocalizationStatus, Meetpoint,
-                           TopologyCandidates, TopologyStatus)
+from glass_nav.msg import (EdgeTraversal, GotoNodeAction, GotoNodeGoal, GotoNodeResult, LocalizationStatus,
+                           Meetpoint, TopologyCandidates, TopologyStatus)
 from glass_nav.ros import conversions, endings
 from glass_nav.ros.mailbox import Mailbox
 from glass_nav.topology import atlas_file, shipped_atlases
@@ -44,6 +44,7 @@ from glass_nav.topology.observations import turn_name
 
 RIGHT_M, RIGHT_RAD = 0.5, 0.35  # a pose that is handed over so near is right
 DONE = ("CONFIRMED", "AMBIGUOUS", "LOST")
+ASKED = 3                       # times for a node, if the driver knows of no localization yet
 LEAST_ROOM_M = 0.5              # around nodes of the tour
 LEAST_LEG_M, LEG_M = 2.0, 8.0   # from node to node, at least and about
 LEG_CHOICES = 4                 # nodes of which one is drawn
@@ -208,9 +209,7 @@ class WakeupDemo:
             return False
         reached = True
         for node in self._tour():
-            self._client.send_goal(GotoNodeGoal(node=node))
-            ended = self._wait(lambda: self._client.get_state() not in (GoalStatus.PENDING, GoalStatus.ACTIVE),
-                               simulated_s=self._p.tour_limit_s)
+            ended = self._go_to(node)
             if self._is_ending():
                 return False
             if not ended:
@@ -226,6 +225,19 @@ class WakeupDemo:
             reached = reached and succeeded
         self._tell_tracking()
         return reached
+
+    def _go_to(self, node: int) -> bool:
+        """Whether the goal came to an end, whatever it was. The driver may hear of the localization a little later than
+        this node does, and is then asked again."""
+        for _ in range(ASKED):
+            self._client.send_goal(GotoNodeGoal(node=node))
+            if not self._wait(lambda: self._client.get_state() not in (GoalStatus.PENDING, GoalStatus.ACTIVE),
+                              simulated_s=self._p.tour_limit_s):
+                return False
+            if self._client.get_result().code != GotoNodeResult.NOT_LOCALIZED:
+                break
+            self._wait(self._is_ending, simulated_s=1.0)
+        return True
 
     def _tour(self) -> List[int]:
         """Nodes one after the other, not far from each other, along edges that a robot fits through."""
