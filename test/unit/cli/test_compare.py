@@ -9,20 +9,8 @@ import numpy as np
 import pytest
 
 import browser
-from glass_nav.cli import main as cli
 
 FILES = {"compare.html", "compare.json", "compare.png", "runs.csv", "timings.csv"}
-
-
-@pytest.fixture
-def run(tmp_path, capsys):
-    """run(command, option, ...): exit code, stdout, stderr, without the path of the folder."""
-    def command(*options):
-        code = cli.main([str(option) for option in options])
-        captured = capsys.readouterr()
-        return code, captured.out.replace(f"{tmp_path}/", ""), captured.err.replace(f"{tmp_path}/", "")
-
-    return command
 
 
 @pytest.fixture

@@ -8,25 +8,12 @@ import re
 import shutil
 from html.parser import HTMLParser
 
-import pytest
 from PIL import Image
 
 import browser
-from glass_nav.cli import main as cli
 
 PICTURES = {"way.png", "cases_over_time.png", "glass.png", "errors.png", "reliability.png", "update_time.png"}
 WORST = {f"worst_{number:02d}.png" for number in range(1, 11)}
-
-
-@pytest.fixture
-def run(tmp_path, capsys):
-    """run(command, option, ...): exit code, stdout, stderr, without the path of the folder."""
-    def command(*options):
-        code = cli.main([str(option) for option in options])
-        captured = capsys.readouterr()
-        return code, captured.out.replace(f"{tmp_path}/", ""), captured.err.replace(f"{tmp_path}/", "")
-
-    return command
 
 
 class Page(HTMLParser):
