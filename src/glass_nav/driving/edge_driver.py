@@ -2,8 +2,8 @@
 
 No pose in a map is needed: the graph is that of a small map around the robot, see local_map.py, made by the same code
 as the atlas, so that both see the same meetpoints. What lies ahead may turn out otherwise (a pane that was not seen
-yet, a corner that hid something), so a meetpoint counts only once the robot stands there and has looked again. All
-poses are odom_from_base (3,).
+yet, a corner that hid something), so a meetpoint counts only once the robot stands there and has looked again. What
+comes in is odom_from_base (3,); map, graph and ways are in the frame local, odom without its drift, see local_pose.py.
 
 Choset, Burdick, Sensor-based exploration: the hierarchical generalized Voronoi graph (IJRR 2000): tracing and homing;
 here both go along a line of the local graph instead of a gradient of the distances.
@@ -23,8 +23,8 @@ from glass_nav.driving import braking, edge_report, local_graph, pursuit, veloci
 from glass_nav.driving.base_limits import BaseLimits
 from glass_nav.driving.edge_report import Node, Trace
 from glass_nav.driving.local_graph import LocalGraph
-from glass_nav.driving.local_pose import LocalPose
 from glass_nav.driving.local_map import LocalMap, LocalMapParams
+from glass_nav.driving.local_pose import LocalPose
 from glass_nav.geometry import angles, polyline, se2
 from glass_nav.geometry.polyline import Polyline
 from glass_nav.sensing.scan import Scan
@@ -145,7 +145,7 @@ class EdgeDriver:
 
     def seek(self) -> None:
         """Drive to a meetpoint, having looked around."""
-        self._node, self._trace = None, None
+        self._node = None
         self._begin(SEEKING, "looking around")
         self._sweep_rad = 2.0 * math.pi
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import List, Tuple
+from typing import List, Optional, Tuple
 
 import numpy as np
 from scipy import ndimage
@@ -70,6 +70,7 @@ class LocalMap:
         shape = (p.directions, self._size, self._size)
         self._ended, self._passed = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
         self._stood = np.zeros(shape[1:], bool)  # the robot's outline was here
+        self._occupied: Optional[np.ndarray] = None  # worked out since the last scan
 
     @property
     def params(self) -> LocalMapParams:
@@ -77,6 +78,7 @@ class LocalMap:
 
     def clear(self) -> None:
         """Forget all."""
+        self._occupied = None
         self._ended[:], self._passed[:], self._stood[:], self._seen = 0, 0, False, False
 
     def add(self, scan: Scan, odom_from_base: np.ndarray) -> None:
@@ -86,6 +88,7 @@ class LocalMap:
             scan: in which beams begin at the laser; origins of deskewed ones are not looked at.
             odom_from_base: (3,) at its stamp.
         """
+        self._occupied = None
         self._follow(odom_from_base)
         laser = se2.compose(odom_from_base, scan.base_from_laser)
         cell_m = self._p.resolution_m
@@ -106,6 +109,11 @@ class LocalMap:
 
     def occupied(self) -> np.ndarray:
         """(n, n) bool: something stands there, glass included, as far as it was seen itself."""
+        if self._occupied is None:
+            self._occupied = self._worked_out()
+        return self._occupied
+
+    def _worked_out(self) -> np.ndarray:
         likely = np.flatnonzero((self._ended >= self._p.least_ends).any(axis=0))  # few cells: the rest is quick
         ended, passed = (counts.reshape(self._p.directions, -1)[:, likely].astype(np.int64)
                          for counts in (self._ended, self._passed))
@@ -133,7 +141,7 @@ class LocalMap:
         occupied = self.occupied()
         free = (self._passed.any(axis=0) | self._stood) & ~occupied
         if self._p.extend_glass_m > 0.0:
-            occupied |= self._extended(occupied)
+            occupied = occupied | self._extended(occupied)
         occupancy = np.where(occupied & ~self._stood, OCCUPIED, np.where(free, FREE, UNKNOWN)).astype(np.int8)
         return self._as_map(occupancy)
 

@@ -635,14 +635,5 @@ class DriverNode:
 
 def main() -> None:
     """Start the node; exit code 2 if a parameter cannot be used, 3 if the atlas cannot."""
-    rospy.init_node("driver", disable_signals=True)
-    ending = endings.event_on_signals()
-    given: Dict[str, Any] = rospy.get_param("~", {})
-    try:
-        node = DriverNode(params.load(DriverParams, given, rospy.get_name()))
-    except (ValueError, OSError) as err:  # ParamError, AtlasError
-        endings.refuse_to_start(err, 3 if isinstance(err, (AtlasError, OSError)) else 2)
-    try:
-        node.run(ending)
-    finally:
-        rospy.signal_shutdown("ended")
+    endings.run_node("driver", lambda given: DriverNode(params.load(DriverParams, given, rospy.get_name())),
+                     (AtlasError, OSError))

@@ -1,11 +1,11 @@
-"""How a node is told to end, and how it says that it cannot begin."""
+"""How a node begins and runs, is told to end, and says that it cannot begin."""
 
 from __future__ import annotations
 
 import signal
 import sys
 import threading
-from typing import NoReturn
+from typing import Any, Callable, Dict, NoReturn, Tuple, Type
 
 import rospy
 
@@ -28,3 +28,24 @@ def refuse_to_start(err: Exception, exit_code: int = 2) -> NoReturn:
     rospy.logfatal(text if text.startswith(name) else f"{name}: {text}")
     rospy.signal_shutdown("cannot start")
     sys.exit(exit_code)
+
+
+def run_node(name: str, make: Callable[[Dict[str, Any]], Any],
+             bad_input: Tuple[Type[Exception], ...] = ()) -> None:
+    """Start a node and run it until it is told to end.
+
+    Args:
+        name: of the node, unless it is renamed.
+        make: the node from its private parameters, as they are given; ValueError ends it with exit code 2.
+        bad_input: exceptions of make() that end it with exit code 3.
+    """
+    rospy.init_node(name, disable_signals=True)
+    ending = event_on_signals()
+    try:
+        node = make(rospy.get_param("~", {}))
+    except (ValueError, *bad_input) as err:
+        refuse_to_start(err, 3 if isinstance(err, bad_input) else 2)
+    try:
+        node.run(ending)
+    finally:
+        rospy.signal_shutdown("ended")

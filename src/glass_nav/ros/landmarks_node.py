@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 import threading
 from dataclasses import dataclass, field
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Dict, List, Optional, Tuple
 
 import numpy as np
 import rospy
@@ -279,14 +279,5 @@ class LandmarksNode:
 
 def main() -> None:
     """Start the node; exit code 2 if a parameter or the landmark file cannot be used."""
-    rospy.init_node("landmarks", disable_signals=True)
-    ending = endings.event_on_signals()
-    given: Dict[str, Any] = rospy.get_param("~", {})
-    try:
-        node = LandmarksNode(params.load(LandmarksNodeParams, given, rospy.get_name()))
-    except ValueError as err:  # ParamError and LandmarkError too
-        endings.refuse_to_start(err)
-    try:
-        node.run(ending)
-    finally:
-        rospy.signal_shutdown("ended")
+    endings.run_node("landmarks",
+                     lambda given: LandmarksNode(params.load(LandmarksNodeParams, given, rospy.get_name())))

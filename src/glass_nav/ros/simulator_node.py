@@ -19,7 +19,7 @@ import math
 import threading
 import time
 from dataclasses import dataclass, replace
-from typing import Any, Dict, Optional
+from typing import Any, Optional
 
 import numpy as np
 import rospy
@@ -305,14 +305,5 @@ def _drive(p: SimulatorNodeParams) -> _Drive:
 
 def main() -> None:
     """Start the node; exit code 2 if a parameter cannot be used."""
-    rospy.init_node("simulator", disable_signals=True)
-    ending = endings.event_on_signals()
-    given: Dict[str, Any] = rospy.get_param("~", {})
-    try:
-        node = SimulatorNode(params.load(SimulatorNodeParams, given, rospy.get_name()))
-    except ValueError as err:  # ParamError, BuildingError, PathError and the others
-        endings.refuse_to_start(err)
-    try:
-        node.run(ending)
-    finally:
-        rospy.signal_shutdown("ended")
+    endings.run_node("simulator",
+                     lambda given: SimulatorNode(params.load(SimulatorNodeParams, given, rospy.get_name())))

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import replace
-from typing import Any, Callable, Dict, Optional
+from typing import Any, Callable, Optional
 
 import actionlib
 import numpy as np
@@ -375,14 +375,5 @@ class TopologyNode:
 
 def main() -> None:
     """Start the node; exit code 2 if a parameter cannot be used, 3 if the atlas cannot."""
-    rospy.init_node("topology", disable_signals=True)
-    ending = endings.event_on_signals()
-    given: Dict[str, Any] = rospy.get_param("~", {})
-    try:
-        node = TopologyNode(params.load(TopologyParams, given, rospy.get_name()))
-    except (ValueError, OSError) as err:  # ParamError, AtlasError
-        endings.refuse_to_start(err, 3 if isinstance(err, (AtlasError, OSError)) else 2)
-    try:
-        node.run(ending)
-    finally:
-        rospy.signal_shutdown("ended")
+    endings.run_node("topology", lambda given: TopologyNode(params.load(TopologyParams, given, rospy.get_name())),
+                     (AtlasError, OSError))
