@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A whole wake-up by the real nodes: simulator, driver, topology, localization, of which two are killed on the way.
+"""A whole wake-up by the real nodes: simulator, driver, topology, localization; all but the first are killed once.
 
 The robot stands somewhere, nobody knows where; at the end it is localized and has driven to a node of the atlas.
 """
@@ -40,6 +40,10 @@ def driver() -> Process:
     return Process("driver_node", "__name:=glass_driver", f"_atlas:={BUILDING}",
                    "topology_status:=glass_topology/status", "restart_search:=glass_topology/restart",
                    "localization_status:=glass_localization/status")
+
+
+def localization() -> Process:
+    return Process("localization_node", "__name:=glass_localization", "_wait_for_initialpose:=true")
 
 
 class WakeUp(unittest.TestCase):
@@ -87,10 +91,17 @@ class WakeUp(unittest.TestCase):
                                   "topology_status:=glass_topology/status", "restart_search:=glass_topology/restart",
                                   "topology_candidates:=glass_topology/candidates",
                                   "localization_status:=glass_localization/status"))
+        first_localization = self.start(localization())
         first_topology, first_driver = self.start(topology()), self.start(driver())
         self.await_(lambda: self.is_at(1, 0), STEP_S, "edge driven")
         self.assertEqual(self.localization.last.state_name, "UNKNOWN")
         self.assertFalse(len(self.poses))
+
+        first_localization.end(signal.SIGKILL)  # nobody needs it yet; the second one knows as little
+        heard = len(self.localization)
+        self.start(localization())
+        self.await_(lambda: len(self.localization) > heard, STEP_S, "word of the second localization")
+        self.assertEqual(self.localization.last.state_name, "UNKNOWN")
 
         first_topology.end(signal.SIGKILL)  # the driver drives on to its meetpoint, and tells the next one of it
         heard = len(self.topology)

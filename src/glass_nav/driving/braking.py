@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from typing import Tuple
 
 import numpy as np
 
@@ -14,6 +16,7 @@ _TIGHT_M = 0.3  # with less room other arcs are tried,
 _OTHER_ARCS_RAD_M = (0.5, -0.5, 1.0, -1.0, 2.0, -2.0)  # bent by so much more,
 _WORTH_M = 0.06  # and taken if they lead so much further
 _LEAST_M_S = 0.04
+_CREEPING_MARGIN_M = 0.005  # kept at that speed, which stops within it
 _DELAY_S = 0.15  # until a command acts
 
 
@@ -49,20 +52,24 @@ def room_m(velocity: np.ndarray, obstacles_m: np.ndarray, limits: BaseLimits, re
     return float(along[max(int(touched.argmax()) - 1, 0)]) if touched.any() else reach_m
 
 
-def allowed(velocity: np.ndarray, obstacles_m: np.ndarray, limits: BaseLimits) -> np.ndarray:
+def allowed(velocity: np.ndarray, obstacles_m: np.ndarray, limits: BaseLimits, creep: bool = False) -> np.ndarray:
     """(3,) the velocity, slow enough to stand before anything is touched; between close obstacles along another arc, if
-    that leads further. As for room_m()."""
+    that leads further.
+
+    Args:
+        velocity, obstacles_m, limits: as for room_m().
+        creep: where there is no other way, slowly and with next to no margin: out of where the robot came in.
+    """
     speed = math.hypot(velocity[0], velocity[1])
     if speed < 1e-6:
         return velocity
     reach = 0.5 * speed ** 2 / limits.max_acceleration_m_s2 + 0.5
-    room = room_m(velocity, obstacles_m, limits, reach)
-    if room < _TIGHT_M:
-        for change in _OTHER_ARCS_RAD_M:
-            other = velocity + [0.0, 0.0, change * speed]
-            further = room_m(other, obstacles_m, limits, reach)
-            if further > room + _WORTH_M:
-                velocity, room = other, further
+    velocity, room = _furthest(velocity, obstacles_m, limits, reach)
+    if creep and room <= _STEP_M:
+        limits = replace(limits, margin_m=min(limits.margin_m, _CREEPING_MARGIN_M))
+        velocity, room = _furthest(velocity, obstacles_m, limits, reach)
+        if room > _STEP_M:
+            return velocity * (min(_LEAST_M_S, speed) / speed)
     lost = _DELAY_S * limits.max_acceleration_m_s2
     fastest = max(math.sqrt(lost ** 2 + 2.0 * limits.max_acceleration_m_s2 * room) - lost, 0.0)
     if fastest >= speed:
@@ -70,3 +77,17 @@ def allowed(velocity: np.ndarray, obstacles_m: np.ndarray, limits: BaseLimits) -
     if room <= _STEP_M:
         return np.array([0.0, 0.0, velocity[2]])
     return velocity * (max(fastest, _LEAST_M_S) / speed)
+
+
+def _furthest(velocity: np.ndarray, obstacles_m: np.ndarray, limits: BaseLimits,
+              reach_m: float) -> Tuple[np.ndarray, float]:
+    """The velocity, or between close obstacles one along an arc that leads further; and how far that is free."""
+    room = room_m(velocity, obstacles_m, limits, reach_m)
+    if room < _TIGHT_M:
+        speed = math.hypot(velocity[0], velocity[1])
+        for change in _OTHER_ARCS_RAD_M:
+            other = velocity + [0.0, 0.0, change * speed]
+            further = room_m(other, obstacles_m, limits, reach_m)
+            if further > room + _WORTH_M:
+                velocity, room = other, further
+    return velocity, room

@@ -280,7 +280,8 @@ class EdgeDriver:
                     wanted[2] = self._p.limits.max_turn_rad_s
             elif self._way is not None and not self._looking:
                 wanted = self._along_way(self._way, pose)
-                safe = braking.allowed(wanted, self._obstacles_at(pose), self._p.limits)
+                goes_back = self._phase == RETURNING or (self._phase == FOLLOWING and self._rank == 0)
+                safe = braking.allowed(wanted, self._obstacles_at(pose), self._p.limits, creep=goes_back)
                 self._note_blocked(wanted, safe, dt_s)
                 wanted = safe
         command = velocity.limited(wanted, self._velocity, self._p.limits, dt_s)
@@ -453,7 +454,7 @@ class EdgeDriver:
         node = graph.node_near(self._target, _SAME_NODE_M)
         if node is None or not self._counts(graph)[node]:
             self._looks += 1
-            if self._looks > _LOOKS:
+            if self._looks > _LOOKS and not self._home_to_nearer_end(graph):
                 self._dismiss()
             return
         self._looks = 0
@@ -486,8 +487,24 @@ class EdgeDriver:
                     return
                 self._arrive(latest[-1])
                 return
-        if self._looks >= _MOST_LOOKS:
+        if self._looks >= _MOST_LOOKS and not self._home_to_nearer_end(graph):
             self._dismiss()
+
+    def _home_to_nearer_end(self, graph: LocalGraph) -> bool:
+        """Back to a dead end, if the robot is past it: a way that narrows ends the sooner the better it is seen."""
+        if self._trace is None:
+            return False
+        position = graph.graph.position_m
+        ends = np.flatnonzero((graph.degree == 1) & self._counts(graph)
+                              & (np.hypot(*(position - self._target).T) < _BEHIND_M))
+        trace = cKDTree(self._trace.way_m)
+        for node in ends[np.argsort(np.hypot(*(position[ends] - self._pose[:2]).T))].tolist():
+            passed = trace.query(position[node])[0] < _SAME_NODE_M
+            if passed and not self._is_start(graph, node) and graph.sees(self._pose[:2], position[node]):
+                self._trace.cut_back(position[node])
+                self._home(position[node], np.stack([self._pose[:2], position[node]]))
+                return True
+        return False
 
     def _dismiss(self) -> None:
         self._dismissed.append(self._target)

@@ -22,7 +22,7 @@ import math
 import threading
 import time
 from dataclasses import dataclass
-from typing import Any, Dict, Optional
+from typing import Any, Dict, Optional, Sequence
 
 import actionlib
 import numpy as np
@@ -39,6 +39,7 @@ from glass_nav import params
 from glass_nav.driving import edge_driver
 from glass_nav.driving.edge_driver import Arrival, EdgeDriver
 from glass_nav.driving.route import RoutePlanner
+from glass_nav.driving.seek_policy import SeekPolicy
 from glass_nav.driving.tasks import SUCCEEDED, EdgeTask, GoTask, Moment, Outcome, Task
 from glass_nav.geometry import se2
 from glass_nav.msg import (DriverStatus, EdgeTraversal, GotoNodeAction, GotoNodeFeedback, GotoNodeGoal, GotoNodeResult,
@@ -65,6 +66,7 @@ STATUS_PERIOD_S = 0.5
 MARKERS_PERIOD_S = 0.5
 RESTART_WAIT_S = 2.0   # for the service, by the wall clock
 MOVED_M = 0.3          # so far from its meetpoint the robot does not stand there any more
+IN_SEARCH = (TopologyStatus.SEARCHING, TopologyStatus.TENTATIVE)
 POSE_STATES = ("LOCALIZED", "UNCERTAIN")  # in which a pose in the map may be driven by
 HALTED, IDLE, FAILED = "HALTED", "IDLE", "FAILED"
 PREEMPTED, REFUSED, NOT_AT_MEETPOINT, NO_INPUT, NOT_LOCALIZED, RESET = (
@@ -103,7 +105,7 @@ class DriverNode:
         self._arrival_stamp_ns = 0
         self._arrived_at = np.zeros(3)                # odom_from_base there
         self._reported_s = -math.inf
-        self._sought = self._gave_up = False          # by itself
+        self._seeking = SeekPolicy(self._node.seek_attempts)
         self._topology: Optional[TopologyStatus] = None
         self._localization = self._localization_reason = ""
         self._localization_s = -math.inf              # when it was heard
@@ -176,7 +178,7 @@ class DriverNode:
     def _take_topology(self, msg: TopologyStatus) -> None:
         if msg.state == TopologyStatus.WAITING and (self._topology is None
                                                     or self._topology.state != TopologyStatus.WAITING):
-            self._gave_up = False  # somebody asks anew
+            self._seeking.succeeds()  # somebody asks anew
         self._topology = msg
 
     def _take_localization(self, msg: LocalizationStatus) -> None:
@@ -348,7 +350,11 @@ class DriverNode:
         if outcome.code == SUCCEEDED:
             self._tell(edge_driver.ARRIVED if arrival is not None else IDLE, outcome.reason)
         else:
-            self._gave_up = self._gave_up or outcome.code != PREEMPTED
+            if outcome.code != PREEMPTED:
+                if job.server is None:
+                    self._seeking.fails()
+                else:
+                    self._seeking.leave_to_others()
             self._tell(IDLE if outcome.code == PREEMPTED else FAILED, f"{job.name}: {outcome.reason}")
         if job.server is not None:
             result = self._result(job.server, outcome, job.travelled_m, arrival)
@@ -361,14 +367,14 @@ class DriverNode:
 
     def _arrive(self, arrival: Arrival) -> None:
         """Report a meetpoint, and the edge to it."""
-        self._arrival, self._arrival_stamp_ns, self._gave_up = arrival, arrival.stamp_ns, False
+        self._arrival, self._arrival_stamp_ns = arrival, arrival.stamp_ns
+        self._seeking.succeeds()
         if self._odom_from_base is not None:
             self._arrived_at = self._odom_from_base
         traversal = driver_messages.traversal_msg(arrival, self._node.base_frame_id)
         if traversal is not None:
             self._traversals.publish(traversal)
-        elif (self._node.follow_turn_choice and self._topology is not None
-                and self._topology.state in (TopologyStatus.SEARCHING, TopologyStatus.TENTATIVE)):
+        elif self._search_is(IN_SEARCH):
             rospy.logwarn("the search cannot follow the robot to this meetpoint: it is asked to begin anew")
             threading.Thread(target=self._restart_search, daemon=True).start()
             return  # it will wait for a meetpoint then
@@ -393,20 +399,23 @@ class DriverNode:
     def _stands_at_meetpoint(self) -> bool:
         return self._arrival is not None and self._driver.progress.phase == edge_driver.ARRIVED
 
+    def _search_is(self, states: Sequence[int]) -> bool:
+        """Whether there is a search that the robot drives for, in one of these states."""
+        return self._node.follow_turn_choice and self._topology is not None and self._topology.state in states
+
     def _decide(self) -> None:
-        """Nothing is on: does a search wait for the robot?"""
-        waits = self._topology is not None and self._topology.state == TopologyStatus.WAITING
+        """Nothing is on: does a search wait for the robot, or did its edge lead nowhere?"""
+        waits = self._search_is((TopologyStatus.WAITING,))
         if self._arrival is not None and self._odom_from_base is not None and float(np.hypot(
                 *(self._odom_from_base - self._arrived_at)[:2])) > MOVED_M:
             self._driver.stop()
             self._arrival = None
             self._tell(IDLE, "the robot was moved away from its meetpoint")
         if self._stands_at_meetpoint:
-            if waits and self._node.follow_turn_choice and self._now_s - self._reported_s > REPORT_AGAIN_S:
+            if waits and self._now_s - self._reported_s > REPORT_AGAIN_S:
                 self._report_meetpoint()
-        elif self._node.seek_at_start and not self._gave_up and (
-                not self._sought or waits and self._node.follow_turn_choice):
-            self._sought = True
+        elif self._node.seek_at_start and self._seeking.is_due(waits, self._search_is(IN_SEARCH)):
+            self._seeking.seeks()
             self._begin(EdgeTask(self._driver, self._p.recovery, self._p.edge.limits), "~seek_at_start")
 
     # -- the control step
@@ -419,7 +428,7 @@ class DriverNode:
             trouble = self._no_input()
             if trouble is None:
                 self._decide()
-            elif not self._sought and self._node.seek_at_start:
+            elif not self._seeking.sought and self._node.seek_at_start:
                 self._tell(HALTED, trouble)
         job = self._job
         if job is None:
@@ -567,7 +576,7 @@ class DriverNode:
         self._driver.reset()
         self._arrival, self._odom_from_base, self._odometry_pose = None, None, None
         self._seen_ns = self._odometry_ns = 0
-        self._sought = self._gave_up = False
+        self._seeking.reset()
         self._localization, self._localization_s, self._reported_s = "", -math.inf, -math.inf
         self._controlled_s = self._now_s
         self._quiet_from_s = self._now_s + QUIET_S

@@ -21,6 +21,7 @@ class DriverNodeParams:
     backend: str = INTERNAL            # of goto_node; or move_base
     follow_turn_choice: bool = True    # drive as the topology node says
     seek_at_start: bool = True         # drive to a meetpoint at the start, and whenever a search waits for one
+    seek_attempts: int = 3             # of a search in a row, before it waits for somebody
     control_rate_hz: float = 20.0      # of cmd_vel
     use_scan_surfaces: bool = True     # not scan, while the localization is LOCALIZED
     scan_timeout_s: float = 0.6        # an older scan stops the robot
@@ -36,6 +37,8 @@ class DriverNodeParams:
     def __post_init__(self) -> None:
         if self.backend not in (INTERNAL, MOVE_BASE):
             raise ValueError(f"~backend must be {INTERNAL} or {MOVE_BASE}, got {self.backend!r}")
+        if self.seek_attempts < 1:
+            raise ValueError(f"~seek_attempts must be >= 1, got {self.seek_attempts}")
         if not 1.0 <= self.control_rate_hz <= 200.0:
             raise ValueError(f"~control_rate_hz must be 1 to 200 Hz, got {self.control_rate_hz}")
         for name in ("scan_timeout_s", "odometry_timeout_s", "status_timeout_s", "patience_s", "move_base_wait_s",

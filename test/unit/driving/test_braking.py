@@ -33,15 +33,16 @@ def nearest_m(pose, obstacles_m):
     return float(np.hypot(*(obstacles_m - pose[:2]).T).min())
 
 
+@pytest.mark.parametrize("creep", [False, True])
 @pytest.mark.parametrize("seed", range(60))
-def test_the_outline_touches_nothing_on_any_way_that_is_allowed(seed):
+def test_the_outline_touches_nothing_on_any_way_that_is_allowed(seed, creep):
     """One velocity is asked for again and again; the base brakes and speeds up as it can."""
     rng = np.random.default_rng(seed)
     obstacles_m, wanted = some_obstacles(rng), some_velocity(rng)
     pose, command, travelled_m = np.zeros(3), np.zeros(3), 0.0
     for step in range(80):
         seen = se2.transform_points(se2.inverse(pose), obstacles_m)
-        safe = braking.allowed(wanted, seen, LIMITS)
+        safe = braking.allowed(wanted, seen, LIMITS, creep)
         command = velocity.limited(safe, command, LIMITS, CONTROL_S)
         for _ in range(3):
             pose = robot.moved(pose, command * CONTROL_S / 3)
@@ -101,6 +102,16 @@ def test_a_passage_is_driven_through_if_it_is_as_wide_as_the_base_and_its_margin
     inside = walls - [1.0, 0.0]
     assert (braking.room_m(AHEAD, walls, LIMITS, 2.0) == 2.0) == driven
     assert (braking.room_m(AHEAD, inside, LIMITS, 1.5) == 1.5) == driven
+
+
+@pytest.mark.parametrize("half_m, out", [(0.235, True), (0.215, False)])
+def test_back_where_it_came_in_it_creeps_through_what_is_too_narrow_for_its_margins(half_m, out):
+    x = np.linspace(-0.5, 0.5, 101)
+    walls = np.concatenate([np.column_stack([x, np.full(101, side)]) for side in (-half_m, half_m)])
+    walls = se2.transform_points(np.array([0.0, 0.0, 0.1]), walls)  # it does not stand quite along them
+    assert braking.allowed(AHEAD, walls, LIMITS)[0] == 0.0
+    creeping = braking.allowed(AHEAD, walls, LIMITS, creep=True)
+    assert (0.0 < creeping[0] < 0.05) == out and (creeping[0] == 0.0) != out
 
 
 @pytest.mark.parametrize("obstacles", [np.zeros((0, 2)), np.array([[np.nan, 0.0], [np.inf, np.inf]]),

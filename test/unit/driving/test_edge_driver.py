@@ -14,7 +14,7 @@ from glass_nav.driving import edge_driver
 from glass_nav.driving.edge_driver import (ARRIVED, BLOCKED, FAILED, FOLLOWING, HOMING, IDLE, NO_GRAPH, SEEKING,
                                            EdgeDriver)
 from glass_nav.geometry import se2
-from glass_nav.simulation import building_file, shipped_buildings
+from glass_nav.simulation import building_file, lidar, shipped_buildings
 from glass_nav.simulation.building import Building, Pane, Thing, box
 from glass_nav.topology import atlas_file, shipped_atlases
 from glass_nav.topology.atlas import twin
@@ -23,6 +23,7 @@ from glass_nav.topology.observations import ObservationError
 LIMITS = edge_driver.EdgeDriverParams().limits
 OFFICE = "opaque_office"
 OFFICE_START = (9.2, 5.9, 0.0)  # in the corridor, beside node 15
+NARROW_END, BESIDE_NARROW = 20, 21  # nodes
 IN_T = (2.5, 0.9, 0.1)
 
 
@@ -315,3 +316,22 @@ def test_a_meetpoint_that_cannot_quite_be_reached_is_reported_from_as_near_as_it
     away_m = float(np.hypot(*(drive.where(arrival) - drive.simulation.map_from_base[:2])))
     assert arrival.meetpoint.degree == 1 and drive.where(arrival) == pytest.approx([5.4, 0.6], abs=0.15)
     assert 0.1 < away_m < 0.5 and drive.blocked == 0
+
+
+@pytest.mark.parametrize("seed", [3, 8])
+def test_out_of_a_dead_end_that_narrows_it_comes_as_it_went_in(seed):
+    """Beside a table, where the base hardly fits at last and the end is the nearer the better it is seen."""
+    building, atlas = office()
+    start = (*atlas.nodes.position_m[BESIDE_NARROW], 0.3)
+    drive, arrival = arrived_in_t(building, start, model=lidar.preset("sensitive"), seed=seed)
+    node, _ = node_at(atlas, drive, arrival)
+    inward, = (dart for dart in atlas.rings[node] if atlas.darts.node[twin(dart)] == NARROW_END)
+    drive.driver.leave(rank_towards(arrival, drive, atlas.darts.bearing_rad[inward]))
+    end = drive.arrival()
+    assert end.meetpoint.degree == 1
+    assert np.hypot(*(drive.where(end) - atlas.nodes.position_m[NARROW_END])) < 0.3
+    drive.driver.leave(0)
+    back = drive.arrival()
+    assert node_at(atlas, drive, back)[0] == node and back.meetpoint.degree == 3
+    assert drive.blocked == 0
+    check_commands(drive)

@@ -26,6 +26,7 @@ def test_the_radius_of_the_robot_is_that_of_base_graph_and_map():
 @pytest.mark.parametrize("given, text", [
     ({"backend": "teb"}, "/driver: ~backend must be internal or move_base, got 'teb'"),
     ({"control_rate_hz": 0.5}, "/driver: ~control_rate_hz must be 1 to 200 Hz, got 0.5"),
+    ({"seek_attempts": 0}, "/driver: ~seek_attempts must be >= 1, got 0"),
     ({"patience_s": 0.0}, "/driver: ~patience_s must be > 0 and finite, got 0.0"),
     ({"base_frame_id": "odom"}, "/driver: ~odom_frame_id, ~base_frame_id and ~global_frame_id must differ, got 'odom', "
                                 "'odom', 'map'"),

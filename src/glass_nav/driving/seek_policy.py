@@ -1,0 +1,51 @@
+"""When a driver seeks a meetpoint by itself: at the start, for a search that waits, where an edge led nowhere."""
+
+from __future__ import annotations
+
+
+class SeekPolicy:
+    """Told what happens to the robot, it says whether to seek; only so often in a row without success."""
+
+    def __init__(self, attempts: int) -> None:
+        """
+        Args:
+            attempts: tasks of the search that may fail in a row, >= 1; then it is for others to go on.
+        """
+        self._attempts = attempts
+        self.reset()
+
+    def reset(self) -> None:
+        """All begins anew."""
+        self._sought = False
+        self._failures = 0
+
+    @property
+    def sought(self) -> bool:
+        """Whether it has been sought since the start."""
+        return self._sought
+
+    def seeks(self) -> None:
+        """The robot is on its way to a meetpoint."""
+        self._sought = True
+
+    def fails(self) -> None:
+        """What the search asked for, or the way to a meetpoint, failed."""
+        self._failures += 1
+
+    def succeeds(self) -> None:
+        """The robot arrived, or somebody asked for a new search: earlier failures do not count."""
+        self._failures = 0
+
+    def leave_to_others(self) -> None:
+        """What somebody else asked for failed: they go on, or succeeds() does."""
+        self._failures = self._attempts
+
+    def is_due(self, waits: bool, searching: bool) -> bool:
+        """Whether to seek now, while the robot stands at no meetpoint and nothing is on.
+
+        Args:
+            waits: a search waits for a meetpoint.
+            searching: one has begun and has not ended.
+        """
+        return self._failures < self._attempts and (
+            not self._sought or waits or (searching and self._failures > 0))
