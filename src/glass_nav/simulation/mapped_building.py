@@ -2,7 +2,8 @@
 
 The floor is the largest part of the map's free space that a robot can be in. All that bounds it stands: occupied cells,
 and unknown ones, behind which a real floor might go on. Only specks of unknown cells with no occupied one in them are
-nothing, as for the atlas. Outlines are straightened by less than a cell, so that walls at an angle have no steps.
+nothing, as for the atlas. Outlines go through the middles of the cells' faces and are straightened by less than a cell,
+so that walls at an angle have no steps.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from glass_nav.simulation.start_place import PASSAGE_M
 from glass_nav.world.grid_map import GridMap
 from glass_nav.world.wall_segments import outlines
 
-STRAIGHTENED_CELLS = 0.75  # a step of one cell on the diagonal is off the line by 0.71
+STRAIGHTENED_CELLS = 0.75  # the middles of the faces of any straight wall are nearer than this to a line
 SPECK_M = 0.25             # smaller things that are unknown through and through
 
 
@@ -38,11 +39,12 @@ def build(grid_map: GridMap, name: str) -> Building:
     if not count:
         raise ValueError(f"{name}: no free place in the map has {PASSAGE_M:g} m of room around it")
     largest = int(np.bincount(parts[parts > 0]).argmax())
-    row, column = np.unravel_index(np.argmax(np.where(parts == largest, room_m, 0.0)), floor.shape)
+    row, column = np.divmod(np.argmax(np.where(parts == largest, room_m, 0.0)), floor.shape[1])
     pieces, _ = ndimage.label(floor)
     things = tuple(Thing(se2.transform_points(grid_map.map_from_grid, line * grid_map.resolution_m))
                    for line in map(_straightened, outlines(pieces == pieces[row, column])))
-    return Building((), things=things, start=np.append(grid_map.centres(row, column), 0.0), name=name)
+    start = np.append(grid_map.centres(np.array(row), np.array(column)), 0.0)
+    return Building((), things=things, start=start, name=name)
 
 
 def _specks(grid_map: GridMap) -> np.ndarray:
@@ -58,7 +60,8 @@ def _specks(grid_map: GridMap) -> np.ndarray:
 
 def _straightened(outline: np.ndarray) -> np.ndarray:
     """(k, 2) the corners of a closed line (n, 2) that matter, at least three."""
-    begin = int(np.argmax(np.hypot(*(outline - outline.mean(axis=0)).T)))
-    closed = np.concatenate([outline[begin:], outline[:begin + 1]]).astype(float)
+    middles = 0.5 * (outline + np.roll(outline, -1, axis=0))
+    begin = int(np.argmax(np.hypot(*(middles - middles.mean(axis=0)).T)))
+    closed = np.concatenate([middles[begin:], middles[:begin + 1]])
     kept: List[int] = segments.corners(closed, STRAIGHTENED_CELLS)[:-1].tolist()
     return closed[kept] if len(kept) > 2 else closed[:-1]

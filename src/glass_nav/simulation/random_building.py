@@ -112,18 +112,18 @@ class _Floor:
             self._hall(x0, x1, y0, y1)
             return
         doors = kind >= _HALL + _UNSEEN
-        lengthwise = (sides["low"] or sides["high"]) and (x1 - x0 >= y1 - y0 or not (sides["left"] or sides["right"]))
-        if lengthwise:
-            self._rooms((x0, x1), (y0, y1), (sides["low"], sides["high"]), (sides["left"], sides["right"]), doors, False)
+        across, along = (sides["left"], sides["right"]), (sides["low"], sides["high"])
+        if any(along) and (x1 - x0 >= y1 - y0 or not any(across)):
+            self._rooms((x0, x1), (y0, y1), along, across, doors, False)
         else:
-            self._rooms((y0, y1), (x0, x1), (sides["left"], sides["right"]), (sides["low"], sides["high"]), doors, True)
+            self._rooms((y0, y1), (x0, x1), across, along, doors, True)
 
     def _hall(self, x0: float, x1: float, y0: float, y1: float) -> None:
         """Open to all corridors around it."""
         for _ in range(int(self._rng.integers(1, 4))):
             size = self._rng.uniform(0.3, 0.6)
             place = self._rng.uniform([x0 + 1.2, y0 + 1.2], [x1 - 1.2, y1 - 1.2])
-            self._things.append((box(*place, size, size), "plaster"))
+            self._things.append((box(float(place[0]), float(place[1]), size, size), "plaster"))
 
     def _rooms(self, along: Sequence[float], deep: Sequence[float], facing: Tuple[bool, bool],
                ends: Tuple[bool, bool], doors: bool, turned: bool) -> None:
@@ -190,9 +190,9 @@ class _Floor:
             reach = 0.5 * math.hypot(length, width) + 0.1
             low, high = np.array([along[0], deep[0]]) + reach, np.array([along[1], deep[1]]) - reach
             place = self._rng.uniform(low, np.maximum(high, low))
-            yaw = self._rng.choice([0.0, self._rng.uniform(-0.6, 0.6)])
+            yaw = float(self._rng.choice([0.0, self._rng.uniform(-0.6, 0.6)]))
             if (high > low).all() and np.hypot(*(place - door)) > DOOR_ROOM_M + reach:
-                outline = box(*place, length, width, yaw)
+                outline = box(float(place[0]), float(place[1]), length, width, yaw)
                 self._things.append((outline[:, ::-1] if turned else outline,
                                      str(self._rng.choice(["wood", "metal", "cloth", "plant"]))))
 

@@ -47,8 +47,8 @@ def random_place(building: Building, rng: np.random.Generator) -> np.ndarray:
     grid = building_map.draw(building)
     room_m = ndimage.distance_transform_edt(np.pad(grid.free, 1))[1:-1, 1:-1] * grid.resolution_m
     parts, _ = ndimage.label(room_m >= PASSAGE_M, np.ones((3, 3), bool))
-    row, column = grid.cells(building.start[:2])
-    row, column = ndimage.distance_transform_edt(parts == 0, return_distances=False, return_indices=True)[:, row, column]
+    nearest = ndimage.distance_transform_edt(parts == 0, return_distances=False, return_indices=True)
+    row, column = nearest[(slice(None), *grid.cells(building.start[:2]))]
     rows, columns = np.nonzero((parts == parts[row, column]) & (room_m >= ROOM_M))
     surfaces = building.surfaces
     from_m, to_m = surfaces.from_m[surfaces.present], surfaces.to_m[surfaces.present]
