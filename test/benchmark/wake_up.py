@@ -25,6 +25,7 @@ from typing import Any, Dict, Iterator, List, NamedTuple, Optional
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import floors
 import numpy as np
 
 from glass_nav.driving import tasks
@@ -38,9 +39,8 @@ from glass_nav.geometry import angles, se2
 from glass_nav.localization.glass_mcl import GlassMcl
 from glass_nav.localization.glass_mcl_params import GlassMclParams
 from glass_nav.localization.scan_explanation import ScanExplanation
-from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings, start_place
+from glass_nav.simulation import lidar, shipped_buildings, start_place
 from glass_nav.simulation.simulation import Frame, Simulation
-from glass_nav.topology import atlas_file, shipped_atlases
 from glass_nav.topology.atlas_localizer import CONFIRMED, AtlasLocalizer, Estimate, SearchParams
 
 CONTROL_S = 0.05
@@ -66,10 +66,7 @@ class Trial:
     """One robot in one building."""
 
     def __init__(self, job: Job) -> None:
-        building = building_file.load(shipped_buildings.find(job.building))
-        building = building.opaque() if job.opaque else building
-        self.grid_map = building_map.draw(building)
-        self.atlas = atlas_file.load(shipped_atlases.find(job.building))
+        building, self.grid_map, self.atlas = floors.load(job.building, job.seed, job.opaque)
         start = start_place.random_place(building, np.random.default_rng([job.seed, 1]))
         self.simulation = Simulation(building, lidar.preset(job.lidar), seed=job.seed, start=start)
         self.limits = BaseLimits()
@@ -244,7 +241,8 @@ def line(name: str, runs: List[Dict[str, Any]]) -> str:
 def main() -> None:
     """Run all, print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--buildings", nargs="+", default=list(shipped_buildings.shipped()))
+    parser.add_argument("--buildings", nargs="+", default=list(shipped_buildings.shipped()),
+                        help=floors.HELP)
     parser.add_argument("--lidars", nargs="+", default=["sensitive"], choices=list(lidar.PRESETS))
     parser.add_argument("--opaque", action="store_true", help="film on all glass")
     parser.add_argument("--seeds", type=int, default=2, help="robots in each building with each lidar")

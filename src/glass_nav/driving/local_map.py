@@ -34,7 +34,7 @@ _LEAST_PIECE = 4   # cells of a pane that give a line
 @dataclass(frozen=True)
 class LocalMapParams:
     """Lengths in metres."""
-    window_m: float = 12.0           # edge of the square around the robot
+    window_m: float = 20.0           # edge of the square around the robot: of a hall 11 m wide it shows the ways out
     resolution_m: float = 0.05       # edge of a cell; that of the atlas' map
     directions: int = 16             # of beams, told apart
     least_ends: int = 2              # beams that must have ended in a cell from one direction ...
