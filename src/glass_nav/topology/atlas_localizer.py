@@ -229,7 +229,14 @@ class AtlasLocalizer:
                 begun = replace(begun, reason=f"search {self._search} of {self._params.searches}, nothing fitted any "
                                               f"more: {begun.reason}")
             self._estimate = begun
+        if self._edges_before and self._followed is not None and self._estimate.choice is not None:
+            self._estimate = replace(self._estimate, choice=self._least_seen(self._followed, self._estimate.choice))
         return self._estimate
+
+    def _least_seen(self, followed: FollowedPoses, by_graph: TurnChoice) -> TurnChoice:
+        """Where the graph was wrong once, its candidates do not know which turn tells most: to new places."""
+        rank = followed.least_seen_rank(self._forest.meetpoints[-1])
+        return by_graph if rank is None else TurnChoice(rank, by_graph.degree)
 
     def _with_followed(self, by_graph: Estimate, standing: Standing) -> Estimate:
         """What the graph and the followed poses say together."""
