@@ -126,7 +126,8 @@ class Trial:
             estimate = self._told(task.arrival, rank)
             if self.verbose:
                 print(f"{self.now_s:7.1f} s depth {estimate.depth} {estimate.state}: {estimate.reason}; rank "
-                      f"{estimate.choice.rank if estimate.choice else '-'}; {self._truth(task.arrival)}", flush=True)
+                      f"{estimate.choice.rank if estimate.choice else '-'}; {self._truth(task.arrival)}"
+                      f"{self._scans_say()}", flush=True)
             if estimate.done or estimate.depth >= MOST_EDGES or estimate.choice is None:
                 break
             rank = estimate.choice.rank
@@ -232,8 +233,8 @@ def told(found: Dict[str, Any]) -> str:
     """One run in one line."""
     verdict = ", right" if found["right"] else ", WRONG" if found["wrong"] else ""
     return (f"{found['building']} {found['lidar']} seed {found['seed']}: {found['state']}{verdict} after "
-            f"{found['edges']} edges, {found['search_s']:.0f} s ({found['reason']}); {found['collisions']} collisions; legs "
-            f"{found.get('legs', '-')}, tracking {found.get('tracking_m', math.nan):.3f} m; failures "
+            f"{found['edges']} edges, {found['search_s']:.0f} s ({found['reason']}); {found['collisions']} collisions; "
+            f"legs {found.get('legs', '-')}, tracking {found.get('tracking_m', math.nan):.3f} m; failures "
             f"{found['failures']}; {found['cpu_s']:.0f} s CPU")
 
 

@@ -21,6 +21,7 @@ from glass_nav.topology.edge_segments import SegmentTest
 from glass_nav.topology.followed_poses import FollowedPoses, MapScans, Standing
 from glass_nav.topology.matching import Explained, Matcher, Tolerances, poses_at
 from glass_nav.topology.observations import Meetpoint, Traversal, turn_name
+from glass_nav.topology.passed_edges import PassedEdges
 from glass_nav.topology.search_forest import SearchForest
 
 SEARCHING, TENTATIVE, CONFIRMED, AMBIGUOUS, LOST = "SEARCHING", "TENTATIVE", "CONFIRMED", "AMBIGUOUS", "LOST"
@@ -116,6 +117,7 @@ class AtlasLocalizer:
         self._forest = SearchForest(self._matcher, 0 if params.document else params.max_detection_errors)
         followed = scans is not None and params.follow_places > 0 and not params.document
         self._followed = FollowedPoses(scans) if followed else None
+        self._passed = PassedEdges()
         self._seen_places = 0  # by the followed poses, when the last search began
         self._claim: Optional[_Claim] = None
         self._estimate: Optional[Estimate] = None
@@ -151,6 +153,7 @@ class AtlasLocalizer:
     def start(self, meetpoint: Meetpoint) -> Estimate:
         """Begin a search; what was known before is forgotten."""
         self._edges_before, self._search, self._seen_places = 0, 1, 0
+        self._passed.begin(meetpoint)
         if self._followed is not None:
             self._followed.begin(meetpoint)
         return self._begin(meetpoint)
@@ -162,6 +165,7 @@ class AtlasLocalizer:
             ObservationError: the meetpoint it left has no such edge; nothing is changed.
         """
         self._forest.step(traversal, meetpoint)
+        self._passed.way(traversal.rank, meetpoint, traversal.length_m)
         if self._followed is not None:
             self._followed.follow(meetpoint, traversal.length_m)
         return self._judged()
@@ -230,13 +234,16 @@ class AtlasLocalizer:
                                               f"more: {begun.reason}")
             self._estimate = begun
         if self._edges_before and self._followed is not None and self._estimate.choice is not None:
-            self._estimate = replace(self._estimate, choice=self._least_seen(self._followed, self._estimate.choice))
+            self._estimate = replace(self._estimate, choice=self._least_passed(self._estimate.choice))
         return self._estimate
 
-    def _least_seen(self, followed: FollowedPoses, by_graph: TurnChoice) -> TurnChoice:
-        """Where the graph was wrong once, its candidates do not know which turn tells most: to new places."""
-        rank = followed.least_seen_rank(self._forest.meetpoints[-1])
-        return by_graph if rank is None else TurnChoice(rank, by_graph.degree)
+    def _least_passed(self, by_graph: TurnChoice) -> TurnChoice:
+        """Where the graph was wrong once, its candidates do not know which turn tells most: to what is new."""
+        times = self._passed.times(self._forest.meetpoints[-1])
+        if times is None or times[by_graph.rank] == times.min():
+            return by_graph
+        least = np.flatnonzero(times == times.min())
+        return TurnChoice(int(least[-1]), by_graph.degree)  # back only if there is no other
 
     def _with_followed(self, by_graph: Estimate, standing: Standing) -> Estimate:
         """What the graph and the followed poses say together."""

@@ -33,7 +33,6 @@ _OFF_M, _OFF_SHARE, _OFF_RAD = 0.2, 0.04, np.radians(10.0)  # a pose that odomet
 _APART_M, _APART_SHARE = 1.5, 0.03                          # another place, from where things look otherwise
 _SAME_CELL = np.array([0.3, 0.3, 0.15])                     # poses in one cell are one [m, m, rad]
 _SAME_M, _SAME_RAD = 0.7, 0.25                              # poses nearer than that are no rivals
-_AHEAD_M, _NEAR_M = 2.0, 2.0                                # where an edge leads; meetpoints seen so near there count
 
 
 class MapScans(Protocol):
@@ -80,7 +79,6 @@ class FollowedPoses:
         self._now = np.zeros(0)          # (K,) of the last scan
         self._odom_from_base: Optional[np.ndarray] = None  # at the last meetpoint
         self._way_m = 0.0
-        self._been_m: List[np.ndarray] = []  # (2,) in odom, of each meetpoint
 
     @property
     def standing(self) -> Optional[Standing]:
@@ -94,23 +92,12 @@ class FollowedPoses:
         return Standing(self._poses[best].copy(), len(self._places), float(means[best]), lead, float(self._now[best]),
                         lead_now)
 
-    def least_seen_rank(self, meetpoint: Meetpoint) -> Optional[int]:
-        """The edge of the last meetpoint that leads to where the robot has been least; None if that is not known."""
-        if self._odom_from_base is None or not len(meetpoint.bearings_rad):
-            return None
-        bearing = meetpoint.bearings_rad
-        ahead = meetpoint.centre_m + _AHEAD_M * np.column_stack([np.cos(bearing), np.sin(bearing)])
-        ahead_m = se2.transform_points(self._odom_from_base, ahead)
-        off = np.linalg.norm(ahead_m[:, None] - np.array(self._been_m), axis=-1)  # (degree, meetpoints)
-        return int(np.exp(-0.5 * (off / _NEAR_M) ** 2).sum(axis=1).argmin())
-
     def begin(self, meetpoint: Meetpoint) -> None:
         """Nothing is known any more but this meetpoint."""
         self._forget()
         if meetpoint.odom_from_base is None:
             return
         self._odom_from_base = meetpoint.odom_from_base
-        self._been_m.append(meetpoint.odom_from_base[:2])
         if meetpoint.scan is not None:
             self._take(meetpoint.scan, meetpoint.odom_from_base, 0.0)
 
@@ -121,7 +108,6 @@ class FollowedPoses:
             self.begin(meetpoint)
             return
         self._odom_from_base = after
-        self._been_m.append(after[:2])
         self._way_m += way_m
         self._poses = se2.compose(self._poses, se2.compose(se2.inverse(before), after))
         if meetpoint.scan is not None:

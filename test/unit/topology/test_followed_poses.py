@@ -114,26 +114,6 @@ def test_a_scan_that_proposes_nothing_tells_nothing() -> None:
     assert followed.standing is None
 
 
-def test_the_edge_that_leads_to_where_the_robot_has_been_least_is_known_with_directions() -> None:
-    followed = FollowedPoses(Line([0.5, 0.9]))
-    east_south_west = np.array([0.0, -0.5, -1.0]) * np.pi
-    def cross(x: float, y: float) -> Meetpoint:
-        return Meetpoint(3, 1.0, bearings_rad=east_south_west, odom_from_base=np.array([x, y, 0.0]))
-    followed.begin(cross(0.0, 0.0))
-    followed.follow(cross(2.0, 0.0), 2.0)  # came from the west
-    followed.follow(cross(2.0, -2.0), 2.0)  # been in the south
-    followed.follow(cross(2.0, 0.0), 2.0)
-    assert followed.least_seen_rank(cross(2.0, 0.0)) == 0
-    followed.follow(cross(4.0, 0.0), 2.0)
-    followed.follow(cross(4.0, 2.0), 2.0)
-    turned = Meetpoint(3, 1.0, bearings_rad=east_south_west + 0.5 * np.pi, odom_from_base=np.array([4.0, 0.0, 0.0]))
-    followed.follow(turned, 2.0)  # north, east, south: never been in the east nor south-east
-    assert followed.least_seen_rank(turned) == 1
-    assert followed.least_seen_rank(Meetpoint(3, 1.0)) is None
-    followed.begin(Meetpoint(3, 1.0, bearings_rad=east_south_west))
-    assert followed.least_seen_rank(cross(0.0, 0.0)) is None
-
-
 def test_odometry_must_be_finite() -> None:
     with pytest.raises(ObservationError, match="meetpoint: its odometry needs finite x, y and yaw, got "):
         Meetpoint(3, 1.0, odom_from_base=np.array([0.0, np.nan, 0.0]))
