@@ -3,8 +3,9 @@
 A beam is explained if it ended at one of the ranges that the five cases offer: the first surface on its way, the next
 ones behind it if the walls before are thin enough for glass, or the mirrored one (seed document
 glass_localization.txt). So a candidate in a building of glass is not ruled out by beams that went through panes, nor
-believed because a wall is somewhere. Each pose may slide to where the scan fits best first, for it is known to a
-decimetre or so.
+believed because a wall is somewhere. A beam that ended where the map knows nothing, with nothing of the map on its
+way, is no evidence: who drew the map did not look there. Each pose may slide to where the scan fits best first, for it
+is known to a decimetre or so.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 from typing import Optional, Tuple
 
 import numpy as np
+from scipy import ndimage
 
 from glass_nav.geometry import angles, se2
 from glass_nav.localization import scan_alignment
@@ -19,7 +21,7 @@ from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
 from glass_nav.sensing.scan_matcher import ScanMatcher
-from glass_nav.world.grid_map import GridMap
+from glass_nav.world.grid_map import UNKNOWN, GridMap
 
 _BEAMS = 120        # of a scan that are asked
 _NEAR_CELLS = 3.0   # a beam that ends so near to a range that the map offers is explained
@@ -38,16 +40,18 @@ class ScanExplanation:
         self._field = DistanceField(grid_map)
         self._matcher: Optional[ScanMatcher] = None  # made when it is first asked: it takes some time on a large map
         self._near_m = _NEAR_CELLS * grid_map.resolution_m
+        around = np.ones((2 * int(_NEAR_CELLS) + 1,) * 2, bool)
+        self._near_unknown = ndimage.binary_dilation(grid_map.occupancy == UNKNOWN, around)  # (H, W)
 
     def shares(self, scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
-        """Of the beams that came back, those that the map explains.
+        """Of the beams that came back from where the map knows something, those that it explains.
 
         Args:
             scan: as it was measured.
             map_from_base: (C, 3) poses.
 
         Returns:
-            (C,) shares in [0, 1]; NaN if hardly any beam came back.
+            (C,) shares in [0, 1]; NaN if hardly any beam did.
         """
         return self.fitted(scan, map_from_base, _SLIDES_M, _SLIDES_RAD)[1]
 
@@ -61,7 +65,7 @@ class ScanExplanation:
             most_m, most_rad: a pose that would slide further stays where it was said to be.
 
         Returns:
-            (C, 3) poses, and (C,) shares in [0, 1]; poses as given and NaN if hardly any beam came back.
+            (C, 3) poses, and (C,) shares in [0, 1] as of shares(); poses as given and NaN if hardly any beam came back.
         """
         beams = _telling(scan)
         if beams is None:
@@ -71,7 +75,7 @@ class ScanExplanation:
         for first in range(0, len(map_from_base), _AT_ONCE):
             slid = self._slid(points, map_from_base[first:first + _AT_ONCE], most_m, most_rad)
             poses.append(slid)
-            shares.append(self._explained(scan, beams, slid))
+            shares.append(self._explained(scan, beams, points, slid))
         return np.concatenate(poses), np.concatenate(shares)
 
     def places(self, scan: Scan, most: int) -> np.ndarray:
@@ -90,12 +94,22 @@ class ScanExplanation:
         kept = (np.hypot(off[:, 0], off[:, 1]) < most_m) & (np.abs(angles.wrap(off[:, 2])) < most_rad)
         return np.where(kept[:, None], slid, poses)
 
-    def _explained(self, scan: Scan, beams: np.ndarray, poses: np.ndarray) -> np.ndarray:
+    def _explained(self, scan: Scan, beams: np.ndarray, points_m: np.ndarray, poses: np.ndarray) -> np.ndarray:
         hits = self._caster.cast_surfaces(se2.compose(poses, scan.base_from_laser), scan.angles_rad[beams],
                                           scan.range_max_m, max_thickness_m=_MOST_THICK_M)
         measured = scan.ranges_m[beams]
         offered = np.stack([hits.first_m, hits.second_m, hits.third_m, hits.mirrored_m])  # (4, P, B)
-        return (np.abs(offered - measured) <= self._near_m).any(axis=0).mean(axis=1)
+        explained = (np.abs(offered - measured) <= self._near_m).any(axis=0)
+        ends_m = np.stack([se2.transform_points(pose, points_m) for pose in poses])
+        told = explained | (hits.first_m < measured) | ~self._is_unknown(ends_m)
+        count = told.sum(axis=1)
+        return np.where(count < _LEAST_BEAMS, np.nan, explained.sum(axis=1) / np.maximum(count, 1))
+
+    def _is_unknown(self, points_m: np.ndarray) -> np.ndarray:
+        """(...) bool: the map knows nothing of points (..., 2), or of what is next to them."""
+        rows, columns = self._grid_map.cells(points_m)
+        inside = self._grid_map.contains(rows, columns)
+        return ~inside | self._near_unknown[np.where(inside, rows, 0), np.where(inside, columns, 0)]
 
 
 def _telling(scan: Scan) -> Optional[np.ndarray]:
