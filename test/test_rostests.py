@@ -17,7 +17,10 @@ REPO = Path(__file__).parents[1]
 ROSTESTS = sorted((REPO / "test" / "rostest").glob("*.test"))
 TIMEOUT_S = 600.0  # of one file; the tests in it have shorter ones, and tell more when they fail
 
-pytestmark = pytest.mark.skipif("ROS_PACKAGE_PATH" not in os.environ, reason="no ROS environment: run by scripts/test")
+pytestmark = [
+    pytest.mark.xdist_group("one_at_a_time"),  # each keeps up with a clock
+    pytest.mark.skipif("ROS_PACKAGE_PATH" not in os.environ, reason="no ROS environment: run by scripts/test"),
+]
 
 
 @pytest.mark.parametrize("path", ROSTESTS, ids=[path.stem for path in ROSTESTS])

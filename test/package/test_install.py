@@ -15,7 +15,8 @@ WORKSPACE = REPO / ".build" / "ws"
 SHELL = {"setup", "demo", "test"}  # programs of the checkout
 PROGRAMS = sorted(path.name for path in (REPO / "scripts").iterdir() if path.is_file() and path.name not in SHELL)
 
-pytestmark = pytest.mark.skipif(not (WORKSPACE / "build").exists(), reason="no catkin workspace: run by scripts/test")
+pytestmark = [pytest.mark.xdist_group("one_at_a_time"),  # not while a rostest's nodes start from this workspace
+              pytest.mark.skipif(not (WORKSPACE / "build").exists(), reason="no catkin workspace: run by scripts/test")]
 
 
 @pytest.fixture(scope="module")

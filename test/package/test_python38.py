@@ -17,10 +17,10 @@ PYTHON = OLD / "venv" / "bin" / "python"
 @pytest.mark.skipif(sys.version_info[:2] == (3, 8), reason="the whole suite runs on Python 3.8 here")
 @pytest.mark.skipif(not PYTHON.exists(), reason="no Python 3.8 on this machine (pyenv, /usr/bin/python3.8)")
 def test_unit_tests_pass_on_python_38(tmp_path: Path) -> None:
-    # Two at a time, as nothing else runs meanwhile. The faults of checkup are told by figures and not by the
-    # interpreter; the tests of the command run the same code.
+    # Long runs tell of figures and not of the interpreter; nor do the faults of checkup, and the tests of the command
+    # run the same code.
     command = [str(PYTHON), "-m", "pytest", "test/unit", "--ignore=test/unit/ros", "--ignore=test/unit/checkup", "-q",
-               "-n", "2", "--dist", "loadfile", "-p", "no:cacheprovider", f"--basetemp={tmp_path / 'py38'}"]
+               "-m", "not long_run", "-p", "no:cacheprovider", f"--basetemp={tmp_path / 'py38'}"]
     environment = {name: value for name, value in os.environ.items()
                    if name != "PYTHONPATH" and not name.startswith("COV_CORE")}
     environment["PYTHONPATH"] = str(OLD / "site")

@@ -57,7 +57,7 @@ class AmclLaunchFiles(unittest.TestCase):
                 def is_right(name: str = name) -> bool:
                     said = conversions.planar_from_pose(self.poses[name].last.pose.pose)
                     return bool(np.hypot(*(said - self.robot.map_from_base())[:2]) < 0.35)
-                self.assertTrue(wait_until(is_right, 15.0), f"{self.poses[name].last.pose.pose.position} is not the "
+                self.assertTrue(wait_until(is_right, 30.0), f"{self.poses[name].last.pose.pose.position} is not the "
                                 f"place {self.robot.map_from_base()}: {self.status[name].last}")
 
 

@@ -96,7 +96,7 @@ class Demo(unittest.TestCase):
     def hear_scans(self, count: int) -> None:
         """Returns after so many more."""
         wanted = len(self.truth) + count
-        self.assertTrue(wait_until(lambda: len(self.truth) >= wanted, 20.0), "the lidar stands still")
+        self.assertTrue(wait_until(lambda: len(self.truth) >= wanted, 30.0), "the lidar stands still")
 
     def assertStamps(self, one: Sequence[Any], other: Sequence[Any]) -> None:
         """The same stamps in the time that both were heard in."""
@@ -139,7 +139,7 @@ class Demo(unittest.TestCase):
 
     def test_3_map_time_and_frames_are_those_of_a_robot(self) -> None:
         maps, metadata = Heard("map", OccupancyGrid), Heard("map_metadata", MapMetaData)
-        self.assertTrue(wait_until(lambda: len(maps) and len(metadata), 10.0), "map and map_metadata are not latched")
+        self.assertTrue(wait_until(lambda: len(maps) and len(metadata), 30.0), "map and map_metadata are not latched")
         self.assertEqual(rospy.ServiceProxy("static_map", GetMap)().map, maps.last)
         self.assertEqual(set(maps.last.data), {-1, 0, 100})
         self.assertIn(("base_link", "laser"), [(each.header.frame_id, each.child_frame_id)
@@ -152,7 +152,7 @@ class Demo(unittest.TestCase):
     def test_3_whoever_listens_is_given_the_pose_and_nobody_else(self) -> None:
         lines = len(self.lines.having("starting at x"))
         heard = Heard("initialpose", PoseWithCovarianceStamped)
-        self.assertTrue(wait_until(lambda: len(heard), 10.0), "no initialpose within 10 s")
+        self.assertTrue(wait_until(lambda: len(heard), 30.0), "no initialpose within 30 s")
         self.hear_scans(5)
         self.assertEqual(len(heard), 1)
         truth = self.true_poses()[stamp_ns(heard.last)]
@@ -162,15 +162,15 @@ class Demo(unittest.TestCase):
     def test_4_cmd_vel_moves_the_robot_up_to_a_wall(self) -> None:
         yaw = self.position()[2]
         self.driver.start(0.0, 1.0)  # before the path, which waits
-        self.assertTrue(wait_until(lambda: abs(float(angles.wrap(self.position()[2] - yaw))) > 1.2, 20.0),
+        self.assertTrue(wait_until(lambda: abs(float(angles.wrap(self.position()[2] - yaw))) > 1.2, 30.0),
                         "cmd_vel does not turn the robot")
         start = self.position()
         self.driver.start(0.5, 0.0)
-        self.assertTrue(wait_until(lambda: np.hypot(*(self.position() - start)[:2]) > 0.2, 10.0),
+        self.assertTrue(wait_until(lambda: np.hypot(*(self.position() - start)[:2]) > 0.2, 30.0),
                         "cmd_vel does not move the robot")
         self.assertTrue(wait_until(lambda: self.blocked.last is not None and self.blocked.last.data, 60.0),
                         f"no obstacle stops the robot, which is at {self.position()}")
-        self.assertTrue(wait_until(lambda: self.lines.having("an obstacle stops the robot at x"), 10.0),
+        self.assertTrue(wait_until(lambda: self.lines.having("an obstacle stops the robot at x"), 30.0),
                         "no line about the obstacle")
         self.hear_scans(2)  # the truth comes with the scans, the flag at once
         there = self.position()
@@ -182,17 +182,17 @@ class Demo(unittest.TestCase):
             return float(np.mean([msg.twist.twist.linear.x for msg in self.odometry.all[-5:]]))
 
         self.driver.start(-0.3, 0.0)  # the way that it came
-        self.assertTrue(wait_until(lambda: speed() < -0.25, 10.0), f"{speed()} m/s")
+        self.assertTrue(wait_until(lambda: speed() < -0.25, 30.0), f"{speed()} m/s")
         self.driver.stop()
-        self.assertTrue(wait_until(lambda: speed() > -0.1, 10.0), "the robot goes on when cmd_vel falls silent")
+        self.assertTrue(wait_until(lambda: speed() > -0.1, 30.0), "the robot goes on when cmd_vel falls silent")
 
     def test_6_a_velocity_that_is_none_is_refused(self) -> None:
         publisher = rospy.Publisher("cmd_vel", Twist, queue_size=1)
         msg = Twist()
         msg.linear.x = float("nan")
-        self.assertTrue(wait_until(publisher.get_num_connections, 10.0))
+        self.assertTrue(wait_until(publisher.get_num_connections, 30.0))
         publisher.publish(msg)
-        self.assertTrue(wait_until(lambda: self.lines.having("cmd_vel refused", "got linear.x nan"), 10.0))
+        self.assertTrue(wait_until(lambda: self.lines.having("cmd_vel refused", "got linear.x nan"), 30.0))
         self.assertTrue(np.all(np.isfinite(self.position())))
 
     def test_7_as_fast_as_it_can_until_it_is_told_to_end(self) -> None:

@@ -145,7 +145,7 @@ class Driver(unittest.TestCase):
         self.assertTrue(wait_until(lambda: self.odometry.last.twist.twist.linear.x > forward_m_s, 60.0),
                         f"the robot does not drive: {self.status.last}")
 
-    def await_state(self, name: str, timeout_s: float = 20.0) -> DriverStatus:
+    def await_state(self, name: str, timeout_s: float = 30.0) -> DriverStatus:
         self.assertTrue(wait_until(lambda: self.status.last is not None and self.status.last.state_name == name,
                                    timeout_s), f"no {name}, but {self.status.last}")
         return self.status.last
@@ -157,7 +157,7 @@ class Driver(unittest.TestCase):
         ask()
         self.await_standing(5.0)
         heard = len(self.odometry)
-        self.assertTrue(wait_until(lambda: len(self.odometry) > heard + 25, 10.0))
+        self.assertTrue(wait_until(lambda: len(self.odometry) > heard + 25, 30.0))
         after = [msg for msg in self.odometry.all if conversions.ns_from_stamp(msg.header.stamp) > asked_ns]
         moving = [conversions.ns_from_stamp(msg.header.stamp) for msg in after
                   if msg.twist.twist.linear.x or msg.twist.twist.angular.z]
@@ -166,7 +166,7 @@ class Driver(unittest.TestCase):
         self.assertLess(stood_s, STOPPED_S)
 
     def await_end(self, client: Any, timeout_s: float = 90.0) -> Any:
-        ended = wait_until(lambda: client.get_state() not in (GoalStatus.PENDING, GoalStatus.ACTIVE), timeout_s)
+        ended = wait_until(lambda: client.get_result() is not None, timeout_s)  # its state may be known before
         self.assertTrue(ended, f"no result, the driver says {self.status.last}")
         return client.get_result()
 
@@ -181,7 +181,7 @@ class Driver(unittest.TestCase):
 
     def test_2_a_preempted_search_for_a_meetpoint_stands_at_once(self) -> None:
         self.edges.send_goal(TraverseEdgeGoal())
-        self.assertTrue(wait_until(lambda: self.speed() > 0.5, 20.0))
+        self.assertTrue(wait_until(lambda: self.speed() > 0.5, 30.0))
         self.assertStopsAfter(self.edges.cancel_goal)
         self.assertEqual(self.await_end(self.edges).code, TraverseEdgeResult.PREEMPTED)
         self.assertEqual(self.edges.get_state(), GoalStatus.PREEMPTED)
@@ -195,7 +195,7 @@ class Driver(unittest.TestCase):
         self.assertFalse(result.has_traversal)
         self.assertEqual({each.status.task for each in feedback}, {"traverse_edge"})
         self.assertIn("SEEKING", {each.status.state_name for each in feedback})
-        self.assertTrue(wait_until(lambda: len(self.meetpoints), 10.0))
+        self.assertTrue(wait_until(lambda: len(self.meetpoints), 30.0))
         self.assertEqual(self.meetpoints.last.header.stamp, result.meetpoint.header.stamp)
         self.assertEqual((self.meetpoints.last.degree, self.meetpoints.last.r, tuple(self.meetpoints.last.bearings)),
                          (result.meetpoint.degree, result.meetpoint.r, tuple(result.meetpoint.bearings)))
@@ -219,7 +219,7 @@ class Driver(unittest.TestCase):
                                    10.0))
         self.assertTrue(wait_until(lambda: len(self.traversals), 90.0), f"no traversal: {self.status.last}")
         traversal = self.traversals.last
-        self.assertTrue(wait_until(lambda: self.meetpoints.last.header.stamp == traversal.header.stamp, 10.0))
+        self.assertTrue(wait_until(lambda: self.meetpoints.last.header.stamp == traversal.header.stamp, 30.0))
         self.assertEqual(traversal.rank, 0)
         self.assertGreater(traversal.length, 0.3)
         self.assertLessEqual(traversal.chord, traversal.length + 1e-3)
@@ -270,12 +270,12 @@ class Driver(unittest.TestCase):
 
     def test_7_without_scans_it_stands_and_goes_on_when_they_come_again(self) -> None:
         self.edges.send_goal(TraverseEdgeGoal())
-        self.assertTrue(wait_until(lambda: self.speed() > 0.3, 20.0))
+        self.assertTrue(wait_until(lambda: self.speed() > 0.3, 30.0))
         self.let(hands_on=False)
         self.assertRegex(self.await_state("HALTED").reason, r"^the last scan is 0\.[67] s old$")
         self.await_standing(2.0)
         self.let(hands_on=True)
-        self.assertTrue(wait_until(lambda: self.speed() > 0.3, 20.0), "it does not go on")
+        self.assertTrue(wait_until(lambda: self.speed() > 0.3, 30.0), "it does not go on")
 
     def test_8_goals_that_cannot_be_are_refused_in_a_sentence(self) -> None:
         for goal, words in ((GotoNodeGoal(node=999), "node 999: the atlas opaque_office has nodes 0 to "),
@@ -301,7 +301,7 @@ class Driver(unittest.TestCase):
                                      ("none", GotoNodeResult.NO_WAY, "Failed to find a valid plan.")):
             count = len(player.goals)
             self.second.send_goal(GotoNodeGoal(node=10))
-            self.assertTrue(wait_until(lambda count=count: len(player.goals) > count, 10.0), "move_base has no goal")
+            self.assertTrue(wait_until(lambda count=count: len(player.goals) > count, 30.0), "move_base has no goal")
             target = player.goals[-1].target_pose
             self.assertEqual(target.header.frame_id, "map")
             np.testing.assert_allclose(conversions.planar_from_pose(target.pose)[:2], ATLAS.nodes.position_m[10])
@@ -310,15 +310,15 @@ class Driver(unittest.TestCase):
             self.assertEqual(result.code, code, result)
             self.assertIn(words, result.reason)
         self.second.send_goal(GotoNodeGoal(node=10))
-        self.assertTrue(wait_until(lambda: len(player.goals) == 3, 10.0))
+        self.assertTrue(wait_until(lambda: len(player.goals) == 3, 30.0))
         self.second.cancel_goal()
         self.assertEqual(self.await_end(self.second).code, GotoNodeResult.PREEMPTED)
-        self.assertTrue(wait_until(lambda: player.cancelled == 1, 10.0), "move_base drives on")
+        self.assertTrue(wait_until(lambda: player.cancelled == 1, 30.0), "move_base drives on")
         self.second.send_goal(GotoNodeGoal(node=10))
-        self.assertTrue(wait_until(lambda: len(player.goals) == 4, 10.0))
+        self.assertTrue(wait_until(lambda: len(player.goals) == 4, 30.0))
         self.let(says="LOST")
         self.assertEqual(self.await_end(self.second).code, GotoNodeResult.NOT_LOCALIZED)
-        self.assertTrue(wait_until(lambda: player.cancelled == 2, 10.0), "move_base drives on")
+        self.assertTrue(wait_until(lambda: player.cancelled == 2, 30.0), "move_base drives on")
 
     # -- the process
 

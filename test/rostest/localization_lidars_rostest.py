@@ -52,7 +52,7 @@ class LocalizationLidars(RoomTest):
             with part(lidar.frame):
                 for other in self.lidars:
                     other.silent = other is not lidar
-                self.assertTrue(wait_until(lambda frame=lidar.frame: self.frames_used(5) == {frame}, 15.0),
+                self.assertTrue(wait_until(lambda frame=lidar.frame: self.frames_used(5) == {frame}, 30.0),
                                 f"not {lidar.frame} alone is used")
                 self.expect_right_pose()
                 self.expect_understood()

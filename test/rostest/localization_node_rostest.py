@@ -62,15 +62,15 @@ class LocalizationOnARealRobot(unittest.TestCase):
         cls.map_node.end()
 
     def setUp(self) -> None:
-        self.assertTrue(wait_until(lambda: self.player.connected() and self.initialpose.get_num_connections(), 20.0),
+        self.assertTrue(wait_until(lambda: self.player.connected() and self.initialpose.get_num_connections(), 30.0),
                         "the node does not listen to scan, tf, initialpose within 20 s")
         heard_map = Heard("map", OccupancyGrid)
-        self.assertTrue(wait_until(lambda: len(heard_map), 20.0), "no map from map_node within 20 s")
+        self.assertTrue(wait_until(lambda: len(heard_map), 30.0), "no map from map_node within 30 s")
 
         def ready() -> bool:
             self.player.set_clock()
             return bool(self.lines.having("map of", "/static_map"))
-        self.assertTrue(wait_until(ready, 20.0), "the node has no map within 20 s")
+        self.assertTrue(wait_until(ready, 30.0), "the node has no map within 30 s")
 
     def play(self) -> None:
         """The log from its beginning, started at the reference's first pose."""
@@ -134,7 +134,7 @@ class LocalizationOnARealRobot(unittest.TestCase):
 
     def test_0_the_map_is_served_in_three_ways(self) -> None:
         maps, metadata = Heard("map", OccupancyGrid), Heard("map_metadata", MapMetaData)
-        self.assertTrue(wait_until(lambda: len(maps) and len(metadata), 10.0), "map and map_metadata are not latched")
+        self.assertTrue(wait_until(lambda: len(maps) and len(metadata), 30.0), "map and map_metadata are not latched")
         answer = rospy.ServiceProxy("static_map", GetMap)().map
         self.assertEqual(answer, maps.last)
         self.assertEqual(answer.info, metadata.last)
@@ -148,7 +148,7 @@ class LocalizationOnARealRobot(unittest.TestCase):
     def test_2_after_the_bag_starts_over(self) -> None:
         self.lines.clear()
         self.player.set_clock()
-        self.assertTrue(wait_until(lambda: self.lines.having("time jumped back", "starts over"), 10.0),
+        self.assertTrue(wait_until(lambda: self.lines.having("time jumped back", "starts over"), 30.0),
                         "nothing said about the jump within 10 s")
         self.play()
         self.check()

@@ -86,8 +86,8 @@ class LocalizationOutputs(unittest.TestCase):
     def setUp(self) -> None:
         self.robot.reset()
         self.robot.moving = False
-        self.assertTrue(wait_until(self.initialpose.get_num_connections, 20.0), "nobody listens to initialpose")
-        self.assertTrue(wait_until(lambda: len(self.surfaces), 20.0), "no scan_surfaces within 20 s")
+        self.assertTrue(wait_until(self.initialpose.get_num_connections, 30.0), "nobody listens to initialpose")
+        self.assertTrue(wait_until(lambda: len(self.surfaces), 30.0), "no scan_surfaces within 30 s")
         self.localize()
 
     def localize(self) -> None:
@@ -98,15 +98,15 @@ class LocalizationOutputs(unittest.TestCase):
         self.initialpose.publish(pose_message(self.robot.map_from_base()))
         self.robot.make_steps(3)
         self.status.clear()
-        self.assertTrue(wait_until(sure, 20.0), f"not localized within 20 s: {self.status.last}")
+        self.assertTrue(wait_until(sure, 30.0), f"not localized within 30 s: {self.status.last}")
 
     def newest(self) -> "tuple[LaserScan, LaserScan]":
         """The next message of scan_surfaces, and the scan with its stamp."""
         self.robot.make_steps(2)  # what is under way
         self.surfaces.clear()
-        self.assertTrue(wait_until(lambda: len(self.surfaces), 10.0), "no scan_surfaces within 10 s")
+        self.assertTrue(wait_until(lambda: len(self.surfaces), 30.0), "no scan_surfaces within 30 s")
         out = self.surfaces.last
-        self.assertTrue(wait_until(lambda: self.sent(out.header.stamp), 10.0), "no scan has the stamp of scan_surfaces")
+        self.assertTrue(wait_until(lambda: self.sent(out.header.stamp), 30.0), "no scan has the stamp of scan_surfaces")
         return out, self.sent(out.header.stamp)[0]
 
     def sent(self, stamp: rospy.Time) -> List[LaserScan]:
@@ -155,7 +155,7 @@ class LocalizationOutputs(unittest.TestCase):
     def test_while_the_pose_is_not_trusted_the_scan_is_raw_and_flagged(self) -> None:
         self.surfaces.clear()
         rospy.ServiceProxy("global_localization", Empty)()
-        self.assertTrue(wait_until(lambda: any(msg.intensities[0] == -1.0 for msg in self.surfaces.all), 10.0),
+        self.assertTrue(wait_until(lambda: any(msg.intensities[0] == -1.0 for msg in self.surfaces.all), 30.0),
                         f"no raw scan while searching; state {self.status.last.state_name}")
         out = [msg for msg in self.surfaces.all if msg.intensities[0] == -1.0][0]
         self.assertEqual(set(out.intensities), {-1.0})
@@ -175,7 +175,7 @@ class LocalizationOutputs(unittest.TestCase):
                 self.robot.spoil = lambda msg: msg
                 self.robot.make_steps(2)
                 self.surfaces.clear()
-                self.assertTrue(wait_until(lambda: len(self.surfaces) > 3, 20.0), "no scan_surfaces any more")
+                self.assertTrue(wait_until(lambda: len(self.surfaces) > 3, 30.0), "no scan_surfaces any more")
                 stamps = [msg.header.stamp for msg in self.surfaces.all]
                 self.assertEqual(len(stamps), len(set(stamps)))
                 self.assertFalse(set(stamps) & set(spoilt))
@@ -192,7 +192,7 @@ class LocalizationOutputs(unittest.TestCase):
     def glass_map(self) -> OccupancyGrid:
         """As somebody gets it who comes late."""
         heard = Heard(f"{NODE}/glass_map", OccupancyGrid)
-        self.assertTrue(wait_until(lambda: len(heard), 10.0), "no ~glass_map within 10 s")
+        self.assertTrue(wait_until(lambda: len(heard), 30.0), "no ~glass_map within 30 s")
         return heard.last
 
     def test_the_glass_map_has_the_maps_geometry_and_tells_the_pane_from_walls(self) -> None:
@@ -200,7 +200,7 @@ class LocalizationOutputs(unittest.TestCase):
             self.update()
             self.robot.make_steps(1)
         listener = Heard(f"{NODE}/glass_map", OccupancyGrid)
-        self.assertTrue(wait_until(lambda: len(listener) > 1 or (self.update() and False), 10.0), "sent only once")
+        self.assertTrue(wait_until(lambda: len(listener) > 1 or (self.update() and False), 30.0), "sent only once")
         msg = self.glass_map()
         self.assertEqual(msg.header.frame_id, "map")
         self.assertAlmostEqual(msg.info.resolution, self.map_msg.info.resolution, places=6)
@@ -214,7 +214,7 @@ class LocalizationOutputs(unittest.TestCase):
 
     def test_the_glass_map_goes_out_no_more_often_than_asked(self) -> None:
         listener = Heard(f"{NODE}/glass_map", OccupancyGrid)
-        self.assertTrue(wait_until(lambda: len(listener), 10.0), "no ~glass_map within 10 s")
+        self.assertTrue(wait_until(lambda: len(listener), 30.0), "no ~glass_map within 30 s")
         for _ in range(15):
             self.update()
             self.robot.make_steps(1)
@@ -229,8 +229,8 @@ class LocalizationOutputs(unittest.TestCase):
 
     def test_each_case_has_its_namespace_and_the_status_too(self) -> None:
         markers = Heard(f"{NODE}/beam_markers", MarkerArray)
-        self.assertTrue(wait_until(lambda: len(markers), 10.0), "no ~beam_markers within 10 s")
-        self.assertTrue(wait_until(lambda: self.sent(markers.last.markers[0].header.stamp), 10.0),
+        self.assertTrue(wait_until(lambda: len(markers), 30.0), "no ~beam_markers within 30 s")
+        self.assertTrue(wait_until(lambda: self.sent(markers.last.markers[0].header.stamp), 30.0),
                         "no scan has the stamp of the markers")
         names = {marker.ns for marker in markers.last.markers}
         self.assertEqual(names, {*beam_displays.CASE_NAMES, beam_displays.STATUS_NAMESPACE})
@@ -242,7 +242,7 @@ class LocalizationOutputs(unittest.TestCase):
 
     def test_the_walls_are_shown_by_what_they_are(self) -> None:
         markers = Heard(f"{NODE}/wall_markers", MarkerArray)
-        self.assertTrue(wait_until(lambda: len(markers), 10.0), "no ~wall_markers within 10 s")
+        self.assertTrue(wait_until(lambda: len(markers), 30.0), "no ~wall_markers within 30 s")
         self.assertEqual([marker.ns for marker in markers.last.markers], list(wall_display.WALL_NAMES))
 
     def test_silence_is_told_beside_the_robot(self) -> None:
@@ -254,7 +254,7 @@ class LocalizationOutputs(unittest.TestCase):
     def test_the_legend_waits_for_whoever_comes(self) -> None:
         for _ in range(2):
             legend = Heard(f"{NODE}/legend", Image)
-            self.assertTrue(wait_until(lambda legend=legend: len(legend), 10.0), "no ~legend within 10 s")
+            self.assertTrue(wait_until(lambda legend=legend: len(legend), 30.0), "no ~legend within 30 s")
             self.assertEqual((legend.last.encoding, legend.last.step), ("rgb8", 3 * legend.last.width))
             self.assertEqual(len(legend.last.data), legend.last.height * legend.last.step)
 

@@ -40,8 +40,8 @@ class RoomTest(unittest.TestCase):
 
     def setUp(self) -> None:
         self.robot.reset()
-        self.assertTrue(wait_until(self.initialpose.get_num_connections, 20.0), "nobody listens to initialpose")
-        self.assertTrue(wait_until(lambda: len(self.transforms), 20.0), "no map -> odom within 20 s")
+        self.assertTrue(wait_until(self.initialpose.get_num_connections, 30.0), "nobody listens to initialpose")
+        self.assertTrue(wait_until(lambda: len(self.transforms), 30.0), "no map -> odom within 30 s")
         self.poses.clear()
         self.initialpose.publish(pose_message(self.robot.map_from_base()))
         self.expect_right_pose()
@@ -62,7 +62,7 @@ class RoomTest(unittest.TestCase):
         off = se2.compose(map_from_odom, self.robot.odom_from_base()) - truth
         return float(np.hypot(off[0], off[1]) + abs(angles.wrap(off[2])))
 
-    def expect_right_pose(self, timeout_s: float = 10.0) -> None:
+    def expect_right_pose(self, timeout_s: float = 30.0) -> None:
         """A transform of a scan from now on puts the robot where it is."""
         self.transforms.clear()
         self.assertTrue(wait_until(lambda: len(self.transforms) and self.error_m() < 0.25, timeout_s),
@@ -73,11 +73,11 @@ class RoomTest(unittest.TestCase):
     def expect_understood(self) -> None:
         """A scan from now on is explained by the map."""
         self.status.clear()
-        self.assertTrue(wait_until(lambda: len(self.status) and self.status.last.used_share > 0.8, 5.0),
+        self.assertTrue(wait_until(lambda: len(self.status) and self.status.last.used_share > 0.8, 30.0),
                         f"no scan is understood: {self.status.last}")
 
     def expect_line(self, *words: str) -> None:
-        self.assertTrue(wait_until(lambda: self.lines.having(*words), 15.0),
+        self.assertTrue(wait_until(lambda: self.lines.having(*words), 30.0),
                         f"no log line with {words}; there are {self.lines.having('')[-10:]}")
 
     def start(self, name: str, *private: str, script: str = "localization_node") -> Process:

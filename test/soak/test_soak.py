@@ -14,6 +14,7 @@ REPO = Path(__file__).parents[2]
 TIMEOUT_S = 300.0
 
 
+@pytest.mark.xdist_group("one_at_a_time")
 @pytest.mark.skipif("ROS_PACKAGE_PATH" not in os.environ, reason="no ROS environment: run by scripts/test")
 def test_the_node_lasts_through_three_minutes_of_faults() -> None:
     done = subprocess.run([sys.executable, str(REPO / "test" / "benchmark" / "soak.py"), "--minutes", "3",

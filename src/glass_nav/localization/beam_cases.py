@@ -119,7 +119,7 @@ def as_seen_from(cases: BeamCases, measured_m: np.ndarray, references: Reference
     A beam that passes an edge from there keeps its range; one that ends farther from its surface is uncertain.
     """
     offered_m, across_m = _offered(cases.case, measured_m, _of_sample_0(references), residuals)
-    other = np.abs(offered_m[0] - cases.expected_m) > _OTHER_SURFACE_M  # also where there is none
+    other = np.abs(np.nan_to_num(offered_m[0] - cases.expected_m)) > _OTHER_SURFACE_M  # also where there is none
     fits = across_m[0] <= _TOLD_GATES * gate_m(residuals, vote)
     return _told(cases.case, cases.weight, measured_m, np.where(fits, offered_m[0], cases.expected_m), fits | other)
 

@@ -93,8 +93,8 @@ def _seen_side(grid_map: GridMap, cell: np.ndarray, axis_rad: np.ndarray, direct
     What a mapper drew it saw from somewhere. A lidar that looks back at a building through its glass meets the outer
     faces of walls, which are on no map: decimetres in front of the inner ones.
     """
-    facing_rad = np.where(np.cos(direction_rad - axis_rad) > 0.0, axis_rad + np.pi, axis_rad)
-    facing_rad = np.where(np.isnan(axis_rad), direction_rad + np.pi, facing_rad)
+    facing_rad = np.where(np.isnan(axis_rad), direction_rad + np.pi, axis_rad)
+    facing_rad = np.where(np.cos(direction_rad - facing_rad) > 0.0, facing_rad + np.pi, facing_rad)
     centre = grid_map.centres(*np.divmod(cell, grid_map.occupancy.shape[1]))
     step = np.stack([np.cos(facing_rad), np.sin(facing_rad)], axis=-1)
     rows, columns = grid_map.cells(centre + _BESIDE_CELLS * grid_map.resolution_m * step)

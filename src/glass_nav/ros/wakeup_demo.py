@@ -231,7 +231,7 @@ class WakeupDemo:
         this node does, and is then asked again."""
         for _ in range(ASKED):
             self._client.send_goal(GotoNodeGoal(node=node))
-            if not self._wait(lambda: self._client.get_state() not in (GoalStatus.PENDING, GoalStatus.ACTIVE),
+            if not self._wait(lambda: self._client.get_result() is not None,  # its state may be known before
                               simulated_s=self._p.tour_limit_s):
                 return False
             if self._client.get_result().code != GotoNodeResult.NOT_LOCALIZED:

@@ -101,7 +101,8 @@ class LandmarkMap:
         """(..., M) as in_view(), for ways (..., M, 2) from M of the landmarks, chosen by `which`, to a point each."""
         near = np.hypot(way_m[..., 0], way_m[..., 1]) <= self.range_m[which] * range_share
         off = np.abs(angles.wrap(np.arctan2(way_m[..., 1], way_m[..., 0]) - self.facing_rad[which]))
-        return near & (np.isnan(off) | (off <= 0.5 * self.view_rad[which] + slack_rad))
+        all_round = np.isnan(off)
+        return near & (all_round | (np.where(all_round, 0.0, off) <= 0.5 * self.view_rad[which] + slack_rad))
 
     def joined(self, other: "LandmarkMap") -> "LandmarkMap":
         """Both; sigma is that of this map."""

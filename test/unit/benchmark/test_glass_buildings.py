@@ -39,6 +39,7 @@ def test_a_drive_is_the_same_for_the_same_seed_and_another_for_another():
     assert {"sensitive", "weak", "coated"} <= set(drives.lidars())
 
 
+@pytest.mark.long_run
 def test_every_localizer_is_scored_on_the_same_drive():
     job = Job("opaque_office", "sensitive", 100, 0.0, 4, ("ours", "ours_oracle", "amcl_field60"), GlassMclParams())
     runs = {each.localizer: each for each in glass_buildings.run(job)}

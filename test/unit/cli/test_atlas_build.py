@@ -51,6 +51,7 @@ def size_px(path):
     return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
 
 
+@pytest.mark.long_run
 def test_an_atlas_is_built_and_drawn(run, floor, tmp_path):
     code, out, err = run("build", floor, "--out", tmp_path / "atlas" / "ours")
     assert code == 0, err

@@ -26,6 +26,7 @@ def rows(folder):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.long_run
 def test_any_number_of_jobs_gives_the_same_answer_bit_for_bit(run, room_bag, room_map, few, tmp_path):
     pytest.importorskip("joblib", reason="scripts/setup installs joblib")
     path = room_bag(scans=12).write()
@@ -64,6 +65,7 @@ def test_what_another_localization_left_in_the_bag_is_measured_as_ours_is(run, r
     assert "default against amcl (-0.1" in (tmp_path / "out" / "compare.html").read_text()
 
 
+@pytest.mark.long_run
 def test_a_log_that_has_no_recorded_pose_in_time_is_told(run, room_bag, room_map, tmp_path):
     path = room_bag(amcl_error_m=0.1).write()
     options = ("compare", "topic:/amcl_pose", "--log", f"{path}={room_map}", "--out", tmp_path / "out")
@@ -76,6 +78,7 @@ def test_a_log_that_has_no_recorded_pose_in_time_is_told(run, room_bag, room_map
     assert [row["scans"] for row in rows(tmp_path / "out")] == ["2"]
 
 
+@pytest.mark.long_run
 def test_without_a_ground_truth_ours_start_where_the_recorded_poses_have_the_robot(run, room_bag, room_map, tmp_path):
     """Known from scan 5 on, then 0.1 m too far: carried back to the first scan by odometry."""
     path = room_bag(amcl_error_m=0.1, ground_truth=False).write()
@@ -112,6 +115,7 @@ def test_results_of_replays_are_compared_as_new_runs_are(run, room_bag, room_map
     assert {file.name for file in (tmp_path / "alone").iterdir()} == FILES | {"errors_01.png", "ways_01.png"}
 
 
+@pytest.mark.long_run
 def test_several_logs_are_told_apart_and_together(run, room_bag, room_map, tmp_path):
     first = room_bag(scans=6).write().rename(tmp_path / "first.bag")
     room_bag(scans=8, ground_truth=False).write().rename(tmp_path / "second.bag")

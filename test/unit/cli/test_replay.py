@@ -275,6 +275,7 @@ def test_a_package_that_is_not_built_is_said_in_one_line(capsys, monkeypatch):
                                        "and source its setup.bash\n")
 
 
+@pytest.mark.long_run
 def test_the_script_runs_by_itself(room_bag, room_map, tmp_path):
     done = subprocess.run([sys.executable, str(REPO / "scripts" / "glass_nav"), "replay", str(room_bag().write()),
                            "--map", str(room_map), "--out", str(tmp_path / "out"), "--max-scans", "2"],

@@ -49,6 +49,7 @@ def run(drive, tmp_path, capsys):
     return command
 
 
+@pytest.mark.long_run
 def test_a_meetpoint_on_the_way_is_seen_and_told(run, tmp_path):
     code, out, _ = run("--topology")
     assert code == 0

@@ -8,6 +8,7 @@ import re
 import shutil
 from html.parser import HTMLParser
 
+import pytest
 from PIL import Image
 
 import browser
@@ -46,6 +47,7 @@ class Page(HTMLParser):
             self.open.pop()
 
 
+@pytest.mark.long_run
 def test_a_log_becomes_one_page_that_asks_no_address_for_anything(run, room_bag, room_map, tmp_path):
     code, out, _ = run("report", room_bag(true_beams=(("/true_beams", "TrueBeams"),)).write(), "--map", room_map,
                        "--out", tmp_path / "out", "--global")
@@ -75,6 +77,7 @@ def test_the_browser_of_these_tests_sees_a_page_that_asks_and_complains(tmp_path
     assert len(page.console) == 1
 
 
+@pytest.mark.long_run
 def test_results_of_a_replay_become_the_same_report(run, room_bag, room_map, tmp_path):
     path = room_bag().write()
     assert run("replay", path, "--map", room_map, "--out", tmp_path / "results", "--no-picture")[0] == 0
@@ -99,6 +102,7 @@ def test_without_a_ground_truth_it_is_said_that_nobody_knows(run, room_bag, room
     assert PICTURES | WORST <= {file.name for file in (tmp_path / "out").iterdir()}
 
 
+@pytest.mark.long_run
 def test_what_is_no_run_is_refused_in_one_line(run, room_bag, room_map, tmp_path):
     path = room_bag().write()
     assert run("report", path, "--out", tmp_path / "out") == (2, "", "glass_nav report: a log needs --map\n")

@@ -49,6 +49,7 @@ def run(hall, tmp_path, capsys):
     return command
 
 
+@pytest.mark.long_run
 def test_a_lidar_that_turns_makes_a_bag_that_says_so(run, tmp_path):
     code, _, err = run("--turn-time", 0.05, "--seed", 2)
     assert code == 0, err

@@ -94,6 +94,7 @@ def check_commands(drive):
     assert np.abs(change[:, 2]).max() <= LIMITS.max_turn_acceleration_rad_s2 * CONTROL_S + 1e-9
 
 
+@pytest.mark.long_run
 def test_meetpoints_and_edges_of_an_office_are_those_of_its_atlas():
     building, atlas = office()
     drive = Drive(building, OFFICE_START)
@@ -128,6 +129,7 @@ def test_meetpoints_and_edges_of_an_office_are_those_of_its_atlas():
     check_commands(drive)
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("made", [t_corridor, glass_t], ids=["walls", "glass"])
 def test_a_t_is_as_the_closed_form_says_and_the_walls_of_its_foot_are_reported_also_if_of_glass(made):
     building = made()
@@ -179,6 +181,7 @@ def test_stop_brings_it_to_a_stand_within_its_limits_and_resume_goes_on():
     assert driven.length_m == pytest.approx(math.hypot(5.0, 0.25), abs=0.15)  # as if it had not been stopped
 
 
+@pytest.mark.long_run
 def test_it_goes_back_to_the_meetpoint_that_it_left():
     drive, arrival = at_the_junction()
     drive.driver.leave(rank_towards(arrival, drive, 0.0))
@@ -254,6 +257,7 @@ def test_where_it_stands_obstacles_are_those_of_the_building():
     assert np.abs(seen - drive.simulation.map_from_base[:2]).max() < 2.1
 
 
+@pytest.mark.long_run
 def test_what_bars_the_edge_ends_it_as_blocked_in_front_of_it_and_there_is_a_way_back():
     """A post too thin for a meetpoint, in the middle of a corridor with barely room beside it."""
     faces = np.array([[0.0, 0.0], [7.0, 0.0], [7.0, 1.2], [0.0, 1.2]])
@@ -286,6 +290,7 @@ def test_where_there_is_no_way_it_looks_around_again_and_gives_up():
     assert turned_rad > 3.9 * math.pi and drive.blocked == 0
 
 
+@pytest.mark.long_run
 def test_a_side_corridor_that_turns_out_to_be_behind_a_pane_is_no_meetpoint():
     """From afar the foot of the T is open; whoever stands before it sees the glass."""
     drive, arrival = arrived_in_t(t_corridor([Pane(np.array([[5.0, 0.0], [7.0, 0.0]]))]))
@@ -305,6 +310,7 @@ def test_a_side_corridor_that_turns_out_to_be_behind_a_pane_is_no_meetpoint():
     assert arrival.traversal.length_m == pytest.approx(10.0, abs=0.2) and drive.blocked == 0
 
 
+@pytest.mark.long_run
 def test_a_meetpoint_that_cannot_quite_be_reached_is_reported_from_as_near_as_it_gets():
     """A post stands just before the end of a narrow corridor."""
     faces = np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 1.2], [0.0, 1.2]])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Optional
 
 import numpy as np
+import pytest
 
 from glass_nav.driving.base_limits import BaseLimits
 from glass_nav.driving.edge_driver import EdgeDriver
@@ -47,6 +48,7 @@ def drive(simulation: Simulation, driver: EdgeDriver, task: EdgeTask) -> None:
     raise AssertionError("it did not arrive within 150 s")
 
 
+@pytest.mark.long_run
 def test_a_robot_in_a_cross_of_four_equal_arms_is_ambiguous_and_lists_the_four_places() -> None:
     building = cross()
     grid_map = building_map.draw(building)

@@ -96,6 +96,7 @@ def rank_towards(drive, bearing_rad):
     return int(np.argmin([abs(math.remainder(bearing - bearing_rad, 2 * math.pi)) for bearing in bearings]))
 
 
+@pytest.mark.long_run
 def test_an_edge_is_followed_to_the_next_meetpoint_and_reported():
     drive = arrived(corridor())
     rank = rank_towards(drive, 0.0)
@@ -157,6 +158,7 @@ def test_a_pose_is_driven_to_and_turned_to(planner):
     np.testing.assert_allclose(drive.simulation.map_from_base, [5.2, 4.5, -1.0], atol=0.12)
 
 
+@pytest.mark.long_run
 def test_a_cart_across_the_only_way_is_waited_for_looked_at_and_given_up(planner):
     drive = Drive(corridor(CART), (6.0, 1.0, 0.0))
     states = set()
@@ -195,6 +197,7 @@ def test_a_robot_that_was_pushed_off_its_way_finds_another(planner):
     np.testing.assert_allclose(task.route.polyline_m[0], [5.0, 4.0])
 
 
+@pytest.mark.long_run
 def test_an_edge_that_cannot_be_driven_is_left_for_another_one_where_any_will_do():
     drive = arrived(corridor(), ledge_x=8.0)
     first = rank_towards(drive, 0.0)

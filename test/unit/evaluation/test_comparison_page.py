@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from glass_nav.evaluation import comparison, comparison_page, comparison_pictures, pose_errors
 from glass_nav.evaluation.comparison import Run
@@ -45,6 +46,7 @@ def test_names_are_no_markup(tmp_path):
     assert "&lt;b&gt;" in page and "a&amp;b" in page
 
 
+@pytest.mark.long_run
 def test_a_sweep_over_many_logs_has_pictures_of_the_first_ones(tmp_path):
     logs = [f"{number}.bag" for number in range(comparison_pictures.MOST_LOGS + 2)]
     found = comparison.of([run("one", 0, 0.1, log=log) for log in logs], ["one"], logs)

@@ -17,6 +17,7 @@ KEPT = [KeptScan(1, np.array([0.1, 0.0, 0.0]), np.array([[2.0, 0.0], [np.nan, np
 GLASS = np.where(GRID.occupancy == 100, 80, -1).astype(np.int8)
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("changes, there, absent", [
     pytest.param({}, {"reliability", "errors"}, {"candidates"}, id="with a reference"),
     pytest.param({"reference": None, "states": ["GLOBAL_SEARCH"] * 4}, {"candidates"}, set(),

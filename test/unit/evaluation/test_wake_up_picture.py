@@ -31,6 +31,7 @@ def rgb(code):
     return tuple(int(code[at:at + 2], 16) for at in (1, 3, 5))
 
 
+@pytest.mark.long_run
 def test_the_ways_and_the_candidates_are_drawn(tmp_path):
     wake_up_picture.draw(tmp_path / "a.png", grid(), story(3), "office")
     assert {rgb(SEARCH_COLOUR), rgb(TOUR_COLOUR), rgb(CANDIDATE_COLOUR)} <= colours(tmp_path / "a.png")

@@ -55,6 +55,7 @@ def test_a_step_of_one_degree_is_a_uniform_error_of_half_a_degree():
     assert bearing_errors.step_sigma(1.0) == pytest.approx(draws.std(), rel=0.01)
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("number", range(4))
 @pytest.mark.parametrize("sigma_deg", [0.1, 0.3])
 def test_the_predicted_covariance_is_that_of_drawn_bearings(number, sigma_deg):

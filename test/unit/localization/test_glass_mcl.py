@@ -199,6 +199,7 @@ def test_a_new_pose_on_the_same_map_keeps_its_glass():
     np.testing.assert_array_equal(mcl.glass_map.occupancy(), before)
 
 
+@pytest.mark.long_run
 def test_scans_that_fit_nowhere_teach_nothing():
     """A robot that was carried away would take all walls for glass."""
     drive = GlassDrive(steps=20)
@@ -237,6 +238,7 @@ def test_beams_behind_the_pane_are_cut_at_it_and_others_are_left():
     assert np.percentile(np.concatenate(off_m), 95) < 0.06
 
 
+@pytest.mark.long_run
 def test_a_surface_scan_is_trusted_where_the_robot_is_localized_and_nowhere_else():
     drive = GlassDrive(steps=35)
     rng = np.random.default_rng(0)
@@ -364,6 +366,7 @@ def test_a_scan_without_answers_leaves_a_search_where_it_is():
     assert "possible" in seen.reason
 
 
+@pytest.mark.long_run
 def test_a_robot_that_was_carried_away_says_so_and_is_found_again():
     drive = Drive(seed=3, steps=90)
     mcl = started(at=drive.true[0], seed=3)
@@ -379,6 +382,7 @@ def test_a_robot_that_was_carried_away_says_so_and_is_found_again():
     assert estimates[-1].state == "LOCALIZED" and way_m[-1] < 0.05
 
 
+@pytest.mark.long_run
 def test_a_start_in_the_wrong_place_is_put_right():
     drive = Drive(seed=4, steps=40)
     estimates = drive.through(started(at=drive.true[0] + [1.0, 0.8, 2.0], seed=4))
@@ -386,6 +390,7 @@ def test_a_start_in_the_wrong_place_is_put_right():
     assert drive.errors(estimates)[-1, 0] < 0.05 and estimates[-1].state == "LOCALIZED"
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("forced", [False, True], ids=["no update due", "an update with every scan"])
 def test_a_robot_that_stands_for_five_minutes_stays_where_it_is(forced):
     """A scan a second; odometry trembles by half a millimetre."""
@@ -416,6 +421,7 @@ def test_a_wheel_that_slips_is_made_up_for_by_the_scan(seed):
     assert way_m[17:].max() < 0.05 and turn_rad[17:].max() < np.radians(1.5)
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(3))
 def test_one_absurd_scan_is_forgotten_with_the_next_ones(seed):
     """A ring of 56 beams at 1.0 m all round in the midst of a good drive."""
@@ -453,6 +459,7 @@ def test_a_robot_that_never_saw_anything_is_not_called_localized():
     assert last.reason.startswith("no scan has been used yet; ")
 
 
+@pytest.mark.long_run
 def test_a_robot_that_sees_what_cannot_be_is_called_lost():
     drive = Drive(seed=3, steps=35)
     rng = np.random.default_rng(0)
@@ -660,6 +667,7 @@ def test_an_estimate_is_whole(drive):
         assert np.median(np.abs(estimate.cases.residual_m[told])) < 0.03
 
 
+@pytest.mark.long_run
 def test_the_same_seed_gives_the_same_answer(drive):
     for one, other in zip(drive.through(started(seed=4)), drive.through(started(seed=4))):
         same(one, other)
@@ -848,6 +856,7 @@ def test_wrong_values_are_refused_in_one_line(kind, values, text):
     assert str(err.value) == text
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(3))
 def test_one_absurd_scan_moves_nobody(seed):
     """A ring of 56 beams at 1.0 m all round in the midst of a good drive: the robot goes where odometry leads."""
@@ -868,6 +877,7 @@ def test_a_robot_that_knows_nothing_finds_itself(seed):
     assert way_m < 0.05 and turn_rad < np.radians(1.5)
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(2))
 def test_a_covered_lidar_is_called_lost(seed):
     drive = Drive(seed=seed, steps=35)
@@ -877,6 +887,7 @@ def test_a_covered_lidar_is_called_lost(seed):
     assert drive.through(started())[-1].state == "LOST"
 
 
+@pytest.mark.long_run
 def test_the_same_seed_gives_the_same_answer_to_the_last_bit(drive):
     """Not so where a cosine is taken of a strided column: numpy's result depends on where it lies in memory."""
     first = drive.through(started(seed=4))

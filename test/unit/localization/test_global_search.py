@@ -87,6 +87,7 @@ def test_a_lidar_that_sees_all_round_sees_nothing_new_when_it_turns():
     assert told[-1].lead == pytest.approx(told[0].lead, abs=1.5)
 
 
+@pytest.mark.long_run
 def test_a_place_that_the_first_scan_hid_is_found_later():
     """People all round at the start: none of the first candidates is right."""
     poses = loop_drive(40)
@@ -102,6 +103,7 @@ def test_a_place_that_the_first_scan_hid_is_found_later():
         assert not candidates.found or off(candidates.poses[0], pose)[0] < 0.1
 
 
+@pytest.mark.long_run
 def test_a_slip_of_the_wheels_loses_nobody_for_long():
     poses = loop_drive(40)
     odom = odometry(poses, np.random.default_rng(1))

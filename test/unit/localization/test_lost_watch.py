@@ -80,6 +80,7 @@ def test_told_not_to_it_does_not_look_elsewhere():
     assert verdicts[-1].doubted and verdicts[-1].poor
 
 
+@pytest.mark.long_run
 def test_people_all_round_make_a_pose_doubtful_but_move_nobody():
     watched = Watched()
     watched.drive(loop_drive(30))

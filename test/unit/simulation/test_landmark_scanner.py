@@ -63,6 +63,7 @@ def test_bearings_are_read_in_steps_around_the_true_ones(reading_deg, seed):
         assert abs(steps - np.floor(steps) - 0.5) < 1e-6
 
 
+@pytest.mark.long_run
 def test_the_told_sigma_is_that_of_what_is_read():
     model, off = ScannerModel(), []
     for seed in range(40):

@@ -95,6 +95,7 @@ def test_errors_as_large_as_the_tolerance_all_at_once_do_not_eliminate_the_truth
     assert all(trial.truth_lost_at is None for trial in trials)
 
 
+@pytest.mark.long_run
 def test_no_robot_in_the_atlas_is_told_a_wrong_place_few_with_a_poor_detector() -> None:
     atlas = made_atlases.voronoi(400, 24)
     figures = wake_up.metrics(list(wake_up.trials(atlas, SearchParams(), TrialParams(), 500, 1)))
