@@ -138,7 +138,7 @@ class Trial:
 
     def _told(self, arrival: Arrival, rank: Optional[int]) -> Estimate:
         last = self.localizer.estimate
-        meetpoint = replace(arrival.meetpoint, odom_from_base=self.simulation.reading.odom_from_base)
+        meetpoint = replace(arrival.meetpoint, odom_from_base=arrival.odom_from_base)
         if arrival.traversal is None or last is None or last.done:
             return self.localizer.start(meetpoint)
         return self.localizer.update(arrival.traversal, meetpoint)

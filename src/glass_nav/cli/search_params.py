@@ -12,7 +12,7 @@ from glass_nav import params
 from glass_nav.cli import replay_params
 from glass_nav.topology.atlas_localizer import SearchParams
 
-NODE_ONLY = frozenset(["atlas", "global_frame_id", "odom_frame_id", "check_map", "judge_by_scans", "search_at_start",
+NODE_ONLY = frozenset(["atlas", "global_frame_id", "check_map", "judge_by_scans", "search_at_start",
                        "publish_initial_pose", "initial_pose_sigma_m", "initial_pose_sigma_rad", "listed_candidates",
                        "pairing_tolerance_s", "visits_file"])
 

@@ -1,14 +1,11 @@
-"""The last scans, to be looked up by their stamps: what did the robot see when it reported a meetpoint, and where did
-odometry have it?"""
+"""The last scans, to be looked up by their stamps: what did the robot see when it reported a meetpoint?"""
 
 from __future__ import annotations
 
 import threading
-import time
 from collections import deque
 from typing import Deque, Optional
 
-import numpy as np
 import rospy
 import tf2_ros
 from sensor_msgs.msg import LaserScan
@@ -49,19 +46,6 @@ class ScanMemory:
             return conversions.scan_from_msg(msg, conversions.mounting_from_transform(transform.transform)), ""
         except (tf2_ros.TransformException, ScanError, ValueError) as err:
             return None, str(err)
-
-    def odometry_at(self, stamp: rospy.Time, base_frame: str,
-                    odom_frame: str) -> "tuple[Optional[np.ndarray], str]":
-        """odom_from_base (3,) at that stamp, or None and why there is none."""
-        given_up_s = time.monotonic() + _WAIT_S
-        while True:
-            try:
-                transform = self._tf.lookup_transform(odom_frame, conversions.frame_id(base_frame), stamp)
-                return conversions.planar_from_transform(transform.transform), ""
-            except (tf2_ros.TransformException, ValueError) as err:
-                if time.monotonic() > given_up_s:
-                    return None, str(err)
-            time.sleep(0.02)
 
     def _find(self, stamp: rospy.Time) -> Optional[LaserScan]:
         return next((msg for msg in reversed(self._scans) if msg.header.stamp == stamp), None)

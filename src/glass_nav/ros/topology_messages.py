@@ -22,8 +22,9 @@ AS_TOLD = -1  # rank of a traversal: as the last turn_choice said
 
 def meetpoint_from_msg(msg: MeetpointMsg) -> Meetpoint:
     """Checked; raises ObservationError."""
+    odom_from_base = np.array([msg.odom_x, msg.odom_y, msg.odom_yaw]) if msg.has_odom else None
     return Meetpoint(msg.degree, msg.r, msg.r_sigma, np.array(msg.bearings, float), np.array([msg.x, msg.y]),
-                     conversions.ns_from_stamp(msg.header.stamp))
+                     conversions.ns_from_stamp(msg.header.stamp), odom_from_base=odom_from_base)
 
 
 def traversal_from_msg(msg: EdgeTraversalMsg, told: Optional[TurnChoice]) -> Traversal:

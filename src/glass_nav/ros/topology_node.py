@@ -5,8 +5,8 @@ Wiring only; the answer comes from AtlasLocalizer. Callbacks store, one loop wor
 Subscribes: meetpoint (Meetpoint), edge_traversal (EdgeTraversal): of the driver, or by hand; in either order, the
     traversal and the meetpoint at its end belong together. map (OccupancyGrid, if ~check_map): the atlas must be its.
     scan (LaserScan) and tf to the frame of the meetpoint, with map, if ~judge_by_scans: candidates from where the map
-    does not explain the scan of a meetpoint's stamp are ruled out; with odometry in tf the poses that explain the scans
-    are followed from meetpoint to meetpoint, too.
+    does not explain the scan of a meetpoint's stamp are ruled out; where meetpoints have odometry, the poses that
+    explain the scans are followed from one to the next, too.
 Publishes: turn_choice (TurnChoice): the answer to each meetpoint while there is something to find out;
     initialpose (PoseWithCovarianceStamped) once when CONFIRMED, with the stamp of the meetpoint;
     ~candidates (TopologyCandidates, latched), ~status (TopologyStatus, latched), ~markers (MarkerArray, latched):
@@ -249,18 +249,14 @@ class TopologyNode:
             self._log.warn(f"{kind} refused: {err}")
 
     def _with_scan(self, msg: Meetpoint) -> observations.Meetpoint:
-        """The meetpoint, with the scan of its stamp if that can be used, and odometry."""
+        """The meetpoint, with the scan of its stamp if that can be used."""
         meetpoint = topology_messages.meetpoint_from_msg(msg)
         if self._scans is None or not self._explanation.has_map or not meetpoint.stamp_ns:
             return meetpoint
         scan, why_not = self._scans.at(msg.header.stamp, msg.header.frame_id)
         if scan is None:
             self._log.warn(f"candidates are not judged by the scan at this meetpoint: {why_not}")
-            return meetpoint
-        odom_from_base, why_not = self._scans.odometry_at(msg.header.stamp, msg.header.frame_id, self._p.odom_frame_id)
-        if odom_from_base is None:
-            self._log.warn(f"poses are not followed from this meetpoint on: {why_not}")
-        return replace(meetpoint, scan=scan, odom_from_base=odom_from_base)
+        return replace(meetpoint, scan=scan)
 
     def _start(self, msg: Meetpoint) -> None:
         assert self._localizer is not None

@@ -18,7 +18,7 @@ from glass_nav.topology import ambiguity, vote
 from glass_nav.topology.atlas import Atlas, Visits
 from glass_nav.geometry import angles
 from glass_nav.topology.edge_segments import SegmentTest
-from glass_nav.topology.followed_poses import FollowedPoses, MapScans, Standing
+from glass_nav.topology.followed_poses import MOST_LEAD, FollowedPoses, MapScans, Standing
 from glass_nav.topology.matching import Explained, Matcher, Tolerances, poses_at
 from glass_nav.topology.observations import Meetpoint, Traversal, turn_name
 from glass_nav.topology.passed_edges import PassedEdges
@@ -58,8 +58,8 @@ class SearchParams:
             raise ValueError(f"~searches must be >= 1, got {self.searches}")
         if self.follow_places < 0:
             raise ValueError(f"~follow_places must be >= 0, got {self.follow_places}")
-        if not 0.0 < self.follow_lead < 1.0:
-            raise ValueError(f"~follow_lead must be in (0, 1), got {self.follow_lead}")
+        if not 0.0 < self.follow_lead <= MOST_LEAD:
+            raise ValueError(f"~follow_lead must be in (0, {MOST_LEAD:g}], got {self.follow_lead}")
 
     @property
     def document(self) -> bool:
@@ -115,8 +115,9 @@ class AtlasLocalizer:
                                 None if params.document else params.segments, None if params.document else explained,
                                 params.least_explained)
         self._forest = SearchForest(self._matcher, 0 if params.document else params.max_detection_errors)
-        followed = scans is not None and params.follow_places > 0 and not params.document
-        self._followed = FollowedPoses(scans) if followed else None
+        self._followed: Optional[FollowedPoses] = None
+        if scans is not None and params.follow_places > 0 and not params.document:
+            self._followed = FollowedPoses(scans)
         self._passed = PassedEdges()
         self._seen_places = 0  # by the followed poses, when the last search began
         self._claim: Optional[_Claim] = None
@@ -261,8 +262,9 @@ class AtlasLocalizer:
             if len(agree):
                 return by_graph
             return replace(by_graph, state=LOST, reason="graph and scans contradict each other", choice=None)
-        reason = (f"the only pose that explains the scans of {standing.places} places: {standing.share:.0%} of them, "
-                  f"all others {standing.lead:.0%} less or more")
+        next_best = standing.share - min(standing.lead, MOST_LEAD)
+        reason = (f"one pose explains {standing.share:.0%} of the scans of {standing.places} places, the next best "
+                  f"{next_best:.0%}{' or less' * (standing.lead > MOST_LEAD)}")
         return replace(by_graph, state=CONFIRMED, reason=reason, choice=None, dart=by_graph.dart[agree[:1]],
                        errors=by_graph.errors[agree[:1]], map_from_base=standing.map_from_base)
 

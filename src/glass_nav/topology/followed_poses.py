@@ -27,6 +27,7 @@ from glass_nav.topology.observations import Meetpoint
 _PROPOSED_FIRST, _FIRST = 4000, 1000  # by the scan of the first meetpoint, before they slide; followed of these
 _PROPOSED, _NEW = 1000, 100           # at others
 _MOST = 1000
+MOST_LEAD = 0.3            # that can be told: who is further behind is dropped at last
 _HOPELESS = 0.35           # of the beams, in the mean, less than the best explains
 _SLIDES_M, _SLIDES_RAD = 0.5, np.radians(15.0)              # a proposed pose
 _OFF_M, _OFF_SHARE, _OFF_RAD = 0.2, 0.04, np.radians(10.0)  # a pose that odometry moved: at most, and per metre
@@ -76,7 +77,8 @@ class FollowedPoses:
         self._places: List[_Place] = []
         self._poses = np.zeros((0, 3))
         self._shares = np.zeros((0, 0))  # (K, P)
-        self._now = np.zeros(0)          # (K,) of the last scan
+        self._now = np.zeros(0)          # (K,) of the last scan; NaN: it told nothing
+        self._tried = np.zeros((0, 3)), np.zeros(0)  # all poses of the last scan with their shares, also those dropped
         self._odom_from_base: Optional[np.ndarray] = None  # at the last meetpoint
         self._way_m = 0.0
 
@@ -87,8 +89,9 @@ class FollowedPoses:
             return None
         means = self._shares.mean(axis=1)
         best = int(means.argmax())
-        rivals = ~_same_place(self._poses, self._poses[best])
-        lead, lead_now = (float(value[best] - value[rivals].max(initial=-np.inf)) for value in (means, self._now))
+        lead, lead_now = (float(own - values[~_same_place(poses, self._poses[best])].max(initial=-np.inf))
+                          for own, poses, values in ((means[best], self._poses, means),
+                                                     (self._now[best], *self._tried)))
         return Standing(self._poses[best].copy(), len(self._places), float(means[best]), lead, float(self._now[best]),
                         lead_now)
 
@@ -120,9 +123,11 @@ class FollowedPoses:
         moved, shares = self._scans.fitted(scan, self._poses, off_m, _OFF_RAD)
         new, new_shares = self._proposed(scan)
         if not len(new):  # it tells nothing
+            self._now = np.full(len(self._poses), np.nan)
             return
-        history = np.concatenate([self._shares, self._history(new, new_shares, shares, off_m)])
+        history = np.concatenate([self._shares, self._history(new, new_shares, shares, off_m, odom_from_base)])
         poses, shares = np.concatenate([moved, new]), np.concatenate([shares, new_shares])
+        self._tried = poses, shares
         if self._is_new_place(odom_from_base):
             self._places.append(_Place(scan, odom_from_base, self._way_m))
             history = np.column_stack([history, shares])
@@ -144,7 +149,7 @@ class FollowedPoses:
         return poses[order], shares[order]
 
     def _history(self, poses: np.ndarray, shares: np.ndarray, followed_shares: np.ndarray,
-                 off_m: float) -> np.ndarray:
+                 off_m: float, odom_from_base: np.ndarray) -> np.ndarray:
         """(N, P) what poses (N, 3), that explain shares (N,) of this scan, explain of the places before: as the best
         followed pose that may have come there and explains less where it slid to; or else looked up backwards."""
         history = np.full((len(poses), len(self._places)), np.nan)
@@ -158,7 +163,7 @@ class FollowedPoses:
             if len(near):
                 history[index] = self._shares[near[means[near].argmax()]]
         orphans = np.flatnonzero(np.isnan(history[:, 0]))
-        back, here, way_m = poses[orphans], self._odom_from_base, self._way_m
+        back, here, way_m = poses[orphans], odom_from_base, self._way_m
         for number in range(len(self._places) - 1, -1, -1):
             place = self._places[number]
             back = se2.compose(back, se2.compose(se2.inverse(here), place.odom_from_base))

@@ -35,7 +35,7 @@ class Meetpoint:
     centre_m: np.ndarray = field(default_factory=lambda: np.zeros(2))  # (2,) of the meetpoint in the robot's frame
     stamp_ns: int = 0
     scan: Optional[Scan] = None  # that was seen there, for judging candidates by it
-    odom_from_base: Optional[np.ndarray] = None  # (3,) of the robot at that scan, for following poses
+    odom_from_base: Optional[np.ndarray] = None  # (3,) of the robot by dead reckoning, for following poses
 
     def __post_init__(self) -> None:
         if self.degree < 1:
