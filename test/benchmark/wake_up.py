@@ -19,12 +19,14 @@ import os
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import floors
 import numpy as np
 
 from glass_nav.driving import tasks
@@ -38,9 +40,8 @@ from glass_nav.geometry import angles, se2
 from glass_nav.localization.glass_mcl import GlassMcl
 from glass_nav.localization.glass_mcl_params import GlassMclParams
 from glass_nav.localization.scan_explanation import ScanExplanation
-from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings, start_place
+from glass_nav.simulation import lidar, shipped_buildings, start_place
 from glass_nav.simulation.simulation import Frame, Simulation
-from glass_nav.topology import atlas_file, shipped_atlases
 from glass_nav.topology.atlas_localizer import CONFIRMED, AtlasLocalizer, Estimate, SearchParams
 
 CONTROL_S = 0.05
@@ -59,6 +60,7 @@ class Job(NamedTuple):
     opaque: bool
     seed: int
     judge: bool  # candidates by the scans
+    follow: bool  # poses by the scans, too
     verbose: bool
 
 
@@ -66,16 +68,14 @@ class Trial:
     """One robot in one building."""
 
     def __init__(self, job: Job) -> None:
-        building = building_file.load(shipped_buildings.find(job.building))
-        building = building.opaque() if job.opaque else building
-        self.grid_map = building_map.draw(building)
-        self.atlas = atlas_file.load(shipped_atlases.find(job.building))
+        building, self.grid_map, self.atlas = floors.load(job.building, job.seed, job.opaque)
         start = start_place.random_place(building, np.random.default_rng([job.seed, 1]))
         self.simulation = Simulation(building, lidar.preset(job.lidar), seed=job.seed, start=start)
         self.limits = BaseLimits()
         self.driver = EdgeDriver(EdgeDriverParams(limits=self.limits))
-        self.localizer = AtlasLocalizer(self.atlas, SearchParams(),
-                                        ScanExplanation(self.grid_map).shares if job.judge else None)
+        explanation = ScanExplanation(self.grid_map) if job.judge else None
+        self.localizer = AtlasLocalizer(self.atlas, SearchParams(follow_places=4 if job.follow else 0),
+                                        explanation.shares if explanation else None, explanation)
         self.rng = np.random.default_rng([job.seed, 2])
         self.collisions = 0
         self.map_from_odom: Optional[np.ndarray] = None
@@ -126,19 +126,22 @@ class Trial:
             estimate = self._told(task.arrival, rank)
             if self.verbose:
                 print(f"{self.now_s:7.1f} s depth {estimate.depth} {estimate.state}: {estimate.reason}; rank "
-                      f"{estimate.choice.rank if estimate.choice else '-'}; {self._truth(task.arrival)}", flush=True)
+                      f"{estimate.choice.rank if estimate.choice else '-'}; {self._truth(task.arrival)}"
+                      f"{self._scans_say()}", flush=True)
             if estimate.done or estimate.depth >= MOST_EDGES or estimate.choice is None:
                 break
             rank = estimate.choice.rank
         return {"state": "NO_MEETPOINT" if estimate is None else estimate.state, "failures": failures,
                 "edges": -1 if estimate is None else estimate.depth, "search_s": self.now_s,
-                "candidates": -1 if estimate is None else len(estimate.dart), **self._errors(estimate)}
+                "candidates": -1 if estimate is None else len(estimate.dart),
+                "reason": "" if estimate is None else estimate.reason, **self._errors(estimate)}
 
     def _told(self, arrival: Arrival, rank: Optional[int]) -> Estimate:
         last = self.localizer.estimate
+        meetpoint = replace(arrival.meetpoint, odom_from_base=arrival.odom_from_base)
         if arrival.traversal is None or last is None or last.done:
-            return self.localizer.start(arrival.meetpoint)
-        return self.localizer.update(arrival.traversal, arrival.meetpoint)
+            return self.localizer.start(meetpoint)
+        return self.localizer.update(arrival.traversal, meetpoint)
 
     def _truth(self, arrival: Arrival) -> str:
         """What the meetpoint really is."""
@@ -147,6 +150,15 @@ class Trial:
         node = int(away.argmin())
         return (f"node {node} {away[node]:.2f} m off, degree {arrival.meetpoint.degree} of {self.atlas.degree[node]}, "
                 f"r {arrival.meetpoint.r_m:.2f} of {self.atlas.nodes.r_m[node]:.2f} m{self._edge_truth(arrival, node)}")
+
+    def _scans_say(self) -> str:
+        """How the followed pose that explains most compares, and how far it is off the truth."""
+        standing = self.localizer.standing
+        if standing is None:
+            return ""
+        off_m = float(np.hypot(*(standing.map_from_base - self.simulation.map_from_base)[:2]))
+        return (f"; scans: {standing.places} places, {standing.share:.2f}, lead {standing.lead:.2f}, now "
+                f"{standing.share_now:.2f}, lead {standing.lead_now:.2f}, {off_m:.2f} m off")
 
     def _edge_truth(self, arrival: Arrival, node: int) -> str:
         """The edges between the last node and this one that are most like what was driven."""
@@ -164,7 +176,7 @@ class Trial:
         truth = self.simulation.map_from_base
         if estimate is None or estimate.state != CONFIRMED:
             return {"right": False, "wrong": False, "error_m": math.nan}
-        pose = self.localizer.map_from_base(estimate.dart)[0]
+        pose = self.localizer.poses(estimate)[0]
         off_m = float(np.hypot(*(pose[:2] - truth[:2])))
         right = off_m < RIGHT_M and abs(float(angles.wrap(pose[2] - truth[2]))) < RIGHT_RAD
         self.map_from_odom = se2.compose(pose, se2.inverse(self.simulation.reading.odom_from_base))
@@ -221,8 +233,8 @@ def told(found: Dict[str, Any]) -> str:
     """One run in one line."""
     verdict = ", right" if found["right"] else ", WRONG" if found["wrong"] else ""
     return (f"{found['building']} {found['lidar']} seed {found['seed']}: {found['state']}{verdict} after "
-            f"{found['edges']} edges, {found['search_s']:.0f} s; {found['collisions']} collisions; legs "
-            f"{found.get('legs', '-')}, tracking {found.get('tracking_m', math.nan):.3f} m; failures "
+            f"{found['edges']} edges, {found['search_s']:.0f} s ({found['reason']}); {found['collisions']} collisions; "
+            f"legs {found.get('legs', '-')}, tracking {found.get('tracking_m', math.nan):.3f} m; failures "
             f"{found['failures']}; {found['cpu_s']:.0f} s CPU")
 
 
@@ -244,17 +256,20 @@ def line(name: str, runs: List[Dict[str, Any]]) -> str:
 def main() -> None:
     """Run all, print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--buildings", nargs="+", default=list(shipped_buildings.shipped()))
+    parser.add_argument("--buildings", nargs="+", default=list(shipped_buildings.shipped()),
+                        help=floors.HELP)
     parser.add_argument("--lidars", nargs="+", default=["sensitive"], choices=list(lidar.PRESETS))
     parser.add_argument("--opaque", action="store_true", help="film on all glass")
     parser.add_argument("--seeds", type=int, default=2, help="robots in each building with each lidar")
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--no-scans", action="store_true", help="candidates are not judged by scans")
+    parser.add_argument("--graph-only", action="store_true", help="no poses are followed by the scans")
     parser.add_argument("--verbose", action="store_true", help="tell each step")
     parser.add_argument("--out", type=Path, help="file for all figures, json")
     arguments = parser.parse_args()
-    jobs = [Job(building, name, arguments.opaque, seed, not arguments.no_scans, arguments.verbose)
+    jobs = [Job(building, name, arguments.opaque, seed, not arguments.no_scans, not arguments.graph_only,
+                arguments.verbose)
             for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
             for building in arguments.buildings for name in arguments.lidars]
     runs: List[Dict[str, Any]] = []

@@ -66,7 +66,8 @@ def test_nothing_of_the_tests_or_the_build_is_installed(install: Path) -> None:
     assert not [path for path in files(install) if path.startswith("test") or ".build" in path or "_rostest" in path]
 
 
-@pytest.mark.parametrize("module", ["glass_nav._mrpt_grid", "glass_nav._mrpt_io", "glass_nav.msg"])
+@pytest.mark.parametrize("module", [
+    "glass_nav._beam_vote", "glass_nav._mrpt_grid", "glass_nav._mrpt_io", "glass_nav.msg"])
 def test_compiled_modules_and_messages_come_from_the_install_space(install: Path, tmp_path: Path, module: str) -> None:
     done = in_install_space(install, f"/usr/bin/python3 -c 'import {module} as m; print(m.__file__)'", tmp_path)
     assert done.stdout.startswith(str(python_folder(install))), done.stdout

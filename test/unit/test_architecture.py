@@ -27,6 +27,7 @@ MAY_IMPORT = {
 }
 FOR_ALL = {"amcl_parameters", "params"}  # modules of no room
 ONLY_BY = {  # compiled modules, each behind its face; and what is heavy, where it is needed
+    "glass_nav._beam_vote": "localization",
     "glass_nav._mrpt_grid": "sensing",
     "glass_nav._mrpt_io": "recording world",
     "distributed": "cli",

@@ -98,6 +98,30 @@ py::dict cast_surfaces(const GridRaycaster& grid, const Array<double>& poses, co
   return result;
 }
 
+py::tuple cast_paths(const GridRaycaster& grid, const Array<double>& poses, const Array<double>& angles,
+                     const Array<double>& reach_m, double max_thickness_m, double min_linearity, double min_gap_m,
+                     int threads) {
+  constexpr double kUnused = 1.0;
+  const RayBatch rays = batch_of(poses, angles, kUnused, threads);
+  if (reach_m.ndim() != 1 || reach_m.shape(0) != angles.shape(0)) throw std::invalid_argument("reach must be (B,)");
+  const std::vector<py::ssize_t> shape{4, poses.shape(0), angles.shape(0)};
+  py::array_t<double> range_m(shape), cos(shape);
+  py::array_t<std::int32_t> cell(shape);
+  PathArrays out{};
+  for (std::size_t path = 0; path < 4; ++path) {
+    const std::size_t from = path * rays.pose_count * rays.angle_count;
+    out.range_m[path] = range_m.mutable_data() + from;
+    out.cos[path] = cos.mutable_data() + from;
+    out.cell[path] = cell.mutable_data() + from;
+  }
+  {
+    const double* reach = reach_m.data();
+    py::gil_scoped_release unlocked;
+    grid.cast_paths(rays, reach, {max_thickness_m, min_linearity, min_gap_m}, out);
+  }
+  return py::make_tuple(range_m, cos, cell);
+}
+
 py::array_t<double> simulate_scan_ray_raw(const GridRaycaster& grid, const Array<double>& poses,
                                           const Array<double>& angles, double max_range_m) {
   const RayBatch rays = batch_of(poses, angles, max_range_m, 1);
@@ -177,6 +201,8 @@ PYBIND11_MODULE(_mrpt_grid, module) {
       .def("cast", &cast, py::arg("poses"), py::arg("angles"), py::arg("max_range_m"), py::arg("threads"))
       .def("cast_first", &cast_first, py::arg("poses"), py::arg("angles"), py::arg("max_range_m"), py::arg("threads"))
       .def("cast_surfaces", &cast_surfaces, py::arg("poses"), py::arg("angles"), py::arg("max_range_m"),
+           py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"), py::arg("threads"))
+      .def("cast_paths", &cast_paths, py::arg("poses"), py::arg("angles"), py::arg("reach_m"),
            py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"), py::arg("threads"))
       .def("simulate_scan_ray_raw", &simulate_scan_ray_raw, py::arg("poses"), py::arg("angles"),
            py::arg("max_range_m"))

@@ -119,32 +119,57 @@ void GridRaycaster::cast_first(const RayBatch& batch, double* range_m, std::int3
   });
 }
 
-void GridRaycaster::cast_surfaces(const RayBatch& batch, const SurfaceLimits& limits,
-                                  const SurfaceArrays& out) const {
-  const double t_max = batch.max_range_m / resolution_m_;
+template <class Reach, class Store>
+void GridRaycaster::find_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const Reach& t_max,
+                                  const Store& store) const {
   const SurfaceRules rules{limits.max_thickness_m / resolution_m_, limits.min_linearity,
                            limits.min_gap_m / resolution_m_};
   const WallNormals& wall_normals = normals();  // before the threads start
   with_seeker([&](const GridCells& grid, const auto& seeker) {
     const SurfaceFinder finder(grid, seeker, wall_normals, rules);
-    const auto store = [&](std::size_t i, const Surfaces& found) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        out.range_m[k][i] = found.range[k] * resolution_m_;
-        out.cell[k][i] = found.cell[k];
-      }
-      for (std::size_t k = 0; k < 2; ++k) out.thickness_m[k][i] = found.thickness[k] * resolution_m_;
-      out.normal_rad[i] = std::atan2(found.normal.y, found.normal.x);
-      out.linearity[i] = found.normal.linearity;
-      out.mirrored_m[i] = found.mirrored * resolution_m_;
-      out.mirrored_cell[i] = found.mirrored_cell;
-    };
     for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
       constexpr std::size_t kTogether = 512;  // their state fits the level 2 cache
       for (std::size_t done = 0; done < count; done += kTogether) {
         finder.along_all(std::min(kTogether, count - done), t_max, rays,
-                         [&](std::size_t i, const Surfaces& found) { store(first + done + i, found); });
+                         [&](std::size_t i, const Surfaces& found, const Ray& ray) {
+                           store(first + done + i, finder, found, ray);
+                         });
       }
     });
+  });
+}
+
+void GridRaycaster::cast_surfaces(const RayBatch& batch, const SurfaceLimits& limits,
+                                  const SurfaceArrays& out) const {
+  const auto reach = [t_max = batch.max_range_m / resolution_m_](std::size_t) { return t_max; };
+  find_surfaces(batch, limits, reach, [&](std::size_t i, const auto&, const Surfaces& found, const Ray&) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      out.range_m[k][i] = found.range[k] * resolution_m_;
+      out.cell[k][i] = found.cell[k];
+    }
+    for (std::size_t k = 0; k < 2; ++k) out.thickness_m[k][i] = found.thickness[k] * resolution_m_;
+    out.normal_rad[i] = std::atan2(found.normal.y, found.normal.x);
+    out.linearity[i] = found.normal.linearity;
+    out.mirrored_m[i] = found.mirrored * resolution_m_;
+    out.mirrored_cell[i] = found.mirrored_cell;
+  });
+}
+
+void GridRaycaster::cast_paths(const RayBatch& batch, const double* reach_m, const SurfaceLimits& limits,
+                               const PathArrays& out) const {
+  const auto reach = [&](std::size_t beam) { return reach_m[beam] / resolution_m_; };
+  find_surfaces(batch, limits, reach, [&](std::size_t i, const auto& finder, const Surfaces& found, const Ray& ray) {
+    const Incidences incidences = finder.incidences(found, ray);
+    constexpr std::size_t kMirrored = 1;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t path = k == 0 ? 0 : k + 1;
+      out.range_m[path][i] = found.range[k] * resolution_m_;
+      out.cos[path][i] = incidences.cos[k];
+      out.cell[path][i] = found.cell[k];
+    }
+    out.range_m[kMirrored][i] = found.mirrored * resolution_m_;
+    out.cos[kMirrored][i] = incidences.mirrored_cos;
+    out.cell[kMirrored][i] = found.mirrored_cell;
   });
 }
 

@@ -52,6 +52,14 @@ struct SurfaceArrays {
   std::int32_t* mirrored_cell;  // where that ends; -1 where none
 };
 
+/// Where the results of cast_paths go: arrays of pose_count * angle_count for each way that a beam may take: to the
+/// first surface, mirrored there, and to the second and the third.
+struct PathArrays {
+  double* range_m[4];  // whole length; inf where none
+  double* cos[4];      // of the incidence where it ends; 1 without a normal
+  std::int32_t* cell[4];  // where it ends; -1 where none
+};
+
 /// An occupancy grid and the rays on it. Frame of the grid: cell [0, 0] starts at (0, 0), no rotation.
 class GridRaycaster {
  public:
@@ -71,6 +79,10 @@ class GridRaycaster {
   /// First, second and third surface along every ray, with what lies between.
   void cast_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const SurfaceArrays& out) const;
 
+  /// The same for comparison with measured ranges, without what lies between; beam b is followed up to reach_m[b].
+  void cast_paths(const RayBatch& batch, const double* reach_m, const SurfaceLimits& limits,
+                  const PathArrays& out) const;
+
   /// What simulateScanRay itself answers, faults included, asked to look to max_range_m: for comparison only.
   void simulate_scan_ray_raw(const RayBatch& batch, double* range_m) const;
 
@@ -81,6 +93,8 @@ class GridRaycaster {
   GridCells cells() const;
   template <class Use>
   void with_seeker(const Use& use) const;  // use(GridCells, seeker of the backend)
+  template <class Reach, class Store>
+  void find_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const Reach& t_max, const Store& store) const;
 
   int width_, height_;
   double resolution_m_;

@@ -36,6 +36,9 @@ class RayStream {
   /// True if the next ray starts from another place than the one before.
   bool at_new_origin() const { return beam_ == 0; }
 
+  /// Index of the beam of the next ray.
+  std::size_t beam() const { return beam_; }
+
   Ray next() {
     if (at_new_origin()) {
       ray_.x = pose_[0] / resolution_m_;

@@ -34,6 +34,12 @@ struct Surfaces {
   std::int32_t mirrored_cell = -1;
 };
 
+/// |cos| of the incidence where the first, second and third surface and the mirrored path were met; 1 without a normal.
+struct Incidences {
+  std::array<double, 3> cos{1.0, 1.0, 1.0};
+  double mirrored_cos = 1.0;
+};
+
 /// Looks along rays and through what they meet.
 template <class Seeker>
 class SurfaceFinder {
@@ -41,24 +47,35 @@ class SurfaceFinder {
   SurfaceFinder(const GridCells& cells, const Seeker& seeker, const WallNormals& normals, const SurfaceRules& rules)
       : cells_(cells), seeker_(seeker), normals_(normals), rules_(rules) {}
 
-  /// Follows `count` rays of the stream `rays`; found(i, Surfaces) for each. All rays go from surface to surface
-  /// together, since the seeker is fastest with many.
-  template <class Rays, class Found>
-  void along_all(std::size_t count, double t_max, Rays& rays, const Found& found) const {
+  /// Follows `count` rays of the stream `rays`, each up to t_max(beam); found(i, Surfaces, Ray) for each. All rays go
+  /// from surface to surface together, since the seeker is fastest with many.
+  template <class Rays, class Reach, class Found>
+  void along_all(std::size_t count, const Reach& t_max, Rays& rays, const Found& found) const {
     std::vector<Search> searches(count);
     std::vector<Surfaces> surfaces(count);
     std::vector<std::size_t> going(count);  // rays that are not at their end
     for (std::size_t i = 0; i < count; ++i) {
+      const double reach = t_max(rays.beam());
       const Ray ray = rays.next();
-      searches[i] = {ray, GridWalk(ray, cells_.width, cells_.height, t_max)};
+      searches[i] = {ray, GridWalk(ray, cells_.width, cells_.height, reach)};
       going[i] = i;
     }
     for (std::size_t k = 0; k < 3 && !going.empty(); ++k) {
       seek_surface(k, going, searches, surfaces);
-      if (k == 0) mirror(going, searches, surfaces, t_max);
+      if (k == 0) mirror(going, searches, surfaces);
       if (k < 2) pass_surface(k, going, searches, surfaces);  // what is behind the third is nobody's business
     }
-    for (std::size_t i = 0; i < count; ++i) found(i, surfaces[i]);
+    for (std::size_t i = 0; i < count; ++i) found(i, surfaces[i], searches[i].ray);
+  }
+
+  /// How flatly the ray and its mirrored path met what they met.
+  Incidences incidences(const Surfaces& at, const Ray& ray) const {
+    Incidences result;
+    if (at.cell[0] < 0) return result;
+    if (usable(at.normal)) result.cos[0] = std::abs(projection(at.normal, ray));
+    for (std::size_t k = 1; k < 3; ++k) result.cos[k] = cos_at(at.cell[k], ray);
+    if (at.mirrored_cell >= 0) result.mirrored_cos = cos_at(at.mirrored_cell, reflected(ray, 0.0, at.normal));
+    return result;
   }
 
  private:
@@ -120,7 +137,7 @@ class SurfaceFinder {
 
   /// Finds the normals of the first surfaces and follows the rays mirrored there: along u - 2 (u . n) n.
   void mirror(const std::vector<std::size_t>& hits, const std::vector<Search>& searches,
-              std::vector<Surfaces>& surfaces, double t_max) const {
+              std::vector<Surfaces>& surfaces) const {
     std::vector<std::size_t> mirrored;
     std::vector<WallLine> mirrors;
     for (const std::size_t i : hits) {
@@ -134,6 +151,7 @@ class SurfaceFinder {
         [&](std::size_t j) {
           const double t = surfaces[mirrored[j]].range[0];
           const Ray ray = reflected(searches[mirrored[j]].ray, t, surfaces[mirrored[j]].normal);
+          const double t_max = searches[mirrored[j]].walk.t_max();
           return Search{ray, GridWalk(ray, cells_.width, cells_.height, t_max - t)};
         },
         // Cells of the mirror itself, within the patch that gave its normal: the staircase of a slanted wall.
@@ -143,6 +161,12 @@ class SurfaceFinder {
           at.mirrored_cell = met;
           if (met >= 0) at.mirrored = at.range[0] + walk.t();
         });
+  }
+
+  double cos_at(std::int32_t cell, const Ray& ray) const {
+    if (cell < 0) return 1.0;
+    const WallNormals::Normal normal = normals_.at(cell);
+    return usable(normal) ? std::abs(projection(normal, ray)) : 1.0;
   }
 
   WallLine wall_line(std::int32_t cell) const {

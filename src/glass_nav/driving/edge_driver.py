@@ -212,7 +212,7 @@ class EdgeDriver:
             self._graph_ns = self._stamp_ns
             walls = self._map.walls()
             self._at.know(walls)
-            self._near_walls(walls.occupied)
+            self._near_walls(walls)
 
     def take_arrival(self) -> Optional[Arrival]:
         """The report of a meetpoint, once."""
@@ -325,18 +325,17 @@ class EdgeDriver:
     # -- thinking, once for each graph
 
     def _look(self) -> None:
-        self._grid = self._map.grid()
+        self._grid = self._map.grid_around(self._pose[:2])
         self._graph = LocalGraph(self._grid, self._graph_params)
         self._graph_ns = self._stamp_ns
         self._at.know(self._map.walls())
-        self._near_walls(self._grid.occupied)
+        self._near_walls(self._grid)
 
-    def _near_walls(self, occupied: np.ndarray) -> None:
-        grid = self._map.frame()
+    def _near_walls(self, grid: GridMap) -> None:
         reach = int(_NEAR_M / grid.resolution_m)
         row, column = (int(index) for index in grid.cells(self._pose[:2]))
         top, left = max(row - reach, 0), max(column - reach, 0)
-        rows, columns = np.nonzero(occupied[top:row + reach, left:column + reach])
+        rows, columns = np.nonzero(grid.occupied[top:row + reach, left:column + reach])
         self._walls_m = grid.centres(rows + top, columns + left)
 
     def _think(self) -> None:

@@ -29,12 +29,14 @@ FREE, OCCUPIED = 0, 100
 _FORGET_AT = 60    # beams counted in a cell from one direction: halved, so that what is new counts
 _BEFORE_M = 0.05   # so near in front of where a beam ended it proves nothing: noise, and the cell's own size
 _LEAST_PIECE = 4   # cells of a pane that give a line
+_LOOK_PER_ROOM = 1.9  # of a meetpoint r from its obstacles all ways show that are longer than 1.6 r, and a little more
 
 
 @dataclass(frozen=True)
 class LocalMapParams:
     """Lengths in metres."""
-    window_m: float = 12.0           # edge of the square around the robot
+    window_m: float = 20.0           # edge of the square around the robot
+    narrow_window_m: float = 12.0    # of it, so much is looked at in narrow places, more in wide ones
     resolution_m: float = 0.05       # edge of a cell; that of the atlas' map
     directions: int = 16             # of beams, told apart
     least_ends: int = 2              # beams that must have ended in a cell from one direction ...
@@ -44,7 +46,7 @@ class LocalMapParams:
     robot_radius_m: float = 0.22     # where the robot stands there is room for it
 
     def __post_init__(self) -> None:
-        for name in ("window_m", "resolution_m", "robot_radius_m", "unanswered_m"):
+        for name in ("window_m", "narrow_window_m", "resolution_m", "robot_radius_m", "unanswered_m"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ValueError(f"~{name} must be > 0 m and finite, got {getattr(self, name)}")
         if self.window_m < 10.0 * self.resolution_m:
@@ -144,6 +146,20 @@ class LocalMap:
             occupied = occupied | self._extended(occupied)
         occupancy = np.where(occupied & ~self._stood, OCCUPIED, np.where(free, FREE, UNKNOWN)).astype(np.int8)
         return self._as_map(occupancy)
+
+    def grid_around(self, point_m: np.ndarray) -> GridMap:
+        """Of grid(), a square around a point (2,) of the window: large enough that the ways out of a hall show as ways,
+        and no larger, for what lies far away is known badly, behind glass worst of all.
+        """
+        whole, cell_m = self.grid(), self._p.resolution_m
+        rows, columns = np.nonzero(whole.occupied)
+        at = np.asarray(point_m) / cell_m - self._first
+        room_m = float(np.hypot(columns + 0.5 - at[0], rows + 0.5 - at[1]).min(initial=np.inf)) * cell_m
+        reach_m = min(max(0.5 * self._p.narrow_window_m, _LOOK_PER_ROOM * room_m), 0.5 * self._p.window_m)
+        low = np.maximum(np.rint(at - reach_m / cell_m), 0).astype(np.int64)
+        high = np.rint(at + reach_m / cell_m).astype(np.int64)
+        return GridMap(np.ascontiguousarray(whole.occupancy[low[1]:high[1], low[0]:high[0]]), cell_m,
+                       np.append((self._first + low) * cell_m, 0.0))
 
     def _as_map(self, occupancy: np.ndarray) -> GridMap:
         return GridMap(occupancy, self._p.resolution_m, np.append(self._first * self._p.resolution_m, 0.0))

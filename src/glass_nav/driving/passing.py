@@ -166,7 +166,7 @@ class PassingObserver:
         return moved_m >= self._p.graph_step_m or stamp_ns - self._last_ns >= self._p.graph_period_s * 1e9
 
     def _look(self, stamp_ns: int, pose: np.ndarray) -> None:
-        graph = LocalGraph(self._map.grid(), self._graph_params)
+        graph = LocalGraph(self._map.grid_around(pose[:2]), self._graph_params)
         self._at.know(self._map.walls())
         self._last_ns, self._last_pose = stamp_ns, pose
         self._graphs += 1

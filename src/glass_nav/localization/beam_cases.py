@@ -15,6 +15,7 @@ from typing import Tuple
 
 import numpy as np
 
+from glass_nav import _beam_vote
 from glass_nav.localization import pane_answers
 from glass_nav.localization.range_residuals import RangeResiduals
 from glass_nav.localization.reference_ranges import LEAST_COS, ReferenceRanges
@@ -31,6 +32,7 @@ _UNSEEN_SIDE = 0.002      # chance of a wall to be met from a side that no mappe
 _LEAST_SEEN_THROUGH = 0.05  # a cell may hold a post and the edge of the pane beside it
 _TEMPER = 0.2  # of a sample's evidence: beams err together, and the best sample shall not vote alone
 _REACH, _ROUNDS = 2, 3    # of the pull between neighbouring beams
+_BY_SAMPLE = ("range_m", "cos_incidence", "thickness_m")  # fields of references that tell of all samples
 
 
 @dataclass(frozen=True)
@@ -92,19 +94,22 @@ def classify(measured_m: np.ndarray, references: ReferenceRanges, residuals: Ran
         max_range_m: of the lidar: what it can still see; of the soft vote.
     """
     answered = np.isfinite(measured_m)
-    references = _inside_walls(references, residuals)
     if vote.vote_mode == "paper":
         share = _paper_ballots(measured_m, references, residuals, vote)  # (5, B), column sums 1
     else:
-        prior = _priors(references, glass, max_range_m, vote)
+        prior = _priors(_inside_walls(_of_sample_0(references), residuals), glass, max_range_m, vote)
         share = _pulled(_soft_ballots(measured_m, references, residuals, vote, prior), answered, vote.neighbour_pull)
     share[:, ~answered] = np.array([1.0, 0.0, 0.0, 0.0, 0.0])[:, None]
     won, beam = _winner(share), np.arange(len(measured_m))
     case = np.where(answered & (share[won, beam] >= vote.case_min_share), won, UNCERTAIN)
-    offered_m, across_m = _offered(case, measured_m, references)
-    sample = np.where(across_m[0] <= gate_m(residuals, vote), 0, np.argmin(across_m, axis=0))
-    return _told(case, share[case, beam], measured_m, offered_m[sample, beam],
-                 np.isfinite(across_m[sample, beam]))
+    offered_m, across_m = (values[0] for values in _offered(case, measured_m, _of_sample_0(references), residuals))
+    elsewhere = np.flatnonzero((case > 0) & ~(across_m <= gate_m(residuals, vote)))
+    if len(elsewhere):
+        offered_there_m, across_there_m = _offered(case[elsewhere], measured_m[elsewhere],
+                                                   _of_beams(references, elsewhere), residuals)
+        nearest = np.argmin(across_there_m, axis=0), np.arange(len(elsewhere))
+        offered_m[elsewhere], across_m[elsewhere] = offered_there_m[nearest], across_there_m[nearest]
+    return _told(case, share[case, beam], measured_m, offered_m, np.isfinite(across_m))
 
 
 def as_seen_from(cases: BeamCases, measured_m: np.ndarray, references: ReferenceRanges,
@@ -113,14 +118,24 @@ def as_seen_from(cases: BeamCases, measured_m: np.ndarray, references: Reference
 
     A beam that passes an edge from there keeps its range; one that ends farther from its surface is uncertain.
     """
-    offered_m, across_m = _offered(cases.case, measured_m, _inside_walls(references, residuals))
+    offered_m, across_m = _offered(cases.case, measured_m, _of_sample_0(references), residuals)
     other = np.abs(np.nan_to_num(offered_m[0] - cases.expected_m)) > _OTHER_SURFACE_M  # also where there is none
     fits = across_m[0] <= _TOLD_GATES * gate_m(residuals, vote)
     return _told(cases.case, cases.weight, measured_m, np.where(fits, offered_m[0], cases.expected_m), fits | other)
 
 
-def _offered(case: np.ndarray, measured_m: np.ndarray, references: ReferenceRanges) -> Tuple[np.ndarray, np.ndarray]:
+def _of_sample_0(references: ReferenceRanges) -> ReferenceRanges:
+    return replace(references, **{name: getattr(references, name)[:, :1] for name in _BY_SAMPLE})
+
+
+def _of_beams(references: ReferenceRanges, beams: np.ndarray) -> ReferenceRanges:
+    return replace(references, **{name: getattr(references, name)[:, :, beams] for name in _BY_SAMPLE})
+
+
+def _offered(case: np.ndarray, measured_m: np.ndarray, references: ReferenceRanges,
+             residuals: RangeResiduals) -> Tuple[np.ndarray, np.ndarray]:
     """(N, B) ranges that the samples offer for the case of each beam, and how far across the surface it ended."""
+    references = _inside_walls(references, residuals)
     row, beam = np.maximum(case.astype(int) - 1, 0), np.arange(len(case))
     offered_m = references.range_m[row, :, beam].T
     with np.errstate(invalid="ignore"):
@@ -154,6 +169,7 @@ def _winner(share: np.ndarray) -> np.ndarray:
 def _paper_ballots(measured_m: np.ndarray, references: ReferenceRanges, residuals: RangeResiduals,
                    vote: CaseVote) -> np.ndarray:
     """(5, B) share of the samples whose nearest reference is that case; equal votes."""
+    references = _inside_walls(references, residuals)
     with np.errstate(invalid="ignore"):
         off = np.abs(measured_m - references.range_m)  # (4, N, B)
     off[np.isnan(off)] = np.inf
@@ -168,38 +184,26 @@ def _soft_ballots(measured_m: np.ndarray, references: ReferenceRanges, residuals
                   vote: CaseVote, prior: np.ndarray) -> np.ndarray:
     """(5, B) posterior over the cases; samples count by how well each explains the scan.
 
-    prior (5, B) is what _priors() gives.
+    A reference has a normal density of width residuals.sigma_m, cut at the gate, across the surface; each case has its
+    prior, (5, B) of _priors(), times the density of its reference. The samples are summed before the cases compete: a
+    corner that some of them graze and others miss is no surface to explain the beam by, if without it a likelier case
+    does. The evidence of a sample is the product over the beams that answered, to the power of _TEMPER over the root of
+    their number.
     """
-    answered = np.isfinite(measured_m)
-    z = np.where(answered, measured_m, 0.0)
-    sigma_m, gate = residuals.sigma_m, gate_m(residuals, vote)
-    density = _density(z, references, sigma_m, gate)
-    joint = prior[:4, None] * density  # (4, N, B)
-    nothing = (vote.prior_uncertain * np.exp(-0.25 * (gate / sigma_m) ** 2)
-               + prior[4] * density[FIRST_PENETRATION - 1])  # (N, B)
-    total = joint.sum(axis=0) + nothing
-    log_evidence = np.log(total) @ answered  # (N,)
-    temper = _TEMPER / np.sqrt(max(answered.sum(), 1))
-    sample_w = np.exp(temper * (log_evidence - log_evidence.max()))
-    sample_w /= sample_w.sum()
-    # The samples are summed before the cases compete: a corner that some of them graze and others miss is no surface
-    # to explain the beam by, if without it a likelier case does.
-    share = np.einsum("n,cnb->cb", sample_w, np.concatenate([nothing[None], joint]))
-    return share / share.sum(axis=0)
+    temper = _TEMPER / np.sqrt(max(np.count_nonzero(np.isfinite(measured_m)), 1))
+    return _beam_vote.ballots(measured_m, references.range_m, references.cos_incidence, references.thickness_m, prior,
+                              vote.prior_uncertain, residuals.depth_share, residuals.sigma_m, gate_m(residuals, vote),
+                              LEAST_COS, temper)
+
+
+def reach_m(residuals: RangeResiduals, vote: CaseVote) -> float:
+    """How far behind the end of a beam a reference may be that still is voted for."""
+    return gate_m(residuals, vote) / LEAST_COS
 
 
 def gate_m(residuals: RangeResiduals, vote: CaseVote) -> float:
     """How far across the surface a beam may end from it: a map that fits badly everywhere needs a wider gate."""
     return max(vote.case_gate_m, _GATE_SIGMAS * residuals.sigma_m)
-
-
-def _density(z: np.ndarray, references: ReferenceRanges, sigma_m: float, gate: float) -> np.ndarray:
-    """(4, N, B) how near each reference is, relative to a perfect match."""
-    cos = np.maximum(references.cos_incidence, LEAST_COS)
-    across = (z - references.range_m) * cos
-    density = np.exp(-0.5 * np.minimum((across / sigma_m) ** 2, 100.0))
-    density[~(np.abs(across) <= gate)] = 0.0
-    return density
 
 
 def _priors(references: ReferenceRanges, glass: np.ndarray, max_range_m: float, vote: CaseVote) -> np.ndarray:

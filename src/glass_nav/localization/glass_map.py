@@ -50,6 +50,11 @@ def crossings(measured_m: np.ndarray, references: ReferenceRanges,
     return cell[clear], incidence[clear], passed[clear]
 
 
+def reach_m(residuals: RangeResiduals) -> float:
+    """How far behind the end of a beam crossings() asks for first surfaces."""
+    return (_ENDED_SIGMAS * residuals.sigma_m + _BEHIND_M) / _LEAST_COS
+
+
 @dataclass(frozen=True)
 class GlassEvidence:
     """How much a crossing of a wall of the map says."""

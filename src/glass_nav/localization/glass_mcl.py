@@ -238,7 +238,8 @@ class GlassMcl:
         self._odom_from_base = odom_from_base
         self._up_to_date.add(scan.lidar)
         map_from_base = se2.compose(self._map_from_odom, odom_from_base)  # the vote was held at the aligned pose
-        return self._estimate(scan, odom_from_base, cases, self._references(scan, map_from_base[None]), updated=True)
+        references = self._references(scan, map_from_base[None], 0.0)
+        return self._estimate(scan, odom_from_base, cases, references, updated=True)
 
     def _track(self, scan: Scan, odom_from_base: np.ndarray) -> BeamCases:
         """The particles follow the robot; if the scans say that it is elsewhere, they go there."""
@@ -399,15 +400,16 @@ class GlassMcl:
               covariance: np.ndarray) -> Tuple[BeamCases, ReferenceRanges]:
         """Cases of all beams, by preliminary samples around a pose."""
         samples = preliminary_samples.around(map_from_base, covariance, self._params.samples)
-        references = self._references(scan, samples)
+        behind_m = max(beam_cases.reach_m(self._residuals, self._params.vote), glass_map.reach_m(self._residuals))
+        references = self._references(scan, samples, behind_m)
         glass = self._glass_map.chances(references.cell[[0, 2], 0])
         return beam_cases.classify(scan.ranges_m, references, self._residuals, self._params.vote, glass,
                                    scan.range_max_m), references
 
-    def _references(self, scan: Scan, samples: np.ndarray) -> ReferenceRanges:
+    def _references(self, scan: Scan, samples: np.ndarray, behind_m: float) -> ReferenceRanges:
         vote = self._params.vote
         return reference_ranges.of(self._caster, self._thickness_m, samples, scan, vote.glass_max_thickness_m,
-                                   vote.normal_min_linearity)
+                                   vote.normal_min_linearity, behind_m)
 
     def _learn(self, scan: Scan, references: ReferenceRanges) -> None:
         """Where beams end in walls, and which walls let them pass; references are of a pose that is believed."""

@@ -10,6 +10,7 @@ map may miss it: half of the samples see past it. N samples, B beams; arrays by 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Tuple
 
 import numpy as np
 
@@ -19,7 +20,8 @@ from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import UNKNOWN, GridMap
 
 LEAST_COS = 0.2  # a surface seen flatter than 78 degrees is no worse placed than at that
-_FIRST, _SECOND = 0, 1
+_FIRST, _SECOND, _THIRD = 0, 2, 3  # rows
+_NOWHERE_M = 1e-9
 _BESIDE_CELLS = 2.5  # in front of a surface: past the steps of its staircase
 _BOTH_FACES_CELLS = 3.0  # a wall up to so thick has one line through all its cells
 _LINE_CELLS, _GRAZING_COS = 2.0, 0.02  # the line of a wall lies so near to the cells that a beam meets
@@ -27,12 +29,12 @@ _LINE_CELLS, _GRAZING_COS = 2.0, 0.02  # the line of a wall lies so near to the 
 
 @dataclass(frozen=True)
 class ReferenceRanges:
-    """What the map offers to explain each beam, as seen from each sample."""
+    """What the map offers to explain each beam, as seen from each sample; from sample 0, the pose itself, all of it."""
     range_m: np.ndarray          # (4, N, B) along the beam, inf where the map offers nothing
     cos_incidence: np.ndarray    # (4, N, B) |u . n| at the surface that answers; 1 where it has no normal
     thickness_m: np.ndarray      # (4, N, B) of the wall that answers, as drawn
     cell: np.ndarray             # (4, N, B) int32 flat cell that answers, -1: none
-    pane_incidence: np.ndarray   # (N, B) angle to the normal of the first surface [rad], NaN without one
+    pane_incidence: np.ndarray   # (1, B) angle to the normal of sample 0's first surface [rad], NaN without one
     line_m: np.ndarray           # (4, B) range of sample 0 by the lines of the walls, face_m behind the near faces
     axis_rad: np.ndarray         # (4, B) axes of their normals in map, up to half a turn; NaN: none. Case 2: mirrored
     face_m: float                # half a cell
@@ -40,41 +42,49 @@ class ReferenceRanges:
 
 
 def of(caster: RayCaster, thickness_m: np.ndarray, samples: np.ndarray, scan: Scan,
-       max_thickness_m: float, min_linearity: float) -> ReferenceRanges:
+       max_thickness_m: float, min_linearity: float, behind_m: float = np.inf) -> ReferenceRanges:
     """References of every beam of the scan from every sample.
 
     Args:
         caster: of the map.
         thickness_m: (H * W,) of the map's walls, sensing/wall_thickness.py.
         samples: (N, 3) robot poses in map.
-        scan: its ranges are not looked at.
+        scan: its ranges are looked at for behind_m alone.
         max_thickness_m: a thicker run of occupied cells cannot be glass and ends the ray.
         min_linearity: below it a surface has no normal: no mirrored reference.
+        behind_m: farther behind the end of a beam the samples but the first look for nothing, and nowhere where a
+            beam did not answer; inf: everywhere.
     """
     from_laser = se2.compose(samples, scan.base_from_laser)
-    hits = caster.cast_surfaces(from_laser, scan.angles_rad, scan.range_max_m,
+    paths = caster.cast_paths(from_laser, scan.angles_rad, _reach_m(scan, behind_m), max_thickness_m, min_linearity)
+    range_m, cos, cell = paths.range_m, paths.cos_incidence, paths.cell
+    _miss_corners(caster, min_linearity, range_m, cos, cell)
+    hits = caster.cast_surfaces(from_laser[:1], scan.angles_rad, scan.range_max_m,
                                 max_thickness_m=max_thickness_m, min_linearity=min_linearity)
-    beam_rad = from_laser[:, 2:3] + scan.angles_rad
+    beam_rad = from_laser[0, 2] + scan.angles_rad
+    mirrored_rad = 2.0 * hits.normal_rad[0] + np.pi - beam_rad
+    range_m[:, 0] = np.concatenate([hits.first_m, hits.mirrored_m, hits.second_m, hits.third_m])
+    cell[:, 0] = np.concatenate([hits.first_cell, hits.mirrored_cell, hits.second_cell, hits.third_cell])
+    cos[:, 0] = cos_incidence(caster, np.stack([beam_rad, mirrored_rad, beam_rad, beam_rad]), cell[:, 0],
+                              min_linearity)
     has_normal = hits.linearity >= min_linearity
-    mirrored_rad = 2.0 * hits.normal_rad + np.pi - beam_rad
-    cell = np.stack([hits.first_cell, hits.mirrored_cell, hits.second_cell, hits.third_cell])
-    cos = np.stack([cos_incidence(caster, mirrored_rad if row == 1 else beam_rad, cell[row], min_linearity)
-                    for row in range(4)])
-    incidence = np.where(has_normal, np.arccos(np.clip(cos[0], 0.0, 1.0)), np.nan)
-    range_m = np.stack([hits.first_m, hits.mirrored_m, hits.second_m, hits.third_m])
+    incidence = np.where(has_normal, np.arccos(np.clip(cos[0, :1], 0.0, 1.0)), np.nan)
     normal_rad, linearity = caster.normals()
-    second_is_corner = (hits.second_cell >= 0) & (linearity[hits.second_cell] < min_linearity)
-    missed = _misses_corners(*beam_rad.shape)
-    _miss(_SECOND, missed & second_is_corner, range_m, cos, cell)
-    _miss(_FIRST, missed & (hits.first_cell >= 0) & ~has_normal, range_m, cos, cell)
-    directions_rad = np.stack([beam_rad[0], np.nan_to_num(mirrored_rad[0]), beam_rad[0], beam_rad[0]])
+    directions_rad = np.stack([beam_rad, np.nan_to_num(mirrored_rad), beam_rad, beam_rad])
     axis_rad = np.where((cell[:, 0] >= 0) & (linearity[cell[:, 0]] >= min_linearity), normal_rad[cell[:, 0]], np.nan)
-    line_m = _by_line(caster, thickness_m, from_laser[0], beam_rad[0], range_m[:, 0], cell[:, 0], axis_rad)
+    line_m = _by_line(caster, thickness_m, from_laser[0], beam_rad, range_m[:, 0], cell[:, 0], axis_rad)
     face_m = 0.5 * caster.grid_map.resolution_m
     seen_side = _seen_side(caster.grid_map, cell[:, 0], axis_rad, directions_rad)
     line_m[1] = range_m[1, 0] + face_m / np.maximum(cos[1, 0], LEAST_COS) + 2.0 * face_m * cos[0, 0]
     axis_rad[1] = 2.0 * hits.normal_rad[0] + np.pi - axis_rad[1]
     return ReferenceRanges(range_m, cos, thickness_m[cell], cell, incidence, line_m, axis_rad, face_m, seen_side)
+
+
+def _reach_m(scan: Scan, behind_m: float) -> np.ndarray:
+    """(B,) how far to look along each beam."""
+    if not np.isfinite(behind_m):
+        return np.full(len(scan), scan.range_max_m)
+    return np.where(scan.answered, np.minimum(np.abs(scan.ranges_m) + behind_m, scan.range_max_m), _NOWHERE_M)
 
 
 def _seen_side(grid_map: GridMap, cell: np.ndarray, axis_rad: np.ndarray, direction_rad: np.ndarray) -> np.ndarray:
@@ -93,20 +103,27 @@ def _seen_side(grid_map: GridMap, cell: np.ndarray, axis_rad: np.ndarray, direct
     return (cell < 0) | (inside & (beside != UNKNOWN))
 
 
-def _misses_corners(samples: int, beams: int) -> np.ndarray:
-    """(N, B) bool: for each beam every other sample but the predicted pose itself, for each sample every other beam."""
+def _miss_corners(caster: RayCaster, min_linearity: float, range_m: np.ndarray, cos: np.ndarray,
+                  cell: np.ndarray) -> None:
+    """Let beams pass first and second surfaces without a normal: of each sample every other beam, for each beam every
+    other sample but the first, which is the predicted pose itself. Works on references (4, N, B) in place."""
+    samples, beams = cell.shape[1:]
     missed = (np.arange(samples)[:, None] + np.arange(beams)) % 2 == 1
-    missed[0] = False
-    return missed
+    missed[:1] = False
+    at = np.flatnonzero(missed.ravel() & (cell[_FIRST].ravel() >= 0))
+    linearity = caster.normals()[1]
+    first, second = (cell[path].ravel()[at] for path in (_FIRST, _SECOND))
+    _miss((_SECOND, _THIRD), at[(second >= 0) & (linearity[second] < min_linearity)], range_m, cos, cell)
+    _miss((_FIRST, _SECOND, _THIRD), at[linearity[first] < min_linearity], range_m, cos, cell)
 
 
-def _miss(surface: int, beams: np.ndarray, range_m: np.ndarray, cos: np.ndarray, cell: np.ndarray) -> None:
-    """Take a surface out of the references (4, N, B) of the chosen beams (N, B); what is behind it moves up."""
-    order = (0, 2, 3)[surface:]
+def _miss(order: Tuple[int, ...], at: np.ndarray, range_m: np.ndarray, cos: np.ndarray, cell: np.ndarray) -> None:
+    """Take a surface out of the references (4, N, B) at flat places (N, B); what is behind it moves up."""
     for values, nothing in ((range_m, np.inf), (cos, 1.0), (cell, -1)):
+        flat = values.reshape(len(values), -1)
         for to, source in zip(order, order[1:]):
-            values[to][beams] = values[source][beams]
-        values[order[-1]][beams] = nothing
+            flat[to, at] = flat[source, at]
+        flat[order[-1], at] = nothing
 
 
 def _by_line(caster: RayCaster, thickness_m: np.ndarray, from_laser: np.ndarray, beam_rad: np.ndarray,

@@ -22,9 +22,11 @@ _RANK = re.compile(r"(?:RANK_)?(\d+)$")
 def meetpoint_msg(arrival: Arrival, frame: str) -> MeetpointMsg:
     """Where the robot stands."""
     seen = arrival.meetpoint
+    odom_x, odom_y, odom_yaw = arrival.odom_from_base.tolist()
     return MeetpointMsg(header=conversions.header(arrival.stamp_ns, frame), degree=seen.degree, r=seen.r_m,
                         r_sigma=seen.sigma_r_m, x=float(seen.centre_m[0]), y=float(seen.centre_m[1]),
-                        bearings=seen.bearings_rad.tolist())
+                        bearings=seen.bearings_rad.tolist(), has_odom=True, odom_x=odom_x, odom_y=odom_y,
+                        odom_yaw=odom_yaw)
 
 
 def traversal_msg(arrival: Arrival, frame: str) -> Optional[EdgeTraversalMsg]:

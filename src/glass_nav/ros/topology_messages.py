@@ -22,8 +22,9 @@ AS_TOLD = -1  # rank of a traversal: as the last turn_choice said
 
 def meetpoint_from_msg(msg: MeetpointMsg) -> Meetpoint:
     """Checked; raises ObservationError."""
+    odom_from_base = np.array([msg.odom_x, msg.odom_y, msg.odom_yaw]) if msg.has_odom else None
     return Meetpoint(msg.degree, msg.r, msg.r_sigma, np.array(msg.bearings, float), np.array([msg.x, msg.y]),
-                     conversions.ns_from_stamp(msg.header.stamp))
+                     conversions.ns_from_stamp(msg.header.stamp), odom_from_base=odom_from_base)
 
 
 def traversal_from_msg(msg: EdgeTraversalMsg, told: Optional[TurnChoice]) -> Traversal:
@@ -63,12 +64,13 @@ def status_msg(state: str, reason: str, stamp_ns: int, frame: str, estimate: Opt
 
 def candidates_msg(atlas: Atlas, estimate: Estimate, poses: np.ndarray, stamp_ns: int,
                    frame: str) -> TopologyCandidates:
-    """The first candidates, as many as there are poses (K, 3) for."""
+    """The first candidates, as many as there are poses (K, 3) for; none where the atlas does not have the place that
+    scans confirmed."""
     dart = estimate.dart[:len(poses)]
     return TopologyCandidates(
         header=conversions.header(stamp_ns, frame), total=len(estimate.dart), nodes=atlas.darts.node[dart].tolist(),
         edges=(dart >> 1).tolist(), detection_errors=bytes(estimate.errors[:len(poses)].astype(np.uint8)),
-        poses=[conversions.pose_from_planar(pose) for pose in poses])
+        poses=[conversions.pose_from_planar(pose) for pose in poses[:len(dart)]])
 
 
 def pose_msg(pose: np.ndarray, sigma_m: float, sigma_rad: float, stamp_ns: int,

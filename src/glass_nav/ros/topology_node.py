@@ -5,7 +5,8 @@ Wiring only; the answer comes from AtlasLocalizer. Callbacks store, one loop wor
 Subscribes: meetpoint (Meetpoint), edge_traversal (EdgeTraversal): of the driver, or by hand; in either order, the
     traversal and the meetpoint at its end belong together. map (OccupancyGrid, if ~check_map): the atlas must be its.
     scan (LaserScan) and tf to the frame of the meetpoint, with map, if ~judge_by_scans: candidates from where the map
-    does not explain the scan of a meetpoint's stamp are ruled out.
+    does not explain the scan of a meetpoint's stamp are ruled out; where meetpoints have odometry, the poses that
+    explain the scans are followed from one to the next, too.
 Publishes: turn_choice (TurnChoice): the answer to each meetpoint while there is something to find out;
     initialpose (PoseWithCovarianceStamped) once when CONFIRMED, with the stamp of the meetpoint;
     ~candidates (TopologyCandidates, latched), ~status (TopologyStatus, latched), ~markers (MarkerArray, latched):
@@ -32,15 +33,14 @@ from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 from visualization_msgs.msg import MarkerArray
 
 from glass_nav import params
-from glass_nav.localization.scan_explanation import ScanExplanation
 from glass_nav.msg import (EdgeTraversal, LocalizeGloballyAction, LocalizeGloballyFeedback, LocalizeGloballyGoal,
                            LocalizeGloballyResult, Meetpoint, TopologyCandidates, TopologyStatus, TurnChoice)
 from glass_nav.ros import action_status, conversions, endings, topology_displays, topology_messages
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Errand, Mailbox
 from glass_nav.ros.scan_memory import ScanMemory
+from glass_nav.ros.served_explanation import ServedExplanation
 from glass_nav.ros.topology_params import TopologyParams
-from glass_nav.sensing.scan import Scan
 from glass_nav.topology import atlas_file, observations, shipped_atlases
 from glass_nav.topology.atlas import AtlasError
 from glass_nav.topology.atlas_localizer import CONFIRMED, AtlasLocalizer, Estimate
@@ -57,7 +57,7 @@ class TopologyNode:
     def __init__(self, p: TopologyParams) -> None:
         self._p, self._search_params = p.node, p.search
         self._map_fingerprint: Optional[str] = None
-        self._explanation: Optional[ScanExplanation] = None  # None: there is no map
+        self._explanation = ServedExplanation()
         self._scans = ScanMemory() if p.node.judge_by_scans else None
         self._localizer: Optional[AtlasLocalizer] = self._loaded(p.node.atlas)
         self._show_atlas()
@@ -179,7 +179,9 @@ class TopologyNode:
             except AtlasError as err:
                 raise AtlasError(f"{path}: {err}") from err
         rospy.loginfo(f"{path}: {len(atlas.nodes)} nodes, {len(atlas.edges)} edges")
-        return AtlasLocalizer(atlas, self._search_params, self._explained if self._p.judge_by_scans else None)
+        if not self._p.judge_by_scans:
+            return AtlasLocalizer(atlas, self._search_params)
+        return AtlasLocalizer(atlas, self._search_params, self._explanation.shares, self._explanation)
 
     def _show_atlas(self) -> None:
         """Work out its markers, which are sent with those of each step."""
@@ -203,7 +205,7 @@ class TopologyNode:
         try:
             grid_map = conversions.map_from_msg(msg)
             if self._p.judge_by_scans:
-                self._explanation = ScanExplanation(grid_map)
+                self._explanation.take(grid_map)
             if not self._p.check_map:
                 return
             self._map_fingerprint = grid_map.fingerprint
@@ -246,16 +248,10 @@ class TopologyNode:
         except ObservationError as err:
             self._log.warn(f"{kind} refused: {err}")
 
-    def _explained(self, scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
-        """(C,) share of the scan that the map explains from each pose (C, 3); NaN without a map."""
-        if self._explanation is None:
-            return np.full(len(map_from_base), np.nan)
-        return self._explanation.shares(scan, map_from_base)
-
     def _with_scan(self, msg: Meetpoint) -> observations.Meetpoint:
         """The meetpoint, with the scan of its stamp if that can be used."""
         meetpoint = topology_messages.meetpoint_from_msg(msg)
-        if self._scans is None or self._explanation is None or not meetpoint.stamp_ns:
+        if self._scans is None or not self._explanation.has_map or not meetpoint.stamp_ns:
             return meetpoint
         scan, why_not = self._scans.at(msg.header.stamp, msg.header.frame_id)
         if scan is None:
@@ -357,7 +353,7 @@ class TopologyNode:
     def _listed_poses(self) -> np.ndarray:
         if self._localizer is None or self._estimate is None:
             return np.zeros((0, 3))
-        return self._localizer.map_from_base(self._estimate.dart[:self._p.listed_candidates])
+        return self._localizer.poses(self._estimate, self._p.listed_candidates)
 
     def _pose_msg(self, stamp_ns: int, frame: str) -> PoseWithCovarianceStamped:
         return topology_messages.pose_msg(self._listed_poses()[0], self._p.initial_pose_sigma_m,

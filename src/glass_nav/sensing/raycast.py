@@ -49,6 +49,14 @@ class SurfaceHits:
     mirrored_cell: np.ndarray       # int32 flat index of the cell where that ends, -1: none
 
 
+@dataclass(frozen=True)
+class Paths:
+    """The four ways along each ray, (4, P, B): to the first surface, mirrored there, to the second and the third."""
+    range_m: np.ndarray        # whole length, inf: none
+    cos_incidence: np.ndarray  # |u . n| where it ends, 1 where nothing or no normal is
+    cell: np.ndarray           # int32 flat index of the cell met, -1: none
+
+
 class RayCaster:
     """Casts rays on one map. Safe to share between threads."""
 
@@ -123,17 +131,34 @@ class RayCaster:
         Raises:
             ValueError: as cast(), or a limit outside its bounds.
         """
-        if not max_thickness_m >= 0.0:
-            raise ValueError(f"ray caster: max_thickness must be >= 0 m, got {max_thickness_m}")
-        if not 0.0 <= min_linearity <= 1.0:
-            raise ValueError(f"ray caster: min_linearity must be in [0, 1], got {min_linearity}")
-        if not 0.0 <= min_gap_m < np.inf:
-            raise ValueError(f"ray caster: min_gap must be finite and >= 0 m, got {min_gap_m}")
+        _check_limits(max_thickness_m, min_linearity, min_gap_m)
         poses, angles_rad = self._checked(poses, angles_rad, max_range_m)
         found = self._grid.cast_surfaces(poses, angles_rad, max_range_m, max_thickness_m, min_linearity, min_gap_m,
                                          self._threads)
         found["normal_rad"] = self._in_map(found["normal_rad"])
         return SurfaceHits(**found)
+
+    def cast_paths(self, poses: np.ndarray, angles_rad: np.ndarray, reach_m: np.ndarray, max_thickness_m: float = 0.3,
+                   min_linearity: float = 0.9, min_gap_m: float = 0.1) -> Paths:
+        """Where the paths of cast_surfaces() end, each beam followed only so far as it matters.
+
+        Args:
+            poses, angles_rad, max_thickness_m, min_linearity, min_gap_m: as for cast_surfaces().
+            reach_m: (B,) how far to look along each beam, > 0 and finite.
+
+        Raises:
+            ValueError: as cast_surfaces().
+        """
+        _check_limits(max_thickness_m, min_linearity, min_gap_m)
+        reach_m = np.asarray(reach_m, float)
+        if reach_m.shape != np.shape(angles_rad):
+            raise ValueError(f"ray caster: reach must have the shape of the angles {np.shape(angles_rad)}, "
+                             f"got {reach_m.shape}")
+        if not (np.isfinite(reach_m) & (reach_m > 0.0)).all():
+            raise ValueError(f"ray caster: reach must be finite and > 0 m, got {reach_m.min()} to {reach_m.max()}")
+        poses, angles_rad = self._checked(poses, angles_rad, 1.0)
+        return Paths(*self._grid.cast_paths(poses, angles_rad, reach_m, max_thickness_m, min_linearity, min_gap_m,
+                                            self._threads))
 
     def simulate_scan_ray_raw(self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float) -> np.ndarray:
         """As cast(), by MRPT's simulateScanRay as it is, faults included: to be compared with, not to be used."""
@@ -185,3 +210,12 @@ class RayCaster:
         if not (np.isfinite(max_range_m) and max_range_m > 0.0):
             raise ValueError(f"ray caster: max_range must be finite and > 0 m, got {max_range_m}")
         return se2.compose(self._grid_from_map, poses), angles_rad
+
+
+def _check_limits(max_thickness_m: float, min_linearity: float, min_gap_m: float) -> None:
+    if not max_thickness_m >= 0.0:
+        raise ValueError(f"ray caster: max_thickness must be >= 0 m, got {max_thickness_m}")
+    if not 0.0 <= min_linearity <= 1.0:
+        raise ValueError(f"ray caster: min_linearity must be in [0, 1], got {min_linearity}")
+    if not 0.0 <= min_gap_m < np.inf:
+        raise ValueError(f"ray caster: min_gap must be finite and >= 0 m, got {min_gap_m}")

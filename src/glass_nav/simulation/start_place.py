@@ -13,6 +13,7 @@ from glass_nav.simulation.building import Building, distances
 
 RANDOM = "random"
 ROOM_M = 0.45      # to the nearest surface: it can turn, and drive off in any direction
+PASSAGE_M = 0.3    # from its middle to a wall, where it gets through
 _STREAM = 0x57A27  # of the seed: no other part of a simulation draws from it
 _TRIES = 1000
 
@@ -42,11 +43,12 @@ def start(words: str, building: Building, seed: int) -> Optional[np.ndarray]:
 
 
 def random_place(building: Building, rng: np.random.Generator) -> np.ndarray:
-    """(3,) map_from_base with room to every surface, in the part of the building that its own start is in."""
+    """(3,) map_from_base with room to every surface, where a robot can come from the building's own start."""
     grid = building_map.draw(building)
     room_m = ndimage.distance_transform_edt(np.pad(grid.free, 1))[1:-1, 1:-1] * grid.resolution_m
-    parts, _ = ndimage.label(grid.free)
-    row, column = grid.cells(building.start[:2])
+    parts, _ = ndimage.label(room_m >= PASSAGE_M, np.ones((3, 3), bool))
+    nearest = ndimage.distance_transform_edt(parts == 0, return_distances=False, return_indices=True)
+    row, column = nearest[(slice(None), *grid.cells(building.start[:2]))]
     rows, columns = np.nonzero((parts == parts[row, column]) & (room_m >= ROOM_M))
     surfaces = building.surfaces
     from_m, to_m = surfaces.from_m[surfaces.present], surfaces.to_m[surfaces.present]

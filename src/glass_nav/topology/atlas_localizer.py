@@ -3,7 +3,8 @@
 Seed document: global_localization_procedure.txt. `vote_mode: seed` with `confirm_edges: 0` is its procedure: no edge
 angles, no errors of the detector, done at the first single candidate. Its rule alone claims a place for many robots
 that are not in the atlas at all; the default asks for edges that confirm it, proves ambiguity instead of driving for
-ever, and answers LOST rather than guess.
+ever, and answers LOST rather than guess. Where there are scans and odometry, poses are followed beside the graph
+(followed_poses.py): they find the robot where the atlas has not the meetpoints that are there.
 """
 
 from __future__ import annotations
@@ -15,15 +16,19 @@ import numpy as np
 
 from glass_nav.topology import ambiguity, vote
 from glass_nav.topology.atlas import Atlas, Visits
+from glass_nav.geometry import angles
 from glass_nav.topology.edge_segments import SegmentTest
+from glass_nav.topology.followed_poses import MOST_LEAD, FollowedPoses, MapScans, Standing
 from glass_nav.topology.matching import Explained, Matcher, Tolerances, poses_at
 from glass_nav.topology.observations import Meetpoint, Traversal, turn_name
+from glass_nav.topology.passed_edges import PassedEdges
 from glass_nav.topology.search_forest import SearchForest
 
 SEARCHING, TENTATIVE, CONFIRMED, AMBIGUOUS, LOST = "SEARCHING", "TENTATIVE", "CONFIRMED", "AMBIGUOUS", "LOST"
 VOTE_MODES = ("best", "seed")
 
 _TREE_EDGES = 2000  # searched for an edge that was not driven yet
+_AGREE_M, _AGREE_RAD = 0.7, np.radians(20.0)  # a pose of the graph and a followed one are the same place
 
 
 @dataclass(frozen=True)
@@ -37,6 +42,8 @@ class SearchParams:
     segments: SegmentTest = field(default_factory=SegmentTest)
     least_explained: float = 0.6   # share of a scan that the map must explain from a candidate; where scans are judged
     searches: int = 6              # begun anew where nothing fits any more, before LOST; where scans are judged
+    follow_places: int = 4         # where scans were made, that a followed pose must explain; 0: none is followed
+    follow_lead: float = 0.15      # share of the scans by which all other poses must be behind, in the mean
 
     def __post_init__(self) -> None:
         if self.vote_mode not in VOTE_MODES:
@@ -49,6 +56,10 @@ class SearchParams:
             raise ValueError(f"~least_explained must be in [0, 1), got {self.least_explained}")
         if self.searches < 1:
             raise ValueError(f"~searches must be >= 1, got {self.searches}")
+        if self.follow_places < 0:
+            raise ValueError(f"~follow_places must be >= 0, got {self.follow_places}")
+        if not 0.0 < self.follow_lead <= MOST_LEAD:
+            raise ValueError(f"~follow_lead must be in (0, {MOST_LEAD:g}], got {self.follow_lead}")
 
     @property
     def document(self) -> bool:
@@ -76,6 +87,8 @@ class Estimate:
     dart: np.ndarray              # (C,) candidates: where the edge that the robot came along leads back
     errors: np.ndarray            # (C,) errors of the detector that each takes
     choice: Optional[TurnChoice]  # None: nothing more to find out
+    map_from_base: Optional[np.ndarray] = None  # (3,) CONFIRMED by the scans: the pose; dart is empty where the graph
+    # does not have it
 
     @property
     def done(self) -> bool:
@@ -86,12 +99,15 @@ class Estimate:
 class AtlasLocalizer:
     """One search at a time; start() and update() with what the robot reports, drive as the estimate says."""
 
-    def __init__(self, atlas: Atlas, params: SearchParams, explained: Optional[Explained] = None) -> None:
+    def __init__(self, atlas: Atlas, params: SearchParams, explained: Optional[Explained] = None,
+                 scans: Optional[MapScans] = None) -> None:
         """
         Args:
             atlas: of the building.
             params: of the search.
             explained: judges candidates by the scan of a meetpoint, if it has one; not with vote_mode seed.
+            scans: of the map, by which poses are followed where meetpoints have scan and odometry; not with vote_mode
+                seed.
         """
         self._atlas = atlas
         self._params = params
@@ -99,6 +115,11 @@ class AtlasLocalizer:
                                 None if params.document else params.segments, None if params.document else explained,
                                 params.least_explained)
         self._forest = SearchForest(self._matcher, 0 if params.document else params.max_detection_errors)
+        self._followed: Optional[FollowedPoses] = None
+        if scans is not None and params.follow_places > 0 and not params.document:
+            self._followed = FollowedPoses(scans)
+        self._passed = PassedEdges()
+        self._seen_places = 0  # by the followed poses, when the last search began
         self._claim: Optional[_Claim] = None
         self._estimate: Optional[Estimate] = None
         self._edges_before = 0  # driven in searches in which nothing fitted at last
@@ -125,9 +146,17 @@ class AtlasLocalizer:
         """The last one; None before the first meetpoint."""
         return self._estimate
 
+    @property
+    def standing(self) -> Optional[Standing]:
+        """What the scans say of the poses that are followed; None: nothing yet, or none is followed."""
+        return None if self._followed is None else self._followed.standing
+
     def start(self, meetpoint: Meetpoint) -> Estimate:
         """Begin a search; what was known before is forgotten."""
-        self._edges_before, self._search = 0, 1
+        self._edges_before, self._search, self._seen_places = 0, 1, 0
+        self._passed.begin(meetpoint)
+        if self._followed is not None:
+            self._followed.begin(meetpoint)
         return self._begin(meetpoint)
 
     def update(self, traversal: Traversal, meetpoint: Meetpoint) -> Estimate:
@@ -137,6 +166,9 @@ class AtlasLocalizer:
             ObservationError: the meetpoint it left has no such edge; nothing is changed.
         """
         self._forest.step(traversal, meetpoint)
+        self._passed.way(traversal.rank, meetpoint, traversal.length_m)
+        if self._followed is not None:
+            self._followed.follow(meetpoint, traversal.length_m)
         return self._judged()
 
     def map_from_base(self, dart: np.ndarray) -> np.ndarray:
@@ -144,16 +176,26 @@ class AtlasLocalizer:
         there, or else at the meetpoint with the edge behind it."""
         return poses_at(self._atlas, dart, self._forest.meetpoints[-1])
 
+    def poses(self, estimate: Estimate, most: Optional[int] = None) -> np.ndarray:
+        """(C, 3) map_from_base at the last meetpoint, of the first so many candidates of the last estimate; if scans
+        confirmed one, where it fits them."""
+        if estimate.map_from_base is not None:
+            return estimate.map_from_base[None]
+        return self.map_from_base(estimate.dart[:most])
+
     def path(self, dart: int) -> np.ndarray:
         """Darts (K,) by which a candidate came there, reference dart of the beginning first."""
         return np.array([found for _, found, _ in self._forest.path(dart)], np.int64)
 
     def count_visits(self, visits: Visits) -> None:
-        """What was measured on the way of the only candidate, into the statistics of the atlas.
+        """What was measured on the way of the confirmed candidate, into the statistics of the atlas.
 
-        Edges and meetpoints that the detector erred about are left out.
+        Edges and meetpoints that the detector erred about are left out; nothing is counted where only scans found it.
         """
-        (dart,) = self._forest.candidates()[0]
+        assert self._estimate is not None
+        if not len(self._estimate.dart):
+            return
+        (dart,) = self._estimate.dart
         nodes: List[Tuple[int, float]] = []
         edges: List[Tuple[int, float]] = []
         for depth, passed, plain in self._forest.path(int(dart)):
@@ -180,14 +222,51 @@ class AtlasLocalizer:
         else:
             self._estimate = self._among_several(dart, errors)
         self._estimate = replace(self._estimate, depth=self._edges_before + self._forest.depth)
+        standing = self.standing
+        if standing is not None:
+            self._estimate = self._with_followed(self._estimate, standing)
         judged = self._matcher.judges_scans and self._forest.meetpoints[-1].scan is not None
         if self._estimate.state == LOST and judged and self._search < self._params.searches and self._forest.depth > 0:
             self._search += 1
             self._edges_before += self._forest.depth
             begun = self._begin(self._forest.meetpoints[-1])
-            self._estimate = replace(begun, reason=f"search {self._search} of {self._params.searches}, nothing "
-                                                   f"fitted any more: {begun.reason}")
+            if not begun.done:
+                begun = replace(begun, reason=f"search {self._search} of {self._params.searches}, nothing fitted any "
+                                              f"more: {begun.reason}")
+            self._estimate = begun
+        if self._edges_before and self._followed is not None and self._estimate.choice is not None:
+            self._estimate = replace(self._estimate, choice=self._least_passed(self._estimate.choice))
         return self._estimate
+
+    def _least_passed(self, by_graph: TurnChoice) -> TurnChoice:
+        """Where the graph was wrong once, its candidates do not know which turn tells most: to what is new."""
+        times = self._passed.times(self._forest.meetpoints[-1])
+        if times is None or times[by_graph.rank] == times.min():
+            return by_graph
+        least = np.flatnonzero(times == times.min())
+        return TurnChoice(int(least[-1]), by_graph.degree)  # back only if there is no other
+
+    def _with_followed(self, by_graph: Estimate, standing: Standing) -> Estimate:
+        """What the graph and the followed poses say together."""
+        least, lead = self._params.least_explained, self._params.follow_lead
+        if standing.share >= least and standing.places > self._seen_places:
+            self._seen_places, self._search = standing.places, 1  # it gets on: searches count from here
+        found = (standing.places >= self._params.follow_places and standing.share >= least and standing.lead >= lead
+                 and standing.share_now >= least and standing.lead_now >= -lead)
+        if not found:
+            return by_graph
+        off = self.map_from_base(by_graph.dart) - standing.map_from_base
+        agree = np.flatnonzero((np.hypot(off[:, 0], off[:, 1]) < _AGREE_M)
+                               & (np.abs(angles.wrap(off[:, 2])) < _AGREE_RAD))
+        if by_graph.state in (CONFIRMED, AMBIGUOUS):
+            if len(agree):
+                return by_graph
+            return replace(by_graph, state=LOST, reason="graph and scans contradict each other", choice=None)
+        next_best = standing.share - min(standing.lead, MOST_LEAD)
+        reason = (f"one pose explains {standing.share:.0%} of the scans of {standing.places} places, the next best "
+                  f"{next_best:.0%}{' or less' * (standing.lead > MOST_LEAD)}")
+        return replace(by_graph, state=CONFIRMED, reason=reason, choice=None, dart=by_graph.dart[agree[:1]],
+                       errors=by_graph.errors[agree[:1]], map_from_base=standing.map_from_base)
 
     def _without_candidates(self, dart: np.ndarray, errors: np.ndarray) -> Estimate:
         if self._forest.between_meetpoints():

@@ -35,6 +35,7 @@ class Meetpoint:
     centre_m: np.ndarray = field(default_factory=lambda: np.zeros(2))  # (2,) of the meetpoint in the robot's frame
     stamp_ns: int = 0
     scan: Optional[Scan] = None  # that was seen there, for judging candidates by it
+    odom_from_base: Optional[np.ndarray] = None  # (3,) of the robot by dead reckoning, for following poses
 
     def __post_init__(self) -> None:
         if self.degree < 1:
@@ -54,6 +55,9 @@ class Meetpoint:
                                    f"{np.round(self.bearings_rad, 3).tolist()} rad")
         if self.centre_m.shape != (2,) or not np.isfinite(self.centre_m).all():
             raise ObservationError(f"meetpoint: its place needs finite x and y, got {self.centre_m.tolist()}")
+        odom = self.odom_from_base
+        if odom is not None and (odom.shape != (3,) or not np.isfinite(odom).all()):
+            raise ObservationError(f"meetpoint: its odometry needs finite x, y and yaw, got {odom.tolist()}")
 
     @property
     def gaps_rad(self) -> np.ndarray:

@@ -67,6 +67,14 @@ def extract(grid_map: GridMap, tolerance_cells: float = TOLERANCE_CELLS) -> Wall
     return WallSegments(_in_map(grid_map, ends).reshape(-1, 4), _in_map(grid_map, faces[wall]), label[wall])
 
 
+def outlines(cells: np.ndarray) -> List[np.ndarray]:
+    """Closed lines (n, 2) of corners x, y, in cells, around each piece (H, W) bool and each hole in it; the piece is to
+    the left.
+    """
+    cell, side = _faces(cells)
+    return [(cell + _START[side])[loop] for loop in _loops(cell, side)]
+
+
 def _in_map(grid_map: GridMap, points: np.ndarray) -> np.ndarray:
     return se2.transform_points(grid_map.map_from_grid, points * grid_map.resolution_m)
 

@@ -217,3 +217,19 @@ def test_parameters_that_mean_nothing_are_refused(fields, line):
     with pytest.raises(ValueError) as refused:
         LocalMapParams(**fields)
     assert str(refused.value) == line
+
+
+@pytest.mark.parametrize("half_m, edge_m", [pytest.param(1.0, 12.0, id="a room"), pytest.param(4.0, 15.2, id="a hall"),
+                                            pytest.param(9.0, 20.0, id="a larger one than the window can show")])
+def test_of_a_wide_place_more_is_looked_at_than_of_a_narrow_one(half_m, edge_m):
+    walls = half_m * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
+    local = LocalMap()
+    for number in range(4):
+        local.add(scan_at(Building((Wall(walls, 0.02),)), (0.0, 0.0, 1.5 * number), np.random.default_rng(number)),
+                  np.array([0.0, 0.0, 1.5 * number]))
+    whole, part = local.grid(), local.grid_around(np.zeros(2))
+    assert np.array(part.occupancy.shape) * part.resolution_m == pytest.approx([edge_m, edge_m], abs=0.25)
+    rows, columns = np.nonzero(part.occupancy + 1)
+    places = part.centres(rows, columns)
+    np.testing.assert_array_equal(part.occupancy[rows, columns], whole.occupancy[whole.cells(places)])
+    assert local.grid_around(np.array([0.1, 0.0])).occupied.any() == part.occupied.any()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from buildings import CELL_M, GLASS_ROOM, RANGE_MAX_M, Building
+from glass_nav import _beam_vote
 from glass_nav.geometry import se2
 from glass_nav.localization import beam_cases, reference_ranges
 from glass_nav.localization.beam_cases import CaseVote
@@ -454,6 +455,64 @@ def test_samples_that_see_the_same_corners_may_change_places(seed):
     other = in_a_world(GLASS_ROOM.grid_map(), samples[order], angles_rad, measured_m)
     np.testing.assert_array_equal(one.case, other.case)
     np.testing.assert_allclose(one.weight, other.weight)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_soft_vote_is_the_posterior_over_the_cases(seed):
+    """Against the formula, array by array."""
+    rng = np.random.default_rng(seed)
+    samples, beams, uncertain, depth_share, sigma_m, gate_m, least_cos, temper = 7, 40, 0.1, 0.4, 0.05, 0.15, 0.2, 0.03
+    measured_m = np.where(rng.random(beams) < 0.2, np.inf, rng.uniform(0.5, 3.0, beams))
+    near_m = np.where(np.isfinite(measured_m), measured_m, 1.0) + rng.normal(0.0, 0.1, (4, samples, beams))
+    range_m = np.where(rng.random(near_m.shape) < 0.3, np.inf, near_m)
+    cos, thickness_m = rng.uniform(0.05, 1.0, near_m.shape), rng.integers(0, 5, near_m.shape) / 32
+    prior = rng.dirichlet(np.ones(5), beams).T
+    share = _beam_vote.ballots(measured_m, range_m, cos, thickness_m, prior, uncertain, depth_share, sigma_m, gate_m,
+                               least_cos, temper)
+
+    answered = np.isfinite(measured_m)
+    steep = np.maximum(cos, least_cos)
+    end_m = range_m + depth_share * thickness_m / steep
+    end_m[1] += 2.0 * depth_share * thickness_m[0] * cos[0]
+    across_m = (np.where(answered, measured_m, 0.0) - end_m) * steep
+    density = np.where(np.abs(across_m) <= gate_m, np.exp(-0.5 * np.minimum((across_m / sigma_m) ** 2, 100.0)), 0.0)
+    nothing = uncertain * np.exp(-0.25 * (gate_m / sigma_m) ** 2) + prior[4] * density[2]
+    joint = np.concatenate([nothing[None], prior[:4, None] * density])
+    evidence = np.exp(temper * (np.log(joint.sum(axis=0)) @ answered))
+    expected = np.einsum("n,cnb->cb", evidence, joint)[:, answered]
+    np.testing.assert_allclose(share[:, answered], expected / expected.sum(axis=0), rtol=1e-9)
+    np.testing.assert_array_equal(share[:, ~answered].T, [[1.0, 0.0, 0.0, 0.0, 0.0]] * np.count_nonzero(~answered))
+
+
+@pytest.mark.parametrize("wrong, text", [
+    (dict(measured_m=np.zeros((1, 3))), "measured must be (B,)"),
+    (dict(cos=np.ones((4, 2, 2))), "ranges, cosines and thicknesses must be (4, N, B)"),
+    (dict(range_m=np.ones((4, 0, 3))), "ranges, cosines and thicknesses must be (4, N, B)"),
+    (dict(prior=np.ones((4, 3))), "priors must be (5, B)")])
+def test_ballots_of_other_shapes_are_refused(wrong, text):
+    arrays = dict(measured_m=np.ones(3), range_m=np.ones((4, 2, 3)), cos=np.ones((4, 2, 3)),
+                  thickness_m=np.ones((4, 2, 3)), prior=np.ones((5, 3)))
+    with pytest.raises(ValueError) as err:
+        _beam_vote.ballots(**{**arrays, **wrong}, nothing=0.1, depth_share=0.5, sigma_m=0.05, gate_m=0.15,
+                           least_cos=0.2, temper=0.1)
+    assert str(err.value) == text
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("mode", MODES)
+def test_what_is_far_behind_the_end_of_a_beam_need_not_be_looked_for(mode, seed):
+    grid_map = GLASS_ROOM.grid_map()
+    samples, angles_rad, measured_m = view(seed)
+    residuals, vote = RangeResiduals(0.5, 0.04), CaseVote(vote_mode=mode)
+    scan = Scan(0, measured_m, angles_rad, 0.1, RANGE_MAX_M, np.zeros(3))
+    everywhere, near = (reference_ranges.of(RayCaster(grid_map), wall_thickness(grid_map), samples, scan, 0.2, 0.9,
+                                            behind_m) for behind_m in (np.inf, beam_cases.reach_m(residuals, vote)))
+    assert np.count_nonzero(np.isfinite(near.range_m)) < 0.9 * np.count_nonzero(np.isfinite(everywhere.range_m))
+    glass = np.full((2, 2, len(measured_m)), 0.5)
+    one, other = (beam_cases.classify(measured_m, offered, residuals, vote, glass, RANGE_MAX_M)
+                  for offered in (everywhere, near))
+    np.testing.assert_array_equal(one.case, other.case)
+    np.testing.assert_allclose(one.weight, other.weight, rtol=1e-9)
 
 
 @pytest.mark.parametrize("values, text", [

@@ -11,7 +11,9 @@ from glass_nav.geometry import se2
 from glass_nav.localization.scan_explanation import ScanExplanation
 from glass_nav.sensing.scan import Scan, scan_from_fields
 from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings
+from glass_nav.simulation.building import Building, Wall
 from glass_nav.simulation.lidar import LidarModel
+from glass_nav.world.grid_map import UNKNOWN, GridMap
 
 OFFICE = "glass_office"
 LASER = np.array([0.12, 0.0, 0.0])
@@ -82,3 +84,19 @@ def test_many_poses_are_judged_as_each_alone():
     for index in (0, 63, 64, 69):
         assert explanation.shares(scan, poses[index:index + 1])[0] == pytest.approx(shares[index], abs=1e-12)
     assert explanation.shares(scan, np.zeros((0, 3))).shape == (0,)
+
+
+def test_where_the_map_knows_nothing_beams_are_no_evidence_but_through_a_wall_they_are():
+    """A corridor of which the mapper saw one half; its end stands in what is unknown."""
+    walls = (Wall(np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 3.0], [0.0, 3.0], [0.0, 0.0]]), 0.1),)
+    corridor = Building(walls, start=np.array([2.0, 1.5, 0.0]))
+    grid = building_map.draw(corridor)
+    known = GridMap(np.where(np.arange(grid.occupancy.shape[1]) < 160, grid.occupancy, np.int8(UNKNOWN)),
+                    grid.resolution_m, grid.map_from_grid)  # up to x = 7 m
+    truth, turned = np.array([[5.0, 1.5, 0.1], [5.0, 1.5, 0.1 + 0.5 * np.pi]])
+    ahead = scan_at(corridor, truth, 1)  # many of its beams end beyond 7 m
+    shares = ScanExplanation(known).shares(ahead, np.stack([truth, turned]))
+    assert shares[0] > 0.9 > 0.6 > shares[1], shares
+    assert ScanExplanation(grid).shares(ahead, truth[None])[0] > 0.9
+    nothing = GridMap(np.full_like(grid.occupancy, UNKNOWN), grid.resolution_m, grid.map_from_grid)
+    assert np.isnan(ScanExplanation(nothing).shares(ahead, truth[None])).all()

@@ -7,6 +7,7 @@ import pytest
 
 from glass_nav.driving.edge_driver import Arrival
 from glass_nav.msg import DriverStatus
+from glass_nav.msg import Meetpoint as MeetpointMsg
 from glass_nav.ros import driver_messages, topology_messages
 from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
 
@@ -15,7 +16,7 @@ TRAVERSAL = Traversal(2, 4.2, 4.0, 0.1, 0.2, 0.3, -0.4, np.array([[0.0, 1.0, 2.0
 
 
 def arrival(traversal=TRAVERSAL):
-    return Arrival(7_000_000_001, np.zeros(3), MEETPOINT, traversal)
+    return Arrival(7_000_000_001, np.array([1.0, -2.0, 0.5]), MEETPOINT, traversal)
 
 
 def test_the_topology_node_reads_what_the_driver_reports():
@@ -23,6 +24,7 @@ def test_the_topology_node_reads_what_the_driver_reports():
     assert (found.degree, found.r_m, found.sigma_r_m, found.stamp_ns) == (3, 1.5, 0.04, 7_000_000_001)
     np.testing.assert_array_equal(found.bearings_rad, MEETPOINT.bearings_rad)
     np.testing.assert_array_equal(found.centre_m, MEETPOINT.centre_m)
+    np.testing.assert_array_equal(found.odom_from_base, [1.0, -2.0, 0.5])
     msg = driver_messages.traversal_msg(arrival(), "base_link")
     driven = topology_messages.traversal_from_msg(msg, None)
     assert (driven.rank, driven.length_m, driven.chord_m, driven.sigma_length_m, driven.sigma_chord_m) == (
@@ -30,6 +32,10 @@ def test_the_topology_node_reads_what_the_driver_reports():
     assert (driven.chord_bearing_rad, driven.turn_rad) == (0.3, -0.4)
     np.testing.assert_array_equal(driven.segments_m, TRAVERSAL.segments_m)
     assert topology_messages.stamps_differ_s(driver_messages.meetpoint_msg(arrival(), "base_link"), msg) == 0.0
+
+
+def test_a_meetpoint_that_is_told_by_hand_needs_no_odometry():
+    assert topology_messages.meetpoint_from_msg(MeetpointMsg(degree=3, r=1.5)).odom_from_base is None
 
 
 def test_directions_that_were_not_measured_are_not_told():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -256,6 +258,39 @@ def test_surfaces_are_the_runs_of_the_slow_traversal(seed, backend):
         got_thickness_m = [found.first_thickness_m[p, b], found.second_thickness_m[p, b]]
         assert got_m == pytest.approx(expected_m, abs=1e-8), where
         assert got_thickness_m == pytest.approx(expected_thickness_m[:2], abs=1e-5), where
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_paths_end_where_surfaces_are_as_far_as_one_looks(seed):
+    rng = np.random.default_rng(seed)
+    cells = np.where(rng.random((90, 110)) < 0.004, 100, 0).astype(np.int8)
+    cells[:, 40:42], cells[60:62], cells[20, 50:] = 100, 100, 100
+    caster = RayCaster(GridMap(cells, CELL_M, np.array([1.0, -2.0, 0.3])))
+    axis_rad, linearity = caster.normals()
+    poses = np.c_[rng.uniform(-0.5, 5.5, (40, 2)), rng.uniform(-np.pi, np.pi, 40)]
+    angles_rad, reach_m = rng.uniform(-np.pi, np.pi, 30), rng.uniform(0.1, 6.0, 30)
+    near = caster.cast_paths(poses, angles_rad, reach_m, 0.2, 0.9, 0.12)
+    far = caster.cast_surfaces(poses, angles_rad, 9.0, 0.2, 0.9, 0.12)
+    beam_rad = poses[:, 2:] + angles_rad
+    for path, (range_m, cell) in enumerate([(far.first_m, far.first_cell), (far.mirrored_m, far.mirrored_cell),
+                                            (far.second_m, far.second_cell), (far.third_m, far.third_cell)]):
+        seen = range_m <= reach_m
+        assert seen.any() and not seen.all()
+        np.testing.assert_array_equal(near.range_m[path], np.where(seen, range_m, np.inf))
+        np.testing.assert_array_equal(near.cell[path], np.where(seen, cell, -1))
+        along_rad = 2.0 * far.normal_rad + np.pi - beam_rad if path == 1 else beam_rad
+        cos = np.where(seen & (linearity[cell] >= 0.9), np.abs(np.cos(along_rad - axis_rad[cell])), 1.0)
+        np.testing.assert_allclose(near.cos_incidence[path], cos, atol=1e-5)
+
+
+@pytest.mark.parametrize("reach_m, text", [
+    ([1.0], "reach must have the shape of the angles (2,), got (1,)"),
+    ([1.0, 0.0], "reach must be finite and > 0 m, got 0.0 to 1.0"),
+    ([1.0, np.inf], "reach must be finite and > 0 m, got 1.0 to inf")])
+def test_a_reach_that_is_none_is_refused(reach_m, text):
+    caster = RayCaster(GridMap(np.zeros((9, 9), np.int8), CELL_M, np.zeros(3)))
+    with pytest.raises(ValueError, match=re.escape(text)):
+        caster.cast_paths(np.zeros((1, 3)), np.zeros(2), np.array(reach_m))
 
 
 def test_a_flat_ray_that_has_passed_a_wall_does_not_meet_its_posts():

@@ -30,6 +30,13 @@ def test_it_is_in_the_part_of_the_building_where_its_own_start_is():
         assert x < 4.0 and max(abs(x - 2.0), abs(y - 2.0)) > 0.25  # nor in what the map does not know
 
 
+def test_it_is_not_behind_a_gap_that_no_robot_gets_through():
+    walls = (Wall(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 4.0], [0.0, 4.0], [0.0, 0.0]])),
+             Wall(np.array([[4.0, 0.0], [4.0, 3.3]])))
+    two = Building(walls, start=np.array([0.2, 1.0, 0.0]))  # at the wall, where it can stand though not turn well
+    assert max(start_place.start("random", two, seed)[0] for seed in range(20)) < 4.0
+
+
 def test_a_place_is_taken_as_it_is_given():
     np.testing.assert_array_equal(start_place.start("1.5 -2 0.5", OFFICE, 0), [1.5, -2.0, 0.5])
     np.testing.assert_array_equal(start_place.start("1.5, -2, 0.5", OFFICE, 0), [1.5, -2.0, 0.5])

@@ -210,7 +210,10 @@ def test_the_pose_is_where_the_robot_says_it_stands_at_the_meetpoint() -> None:
     ({"max_detection_errors": 3}, "~max_detection_errors must be 0, 1 or 2, got 3"),
     ({"least_explained": 1.0}, "~least_explained must be in [0, 1), got 1.0"),
     ({"least_explained": float("nan")}, "~least_explained must be in [0, 1), got nan"),
-    ({"searches": 0}, "~searches must be >= 1, got 0")])
+    ({"searches": 0}, "~searches must be >= 1, got 0"),
+    ({"follow_places": -1}, "~follow_places must be >= 0, got -1"),
+    ({"follow_lead": 0.0}, "~follow_lead must be in (0, 0.3], got 0.0"),
+    ({"follow_lead": float("nan")}, "~follow_lead must be in (0, 0.3], got nan")])
 def test_parameters_that_mean_nothing_are_refused(fields: Dict[str, Any], line: str) -> None:
     with pytest.raises(ValueError) as refused:
         SearchParams(**fields)
@@ -295,3 +298,108 @@ def test_a_robot_that_fits_nowhere_at_once_is_lost_and_without_scans_there_is_on
     single = AtlasLocalizer(twins(), SearchParams(max_detection_errors=0, searches=1), west)
     single.start(Meetpoint(1, 0.5, scan=SCAN))
     assert single.update(Traversal(0, 30.0, 30.0), Meetpoint(3, 1.3, scan=SCAN)).state == LOST
+
+
+# -- poses that are followed by scans
+
+
+class OnePlace:
+    """A map from which scans are explained at one pose only: where odometry, begun at (x, y), has the robot."""
+
+    def __init__(self, x: float, y: float, elsewhere: float = 0.65, here: float = 0.9) -> None:
+        self._start, self._elsewhere, self._here = np.array([x, y]), elsewhere, here
+        self.odom_m = np.zeros(2)  # of the robot
+
+    def places(self, scan: Scan, most: int) -> np.ndarray:
+        return np.array([[*(self._start + self.odom_m), 0.0], [*(self._start + self.odom_m + 30.0), 0.0]])
+
+    def fitted(self, scan: Scan, map_from_base: np.ndarray, most_m: float,
+               most_rad: float) -> "tuple[np.ndarray, np.ndarray]":
+        off = np.hypot(*(map_from_base[:, :2] - self._start - self.odom_m).T)
+        return map_from_base, np.where(off < 0.1, self._here, self._elsewhere)
+
+
+def wander(localizer: AtlasLocalizer, world: OnePlace, edges: int = 8, places: int = 100) -> "list[Any]":
+    """Between places in a row, along edges that no atlas of ours has, until the search is over."""
+    def meetpoint() -> Meetpoint:
+        behind_left_on = np.array([np.pi, np.pi / 2, 0.0])
+        return Meetpoint(3, 2.7, bearings_rad=behind_left_on, scan=SCAN, odom_from_base=np.array([*world.odom_m, 0.0]))
+    told = [localizer.start(meetpoint())]
+    for number in range(1, edges + 1):
+        if told[-1].done:
+            break
+        world.odom_m = np.array([3.1 * (number % places), 0.0])
+        told.append(localizer.update(Traversal(2, 3.1, 3.1), meetpoint()))
+    return told
+
+
+def test_where_the_atlas_has_nothing_like_it_the_scans_of_four_places_say_where_the_robot_is() -> None:
+    world = OnePlace(3.0, 4.0)
+    localizer = AtlasLocalizer(twins(), SearchParams(), west, world)
+    told = wander(localizer, world)
+    assert [each.state for each in told[:-1]] == [SEARCHING] * 3 and told[-1].state == CONFIRMED
+    assert told[-1].reason == "one pose explains 90% of the scans of 4 places, the next best 65%"
+    assert told[-1].choice is None and len(told[-1].dart) == 0
+    np.testing.assert_allclose(localizer.poses(told[-1]), [[3.0 + 3 * 3.1, 4.0, 0.0]])
+    localizer.count_visits(localizer.atlas.visits)  # it has none of these edges
+    assert localizer.atlas.visits.node_count.sum() == 0
+
+
+@pytest.mark.parametrize("params, world", [
+    (SearchParams(follow_places=0), OnePlace(3.0, 4.0)),
+    (SearchParams(follow_lead=0.3), OnePlace(3.0, 4.0)),
+    (SearchParams(), OnePlace(3.0, 4.0, elsewhere=0.8)),
+    (SearchParams(), OnePlace(3.0, 4.0, elsewhere=0.3, here=0.55))],
+    ids=["not asked for", "not enough ahead", "others explain as much", "none explains enough"])
+def test_who_is_nowhere_ahead_is_lost_at_last(params: SearchParams, world: OnePlace) -> None:
+    told = wander(AtlasLocalizer(twins(), params, west, world), world, edges=60, places=6)
+    assert told[-1].state == LOST and told[-1].depth < 60
+
+
+def test_searches_count_from_the_last_new_place_while_a_pose_explains_the_scans() -> None:
+    world = OnePlace(3.0, 4.0, elsewhere=0.8)  # the other is as good but for 0.1: too little
+    once = wander(AtlasLocalizer(twins(), SearchParams(searches=2), west, world), world, edges=40)
+    assert once[-1].state == SEARCHING  # each meetpoint is a new place
+    nothing = OnePlace(3.0, 4.0, elsewhere=0.3, here=0.5)
+    given_up = wander(AtlasLocalizer(twins(), SearchParams(searches=2), west, nothing), nothing, edges=40)
+    assert given_up[-1].state == LOST and given_up[-1].depth < 10
+
+
+def test_the_procedure_of_the_document_follows_no_poses() -> None:
+    world = OnePlace(3.0, 4.0)
+    localizer = AtlasLocalizer(twins(), DOCUMENT, west, world)
+    assert wander(localizer, world)[-1].state == LOST and localizer.standing is None
+
+
+def followed_in_the_first_row(x: float) -> "list[Any]":
+    """As driven_in_the_first_row(), with odometry; scans say that it began at x."""
+    world = OnePlace(x, 0.0)
+    localizer = AtlasLocalizer(twins(), SearchParams(use_edge_angles=False, follow_places=2), west, world)
+    told = [localizer.start(Meetpoint(1, 0.5, scan=SCAN, odom_from_base=np.zeros(3)))]
+    for rank, length_m, degree, r_m, east_m in ((0, 6.0, 3, 1.3, 6.0), (2, 8.0, 1, 1.1, 14.0), (0, 8.0, 3, 1.3, 6.0)):
+        if told[-1].done:
+            break
+        world.odom_m = np.array([east_m, 0.0])
+        told.append(localizer.update(Traversal(rank, length_m, length_m), Meetpoint(
+            degree, r_m, scan=SCAN, odom_from_base=np.array([east_m, 0.0, 0.0]))))
+    return told
+
+
+def test_where_graph_and_scans_agree_the_place_of_the_atlas_is_told_with_the_pose_of_the_scans() -> None:
+    told = followed_in_the_first_row(0.0)
+    assert [each.state for each in told] == [TENTATIVE, CONFIRMED]
+    assert told[-1].map_from_base is not None
+    np.testing.assert_allclose(told[-1].map_from_base, [6.0, 0.0, 0.0], atol=1e-6)
+    assert len(told[-1].dart) == 1
+
+
+def test_where_graph_and_scans_contradict_each_other_the_robot_is_not_told_a_place() -> None:
+    world = OnePlace(20.0, 0.0)
+    localizer = AtlasLocalizer(twins(), SearchParams(use_edge_angles=False, follow_places=3, searches=1), west, world)
+    told = [localizer.start(Meetpoint(1, 0.5, scan=SCAN, odom_from_base=np.zeros(3)))]
+    for rank, length_m, degree, r_m, east_m in ((0, 6.0, 3, 1.3, 6.0), (2, 8.0, 1, 1.1, 14.0)):
+        world.odom_m = np.array([east_m, 0.0])
+        told.append(localizer.update(Traversal(rank, length_m, length_m), Meetpoint(
+            degree, r_m, scan=SCAN, odom_from_base=np.array([east_m, 0.0, 0.0]))))
+    assert [each.state for each in told[:2]] == [TENTATIVE] * 2
+    assert (told[-1].state, told[-1].reason) == (LOST, "graph and scans contradict each other")

@@ -98,3 +98,15 @@ def test_a_slanted_wall_is_one_segment():
     assert len(found) == 1 and lengths[0] == pytest.approx(5.0 * np.hypot(1.0, 0.37), abs=0.15)
     slope = (found[0, 3] - found[0, 1]) / (found[0, 2] - found[0, 0])
     assert slope == pytest.approx(0.37, abs=0.01)
+
+
+def test_outlines_run_around_a_piece_and_its_hole_with_the_piece_to_the_left():
+    cells = np.zeros((6, 7), bool)
+    cells[1:5, 1:6] = True
+    cells[2:4, 2:4] = False
+    around = sorted(wall_segments.outlines(cells), key=len)
+    assert [len(line) for line in around] == [8, 18]
+    def area(line):
+        x, y = line.T
+        return 0.5 * (np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+    assert [area(line) for line in around] == [-4.0, 20.0]  # counter-clockwise around the piece, clockwise the hole

@@ -1,0 +1,50 @@
+"""What simulated robots of the benchmarks wake up in: shipped buildings, random floors, maps of real ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+from glass_nav.simulation import building_file, building_map, mapped_building, random_building, shipped_buildings
+from glass_nav.simulation.building import Building
+from glass_nav.topology import atlas_builder, atlas_file, shipped_atlases
+from glass_nav.topology.atlas import Atlas
+from glass_nav.world import map_file
+from glass_nav.world.grid_map import GridMap
+
+RANDOM = "random"
+HELP = "names of shipped buildings, map_server .yaml files, or random: another floor for each seed"
+
+
+class Floor(NamedTuple):
+    """A building, and what the robot has of it."""
+    building: Building
+    grid_map: GridMap
+    atlas: Atlas
+
+
+def load(name: str, seed: int, opaque: bool) -> Floor:
+    """The floor of a name: see HELP.
+
+    Args:
+        name: of it.
+        seed: of a random one.
+        opaque: film on all glass. The walls of maps are opaque anyway.
+    """
+    if name == RANDOM:
+        building = random_building.build(seed)
+        grid_map = building_map.draw(building)
+        atlas = _built(grid_map, building.name)
+    elif name.endswith(".yaml"):
+        grid_map = map_file.load(Path(name))
+        building = mapped_building.build(grid_map, Path(name).stem)
+        atlas = _built(grid_map, building.name)
+    else:
+        building = building_file.load(shipped_buildings.find(name))
+        grid_map = building_map.draw(building)
+        atlas = atlas_file.load(shipped_atlases.find(name))
+    return Floor(building.opaque() if opaque else building, grid_map, atlas)
+
+
+def _built(grid_map: GridMap, name: str) -> Atlas:
+    return atlas_builder.build(grid_map, name, name)[0]
