@@ -49,9 +49,9 @@ class Page(HTMLParser):
 
 @pytest.mark.long_run
 def test_a_log_becomes_one_page_that_asks_no_address_for_anything(run, room_bag, room_map, tmp_path):
-    code, out, _ = run("report", room_bag(true_beams=(("/true_beams", "TrueBeams"),)).write(), "--map", room_map,
+    code, out, err = run("report", room_bag(true_beams=(("/true_beams", "TrueBeams"),)).write(), "--map", room_map,
                        "--out", tmp_path / "out", "--global")
-    assert code == 0
+    assert code == 0, err
     files = {path.name for path in (tmp_path / "out").iterdir()}
     drawn = PICTURES - {"glass.png"} | WORST | {"candidates.png", "confusion.png"}  # no wall was proved so early
     assert drawn | {"report.html", "per_scan.csv"} <= files
