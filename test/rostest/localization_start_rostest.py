@@ -153,11 +153,17 @@ class LocalizationStart(unittest.TestCase):
         self.initialpose.publish(pose_message(self.robot.map_from_base()))
         self.wait_for("LOCALIZED at the right place",
                       lambda: self.state == "LOCALIZED" and self.is_right())
+        self.wait_for("a pose of centimetres", self.is_right_after_a_stretch)
+        self.end()
+        return dict(yaml.safe_load(path.read_text()))
+
+    def is_right_after_a_stretch(self) -> bool:
+        """Drives on for a second; the filter of a busy machine, which sees few of the scans, needs some of them."""
+        self.robot.moving = True
         self.robot.make_steps(10)
         self.robot.moving = False
         self.robot.make_steps(10)
-        self.end()
-        return dict(yaml.safe_load(path.read_text()))
+        return bool(np.hypot(*(self.said() - self.robot.map_from_base())[:2]) < 0.05)
 
     def start_again(self, path: Path, *words: str) -> np.ndarray:
         """Where the next node, which has the file alone, is at first."""

@@ -236,7 +236,11 @@ def _refuse(who: str, bad: np.ndarray, given: np.ndarray, allowed: str) -> None:
 
 
 def _positive(value: np.ndarray) -> np.ndarray:
-    return np.isfinite(value) & (value > 0.0)
+    return np.isfinite(value) & (np.nan_to_num(value) > 0.0)
+
+
+def _not_negative(value: np.ndarray) -> np.ndarray:
+    return np.isfinite(value) & (np.nan_to_num(value) >= 0.0)
 
 
 def _refuse_bad_nodes(nodes: Nodes) -> None:
@@ -263,7 +267,7 @@ def _refuse_bad_edges(edges: Edges) -> None:
     _refuse("edge", ~_positive(edges.length_m), edges.length_m, "the length must be finite and > 0 m")
     _refuse("edge", ~_positive(edges.sigma_m), edges.sigma_m, "sigma must be finite and > 0 m")
     for name, value in (("chord", edges.chord_m), ("clearance", edges.clearance_m)):
-        _refuse("edge", ~(np.isfinite(value) & (value >= 0.0)), value, f"the {name} must be finite and >= 0 m")
+        _refuse("edge", ~_not_negative(value), value, f"the {name} must be finite and >= 0 m")
     at = _first(edges.chord_m > edges.length_m + CHORD_SLACK_M)
     if at >= 0:
         raise AtlasError(f"edge {at}: the chord may not be longer than the way, got chord {edges.chord_m[at]:g} m "
@@ -356,5 +360,5 @@ def _refuse_bad_visits(visits: Visits, nodes: int, edges: int) -> None:
             raise AtlasError(f"visits of {rows} {what}s need count, mean and m2 ({rows},), got {count.shape}, "
                              f"{mean.shape} and {m2.shape}")
         _refuse(f"visits of {what}", count < 0, count, "the count must be >= 0")
-        _refuse(f"visits of {what}", ~(np.isfinite(mean) & (mean >= 0.0)), mean, "the mean must be finite and >= 0 m")
-        _refuse(f"visits of {what}", ~(np.isfinite(m2) & (m2 >= 0.0)), m2, "m2 must be finite and >= 0 m^2")
+        _refuse(f"visits of {what}", ~_not_negative(mean), mean, "the mean must be finite and >= 0 m")
+        _refuse(f"visits of {what}", ~_not_negative(m2), m2, "m2 must be finite and >= 0 m^2")

@@ -106,6 +106,7 @@ def test_many_beams_count_as_independent_ones():
     assert len(baselines.chosen_beams(scan, whole._replace(max_beams=7))) == 7
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("name", baselines.LOCALIZERS)
 def test_every_localizer_follows_a_robot_through_a_room_and_repeats_itself(name):
     rng = np.random.default_rng(3)

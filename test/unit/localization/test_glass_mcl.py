@@ -145,6 +145,7 @@ class GlassDrive(Drive):
                 grid_map.occupied & (np.abs(x - 6.0) > 1.0))
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(3))
 def test_a_pane_becomes_glass_over_a_drive_and_a_wall_does_not(seed):
     drive = GlassDrive(seed)
@@ -169,6 +170,7 @@ def test_in_an_opaque_room_no_wall_becomes_glass(seed):
     assert np.count_nonzero(picture >= 0) > 100 and np.mean(picture[picture >= 0] > 30) < 0.01
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(3))
 def test_a_lidar_that_sees_no_glass_at_all_is_localized(seed):
     """No beam ever comes back from the pane: the wall that the map has there is only in the way."""
@@ -307,6 +309,7 @@ def test_where_the_map_lies_and_how_it_is_turned_does_not_matter(drive, where):
         assert way_m < 0.05 and turn_rad < np.radians(1.5)
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(4))
 def test_from_anywhere_scans_lead_to_the_right_place(seed):
     drive = Drive(seed=seed, steps=40)
@@ -522,6 +525,7 @@ def test_two_lidars_need_not_agree_on_the_order_of_their_stamps(drive):
             lambda mcl: mcl.update(seen_by(drive.scans[1], "rear", -30_000_000), drive.odometry[1]))
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(2))
 def test_two_half_blind_lidars_track_like_one_that_sees_all(seed):
     whole = Drive(seed=seed)
@@ -866,6 +870,7 @@ def test_one_absurd_scan_moves_nobody(seed):
     assert way_m.max() < 0.1 and turn_rad.max() < np.radians(5.0)
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(4))
 def test_a_robot_that_knows_nothing_finds_itself(seed):
     drive = Drive(seed=seed, steps=20)

@@ -62,6 +62,7 @@ def test_without_any_the_list_is_empty(monkeypatch):
         shipped_buildings.find("office")
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("name, kind", [*((name, "diff") for name in shipped_buildings.shipped()),
                                         ("glass_office", "omni")])
 def test_every_path_can_be_driven_also_when_all_furniture_has_moved(name, kind):
