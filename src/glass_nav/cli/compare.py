@@ -11,8 +11,9 @@ from glass_nav.cli import compare_runs, engine, replay
 from glass_nav.cli.compare_runs import Contestant, Job, Log
 from glass_nav.cli.engine import Failed
 from glass_nav.cli.progress import Progress
-from glass_nav.evaluation import comparison, comparison_page, comparison_pictures, pictures
+from glass_nav.evaluation import comparison, comparison_page, comparison_pictures, pictures, thresholds
 from glass_nav.evaluation.comparison import Comparison, Run
+from glass_nav.evaluation.thresholds import Threshold
 from glass_nav.world import map_file
 
 HELP = "runs, parameters or recorded poses side by side, with confidence over seeds"
@@ -41,6 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scheduler", metavar="ADDRESS",
                         help="run on a Dask cluster, such as tcp://10.0.0.7:8786 (needs distributed); its workers need "
                              "this package and the files under the same paths")
+    parser.add_argument("--fail-if", action="append", default=[], metavar="METRIC>LIMIT",
+                        help="exit with 1 if a contestant's mean over all logs and seeds is beyond a limit, such as "
+                             "'position_p95_m>0.3'; metrics as in runs.csv, cpu_ms_per_scan too; may be repeated")
     replay.add_log_arguments(parser)
 
 
@@ -55,6 +59,7 @@ def usage_error(arguments: argparse.Namespace) -> Optional[str]:
     try:
         running = [each.name for each in compare_runs.contestants(arguments.contestants) if each.runs]
         compare_runs.logs(arguments.log, None)
+        _limits(arguments)
     except ValueError as err:
         return str(err)
     if running and not (arguments.log or arguments.logs):
@@ -64,8 +69,11 @@ def usage_error(arguments: argparse.Namespace) -> Optional[str]:
     return replay.usage_error(given)
 
 
-def main(arguments: argparse.Namespace) -> None:
+def main(arguments: argparse.Namespace) -> bool:
     """Read, run, compare, draw, write.
+
+    Returns:
+        whether all contestants keep to the limits of --fail-if.
 
     Raises:
         ValueError, OSError: bad input; one line. Where only some runs fail the others are compared and written first.
@@ -94,6 +102,10 @@ def main(arguments: argparse.Namespace) -> None:
     if failed:
         raise ValueError(f"{len(failed)} of {len(failed) + len(made)} runs could not be made, see above; the others "
                          "are compared")
+    missed = comparison.failures(compared, _limits(arguments))
+    for line in missed:
+        _say(line)
+    return not missed
 
 
 def _run(jobs: List[Job], logs: List[Log], arguments: argparse.Namespace) -> "Tuple[List[Run], List[Failed]]":
@@ -157,6 +169,10 @@ def table(compared: Comparison) -> str:
     widths = [max(map(len, column)) for column in zip(*rows)]
     lines = ["  ".join(f"{cell:<{width}s}" for cell, width in zip(row, widths)).rstrip() for row in rows]
     return "\n".join([f"{comparison.counted(compared)}; mean ± 95 % interval over seeds", *lines])
+
+
+def _limits(arguments: argparse.Namespace) -> List[Threshold]:
+    return [thresholds.parse(text, list(comparison.BY_NAME)) for text in arguments.fail_if]
 
 
 def _say(text: str) -> None:

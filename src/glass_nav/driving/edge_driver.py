@@ -427,6 +427,8 @@ class EdgeDriver:
                 self._fail(NO_GRAPH, f"{why}, also after looking around")
             else:
                 self._swept, self._sweep_rad, self._lost_since_ns = True, 2.0 * math.pi, 0
+                if self._phase == SEEKING:  # any other edge will do
+                    self._way = None
 
     # -- homing
 

@@ -18,6 +18,7 @@ from glass_nav.evaluation import confidence, pose_errors, replay_result
 from glass_nav.evaluation.confidence import Interval
 from glass_nav.evaluation.pose_errors import PoseErrors
 from glass_nav.evaluation.replay_result import ReplayResult
+from glass_nav.evaluation.thresholds import Threshold
 from glass_nav.geometry.trajectory import Trajectory
 
 
@@ -234,6 +235,25 @@ def difference_text(comparison: Comparison, contestant: str, figure: Figure, log
         return ""
     difference = comparison.difference(contestant, figure, log)
     return f"{text(figure, difference, signed=True)} {judged(figure, difference)}".rstrip()
+
+
+def failures(comparison: Comparison, limits: Sequence[Threshold]) -> List[str]:
+    """A line on each contestant and limit that its mean over all logs and seeds misses.
+
+    Raises:
+        ValueError: no contestant has such a figure: the comparison can neither fail nor pass.
+    """
+    found: List[str] = []
+    for limit in limits:
+        figure = BY_NAME[limit.metric]
+        means = {name: interval.mean for name in comparison.contestants
+                 if (interval := comparison.interval(name, figure)) is not None}
+        if not means:
+            raise ValueError(f"--fail-if {limit}: no contestant has {limit.metric}; the logs have no ground truth or "
+                             "no true cases for it, or there is nothing to compare with")
+        found += [f"{limit.metric} of {name} is {mean:.4g}: failed by --fail-if {limit}"
+                  for name, mean in means.items() if limit.is_missed_by(mean)]
+    return found
 
 
 def counted(comparison: Comparison) -> str:

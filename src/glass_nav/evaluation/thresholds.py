@@ -7,7 +7,7 @@ import operator
 import re
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Any, Callable, Dict, Mapping, Optional
+from typing import Any, Callable, Dict, Mapping, Optional, Sequence
 
 COMPARISONS: "Dict[str, Callable[[float, float], bool]]" = {
     ">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt}
@@ -33,6 +33,10 @@ class Threshold:
     def __str__(self) -> str:
         return f"{self.metric} {self.comparison} {self.limit:g}"
 
+    def is_missed_by(self, value: float) -> bool:
+        """Whether such a figure fails the run."""
+        return COMPARISONS[self.comparison](value, self.limit)
+
     def failure(self, metrics: Mapping[str, Any]) -> Optional[str]:
         """The line on a run that fails; None for one that does not.
 
@@ -46,16 +50,20 @@ class Threshold:
         if value is None:
             raise ValueError(f"--fail-if {self}: this log gives no {self.metric}; it has no ground truth or no true "
                              "cases for it, or --topology was not given")
-        if not COMPARISONS[self.comparison](value, self.limit):
+        if not self.is_missed_by(value):
             return None
         return f"{self.metric} is {value:.4g}: failed by --fail-if {self}"
 
 
-def parse(text: str) -> Threshold:
+def parse(text: str, known: Sequence[str] = KNOWN) -> Threshold:
     """`metric>limit`, with >, <, >= or <=.
 
+    Args:
+        text: as given.
+        known: the metrics that there may be.
+
     Raises:
-        ValueError: another form, or a metric that no run has; one line that lists what there is.
+        ValueError: another form, or a metric that is not known; one line that lists what there is.
     """
     match = re.match(r"^\s*([\w.]+)\s*(>=|<=|>|<)\s*(\S+)\s*$", text)
     limit = math.nan
@@ -68,10 +76,10 @@ def parse(text: str) -> Threshold:
         raise ValueError(f"--fail-if must be METRIC, one of {' '.join(COMPARISONS)}, and a number, such as "
                          f"position_p95_m>0.3, got {text!r}")
     metric = match.group(1)
-    if metric not in KNOWN:
-        near = get_close_matches(metric, KNOWN, n=1)
+    if metric not in known:
+        near = get_close_matches(metric, known, n=1)
         hint = f"; did you mean {near[0]}?" if near else ""
-        raise ValueError(f"--fail-if: unknown metric {metric!r}{hint} Known: {', '.join(KNOWN)}")
+        raise ValueError(f"--fail-if: unknown metric {metric!r}{hint} Known: {', '.join(known)}")
     return Threshold(metric, match.group(2), limit)
 
 

@@ -29,6 +29,7 @@ _MOST_THICK_M = 0.3  # a thicker wall is no glass
 _SLIDES_M, _SLIDES_RAD = 0.5, np.radians(15.0)  # a pose that would slide further stays where it was said to be
 _AT_ONCE = 64       # poses
 _LEAST_BEAMS = 10
+_LEAST_TOLD = 0.25  # of the beams that came back; where the map knows less of them it cannot judge
 
 
 class ScanExplanation:
@@ -51,7 +52,7 @@ class ScanExplanation:
             map_from_base: (C, 3) poses.
 
         Returns:
-            (C,) shares in [0, 1]; NaN if hardly any beam did.
+            (C,) shares in [0, 1]; NaN if too few did.
         """
         return self.fitted(scan, map_from_base, _SLIDES_M, _SLIDES_RAD)[1]
 
@@ -103,7 +104,8 @@ class ScanExplanation:
         ends_m = np.stack([se2.transform_points(pose, points_m) for pose in poses])
         told = explained | (hits.first_m < measured) | ~self._is_unknown(ends_m)
         count = told.sum(axis=1)
-        return np.where(count < _LEAST_BEAMS, np.nan, explained.sum(axis=1) / np.maximum(count, 1))
+        few = count < max(_LEAST_BEAMS, _LEAST_TOLD * len(beams))
+        return np.where(few, np.nan, explained.sum(axis=1) / np.maximum(count, 1))
 
     def _is_unknown(self, points_m: np.ndarray) -> np.ndarray:
         """(...) bool: the map knows nothing of points (..., 2), or of what is next to them."""

@@ -120,7 +120,7 @@ class FollowedPoses:
 
     def _take(self, scan: Scan, odom_from_base: np.ndarray, way_m: float) -> None:
         off_m = _OFF_M + _OFF_SHARE * way_m
-        moved, shares = self._scans.fitted(scan, self._poses, off_m, _OFF_RAD)
+        moved, shares = self._fitted(scan, self._poses, off_m, _OFF_RAD)
         new, new_shares = self._proposed(scan)
         if not len(new):  # it tells nothing
             self._now = np.full(len(self._poses), np.nan)
@@ -133,6 +133,11 @@ class FollowedPoses:
             history = np.column_stack([history, shares])
         self._keep_distinct(poses, history, shares)
 
+    def _fitted(self, scan: Scan, poses: np.ndarray, most_m: float, most_rad: float) -> Tuple[np.ndarray, np.ndarray]:
+        """As of MapScans; where the map cannot judge, it explains nothing."""
+        poses, shares = self._scans.fitted(scan, poses, most_m, most_rad)
+        return poses, np.nan_to_num(shares)
+
     def _is_new_place(self, odom_from_base: np.ndarray) -> bool:
         for place in self._places:
             off = odom_from_base[:2] - place.odom_from_base[:2]
@@ -143,7 +148,7 @@ class FollowedPoses:
     def _proposed(self, scan: Scan) -> Tuple[np.ndarray, np.ndarray]:
         """(N, 3) poses and (N,) shares: from where the map explains most of this scan."""
         tried, most = (_PROPOSED, _NEW) if self._places else (_PROPOSED_FIRST, _FIRST)
-        poses, shares = self._scans.fitted(scan, self._scans.places(scan, tried), _SLIDES_M, _SLIDES_RAD)
+        poses, shares = self._fitted(scan, self._scans.places(scan, tried), _SLIDES_M, _SLIDES_RAD)
         order = np.argsort(-shares, kind="stable")
         order = order[_first_of_each_cell(poses[order])][:most]
         return poses[order], shares[order]
@@ -168,7 +173,7 @@ class FollowedPoses:
             place = self._places[number]
             back = se2.compose(back, se2.compose(se2.inverse(here), place.odom_from_base))
             off_m = _OFF_M + _OFF_SHARE * (way_m - place.way_m)
-            back, history[orphans, number] = self._scans.fitted(place.scan, back, off_m, _OFF_RAD)
+            back, history[orphans, number] = self._fitted(place.scan, back, off_m, _OFF_RAD)
             here, way_m = place.odom_from_base, place.way_m
         return history
 

@@ -47,6 +47,24 @@ def test_any_number_of_jobs_gives_the_same_answer_bit_for_bit(run, room_bag, roo
     assert page.document.count("<img ") == 3
 
 
+@pytest.mark.parametrize("limits, code, told", [
+    (["position_p95_m>0.4", "position_mean_m>0.25"], 0, None),
+    (["position_p95_m>0.4", "position_mean_m>0.15"], 1,
+     "glass_nav compare: position_mean_m of amcl is 0.2: failed by --fail-if position_mean_m > 0.15\n"),
+    (["case_accuracy<0.9"], 3, "glass_nav compare: --fail-if case_accuracy < 0.9: no contestant has case_accuracy; "),
+    (["lost_shar>0"], 2, "glass_nav compare: --fail-if: unknown metric 'lost_shar'; did you mean lost_share?"),
+    (["position_mean_m"], 2, "glass_nav compare: --fail-if must be METRIC, one of >= <= > <, and a number, ")])
+def test_a_limit_makes_the_exit_code(run, room_bag, room_map, tmp_path, limits, code, told):
+    """Poses at the scans 5, 10 and 15, wrong by 0.1, 0.2 and 0.3 m."""
+    path = room_bag(amcl_error_m=0.1).write()
+    options = [option for limit in limits for option in ("--fail-if", limit)]
+    found, _, err = run("compare", "amcl=topic:/amcl_pose", "--log", f"{path}={room_map}", "--out", tmp_path / "out",
+                        *options)
+    assert found == code
+    assert told is None or told in err
+    assert ("failed by" in err) == (code == 1)
+
+
 def test_what_another_localization_left_in_the_bag_is_measured_as_ours_is(run, room_bag, room_map, tmp_path):
     """Its poses come at the scans 5, 10 and 15, wrong by 0.1, 0.2 and 0.3 m; odometry is exact."""
     path = room_bag(amcl_error_m=0.1).write()

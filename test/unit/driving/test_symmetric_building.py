@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Optional
 
 import numpy as np
@@ -55,22 +56,26 @@ def test_a_robot_in_a_cross_of_four_equal_arms_is_ambiguous_and_lists_the_four_p
     atlas, _ = atlas_builder.build(grid_map, "cross", "cross")
     simulation = Simulation(building, lidar.preset("sensitive"), seed=3)
     driver, limits = EdgeDriver(), BaseLimits()
-    localizer = AtlasLocalizer(atlas, SearchParams(), ScanExplanation(grid_map).shares)
+    explanation = ScanExplanation(grid_map)
+    localizer = AtlasLocalizer(atlas, SearchParams(), explanation.shares, explanation)
     rank: Optional[int] = None
     for _ in range(20):
         task = EdgeTask(driver, RecoveryParams(), limits, rank)
         drive(simulation, driver, task)
         arrival = task.arrival
         assert arrival is not None
+        meetpoint = replace(arrival.meetpoint, odom_from_base=arrival.odom_from_base)
         if arrival.traversal is None:
-            estimate = localizer.start(arrival.meetpoint)
+            estimate = localizer.start(meetpoint)
         else:
-            estimate = localizer.update(arrival.traversal, arrival.meetpoint)
+            estimate = localizer.update(arrival.traversal, meetpoint)
         if estimate.choice is None:
             break
         rank = estimate.choice.rank
     assert estimate.state == AMBIGUOUS, estimate.reason
     assert "4 places fit that no turn can tell apart" in estimate.reason
+    standing = localizer.standing
+    assert standing is not None and standing.places >= 4 and standing.lead < 0.05  # nor do the scans
     poses = localizer.map_from_base(estimate.dart)
     off = np.hypot(*(poses[:, :2] - simulation.map_from_base[:2]).T)
     turned = np.sort(np.mod(poses[:, 2] - poses[off.argmin(), 2] + 0.1, 2.0 * np.pi) - 0.1)

@@ -100,3 +100,34 @@ def test_where_the_map_knows_nothing_beams_are_no_evidence_but_through_a_wall_th
     assert ScanExplanation(grid).shares(ahead, truth[None])[0] > 0.9
     nothing = GridMap(np.full_like(grid.occupancy, UNKNOWN), grid.resolution_m, grid.map_from_grid)
     assert np.isnan(ScanExplanation(nothing).shares(ahead, truth[None])).all()
+
+
+def test_where_nothing_is_known_the_truth_is_among_the_places_proposed_and_explains_most():
+    building, explanation = office()
+    for number, truth in enumerate(PLACES):
+        scan = scan_at(building, truth, 20 + number)
+        places = explanation.places(scan, 200)
+        assert places.shape == (200, 3)
+        poses, shares = explanation.fitted(scan, places, 0.5, np.radians(15.0))
+        best = poses[shares.argmax()] - truth
+        assert np.hypot(*best[:2]) < 0.1 and abs(np.sin(best[2])) < 0.03
+        np.testing.assert_array_equal(explanation.shares(scan, places), shares)
+
+
+def test_a_pose_slides_no_further_than_is_allowed():
+    building, explanation = office()
+    scan = scan_at(building, PLACES[0], 5)
+    near = se2.compose(PLACES[0], np.array([0.12, -0.1, np.radians(4.0)]))[None]
+    slid, share = explanation.fitted(scan, near, 0.3, np.radians(10.0))
+    assert np.hypot(*(slid[0] - PLACES[0])[:2]) < 0.03
+    for most_m, most_rad in ((0.05, 1.0), (0.3, np.radians(1.0))):
+        kept, less = explanation.fitted(scan, near, most_m, most_rad)
+        np.testing.assert_array_equal(kept, near)
+        assert less[0] < share[0]
+
+
+def test_a_scan_in_which_hardly_a_beam_came_back_proposes_nothing_and_moves_nothing():
+    _, explanation = office()
+    nothing = Scan(0, np.full(60, np.inf), np.linspace(-2.0, 2.0, 60), 0.1, 25.0, LASER)
+    assert explanation.places(nothing, 10).shape == (0, 3)
+    np.testing.assert_array_equal(explanation.fitted(nothing, PLACES, 0.5, 0.5)[0], PLACES)

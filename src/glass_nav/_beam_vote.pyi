@@ -1,0 +1,4 @@
+# For mypy: the vote of cases, compiled from cpp/; its typed face is localization/beam_cases.py.
+from typing import Any
+
+def __getattr__(name: str) -> Any: ...
