@@ -10,7 +10,7 @@ is known to a decimetre or so.
 
 from __future__ import annotations
 
-from typing import List, Optional, Tuple
+from typing import Optional, Tuple
 
 import numpy as np
 from scipy import ndimage
