@@ -26,21 +26,21 @@ from glass_nav.topology import atlas_builder, atlas_file, shipped_atlases
 from glass_nav.topology.atlas import RING_MARKER, Atlas
 from glass_nav.world.grid_map import GridMap
 
-BUILD = "build"  # as the name of an atlas: made from the map
+FROM_MAP = "map"  # as the name of an atlas: made from the map
 
 
 def atlas_of(given: str, map_path: Path, grid_map: GridMap) -> Atlas:
     """The atlas of --topology.
 
     Args:
-        given: file, folder or name of an atlas; BUILD: made of the map.
+        given: file, folder or name of an atlas; FROM_MAP: made of the map.
         map_path: where the map is from.
         grid_map: the map.
 
     Raises:
         AtlasError: no such atlas, or one of another map.
     """
-    if given == BUILD:
+    if given == FROM_MAP:
         return atlas_builder.build(grid_map, map_name(map_path), map_name(map_path))[0]
     atlas = atlas_file.load(shipped_atlases.find(given))
     atlas.refuse_other_map(grid_map.fingerprint, str(map_path))

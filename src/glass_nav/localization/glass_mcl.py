@@ -21,6 +21,7 @@ from glass_nav.localization.glass_map import GlassMap
 from glass_nav.localization.glass_mcl_params import GlassMclParams
 from glass_nav.localization.global_search import GlobalSearch
 from glass_nav.localization.lost_watch import LostWatch
+from glass_nav.localization.preliminary_samples import PreliminarySamples
 from glass_nav.localization.range_residuals import RangeResiduals
 from glass_nav.localization.reference_ranges import LEAST_COS, ReferenceRanges
 from glass_nav.localization.scan_alignment import Alignment
@@ -41,6 +42,7 @@ _LEAST_ENDS = 20       # of beams of known case that a pose is refined by
 _NATS_OF_A_FULL_FIT = 20.0  # of log weight between a scan that fits nowhere and one that fits everywhere
 _FOUND = np.array([0.1, 0.1, 0.05])  # deviations [m, m, rad] of a place that was found among all others
 _SHOWN = 500           # candidates drawn for particlecloud
+_FEWER = 3             # times fewer samples vote on a scan that moves no particle
 _REACH = 3.5           # deviations of a given pose that are searched, where it is given vaguely
 
 
@@ -228,7 +230,7 @@ class GlassMcl:
         odom_from_base = self._checked(scan, odom_from_base)
         if not self._is_due(scan.lidar, odom_from_base):
             map_from_base = se2.compose(self._map_from_odom, odom_from_base)
-            cases, references = self._vote(scan, map_from_base, self._best.covariance)
+            cases, references = self._vote(scan, map_from_base, self._best.covariance, self._few_samples())
             return self._estimate(scan, odom_from_base, cases, references)
         if self._search is not None:
             cases = self._seek(scan, odom_from_base)
@@ -396,10 +398,17 @@ class GlassMcl:
         step = se2.compose(se2.inverse(self._odom_from_base), odom_from_base)
         return motion.sample(self._particles, step, self._params.odometry, self._rng)
 
-    def _vote(self, scan: Scan, map_from_base: np.ndarray,
-              covariance: np.ndarray) -> Tuple[BeamCases, ReferenceRanges]:
-        """Cases of all beams, by preliminary samples around a pose."""
-        samples = preliminary_samples.around(map_from_base, covariance, self._params.samples)
+    def _few_samples(self) -> PreliminarySamples:
+        """For a vote that no particle is weighed by, and nothing is learnt from."""
+        samples = self._params.samples
+        if self._params.vote.vote_mode == "paper":
+            return samples
+        return replace(samples, sample_count=-(-samples.sample_count // _FEWER))
+
+    def _vote(self, scan: Scan, map_from_base: np.ndarray, covariance: np.ndarray,
+              shape: Optional[PreliminarySamples] = None) -> Tuple[BeamCases, ReferenceRanges]:
+        """Cases of all beams, by preliminary samples around a pose; of another shape than the parameters say."""
+        samples = preliminary_samples.around(map_from_base, covariance, shape or self._params.samples)
         behind_m = max(beam_cases.reach_m(self._residuals, self._params.vote), glass_map.reach_m(self._residuals))
         references = self._references(scan, samples, behind_m)
         glass = self._glass_map.chances(references.cell[[0, 2], 0])

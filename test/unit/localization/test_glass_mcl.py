@@ -273,6 +273,22 @@ def test_a_scan_between_updates_is_cut_too():
     assert np.mean(again.surface_scan.cut == last.surface_scan.cut) > 0.97 and again.surface_scan.cut.any()
 
 
+@pytest.mark.parametrize("vote_mode", ["soft", "paper"])
+def test_between_updates_beams_are_told_apart_as_in_one(vote_mode):
+    """The same scans from where the robot stands, once with an update and once between updates."""
+    drive = Drive(GLASS_ROOM, glass_share=0.5)
+    mcl = started(GLASS_ROOM, at=drive.true[0], vote_mode=vote_mode)
+    told = []
+    for scan, odom in zip(drive.scans, drive.odometry):
+        at_update, between = (mcl.update(replace(scan, stamp_ns=scan.stamp_ns + later_ns), odom)
+                              for later_ns in (0, 1000))
+        assert at_update.updated and not between.updated
+        told.append((at_update.cases.case, between.cases.case))
+    at_update, between = np.array(told).transpose(1, 0, 2)
+    assert np.mean(at_update == between) > 0.99
+    assert np.count_nonzero(between >= 3) > 50
+
+
 def test_in_an_opaque_room_no_beam_is_said_to_pass(drive):
     cases = np.concatenate([estimate.cases.case for estimate in drive.through(started())])
     assert np.mean(cases == 1) > 0.99
