@@ -4,7 +4,8 @@
 The parts are those of the nodes: the edge driver with its recovery, the search in the atlas, the filter. A robot is put
 at a random place of a building, seeks a meetpoint, and drives as the votes say until the search is over; then it hands
 its pose over to the filter and drives to nodes of the atlas. Right: CONFIRMED within 0.5 m and 20 degrees of the truth;
-wrong: CONFIRMED elsewhere. A collision is a control step in which the base stood at an obstacle.
+wrong: CONFIRMED elsewhere, or told any place with --believed another building. A collision is a control step in which
+the base stood at an obstacle.
 
     test/benchmark/wake_up.py --opaque --seeds 14        # film on all glass; all buildings, or --buildings A B
     test/benchmark/wake_up.py --lidars sensitive weak coated --jobs 2
@@ -42,7 +43,7 @@ from glass_nav.localization.glass_mcl_params import GlassMclParams
 from glass_nav.localization.scan_explanation import ScanExplanation
 from glass_nav.simulation import lidar, shipped_buildings, start_place
 from glass_nav.simulation.simulation import Frame, Simulation
-from glass_nav.topology.atlas_localizer import CONFIRMED, AtlasLocalizer, Estimate, SearchParams
+from glass_nav.topology.atlas_localizer import AMBIGUOUS, CONFIRMED, AtlasLocalizer, Estimate, SearchParams
 
 CONTROL_S = 0.05
 SEARCH_S, LEG_S = 900.0, 120.0   # simulated, at most
@@ -61,6 +62,8 @@ class Job(NamedTuple):
     seed: int
     judge: bool  # candidates by the scans
     follow: bool  # poses by the scans, too
+    tour: bool
+    believed: str  # building whose map and atlas the robot is given
     verbose: bool
 
 
@@ -69,6 +72,9 @@ class Trial:
 
     def __init__(self, job: Job) -> None:
         building, self.grid_map, self.atlas = floors.load(job.building, job.seed, job.opaque)
+        self.elsewhere = job.believed != job.building
+        if self.elsewhere:
+            _, self.grid_map, self.atlas = floors.load(job.believed, job.seed, job.opaque)
         start = start_place.random_place(building, np.random.default_rng([job.seed, 1]))
         self.simulation = Simulation(building, lidar.preset(job.lidar), seed=job.seed, start=start)
         self.limits = BaseLimits()
@@ -174,6 +180,8 @@ class Trial:
 
     def _errors(self, estimate: Optional[Estimate]) -> Dict[str, Any]:
         truth = self.simulation.map_from_base
+        if self.elsewhere and estimate is not None and estimate.state in (CONFIRMED, AMBIGUOUS):
+            return {"right": False, "wrong": True, "error_m": math.nan}
         if estimate is None or estimate.state != CONFIRMED:
             return {"right": False, "wrong": False, "error_m": math.nan}
         pose = self.localizer.poses(estimate)[0]
@@ -223,7 +231,7 @@ def run(job: Job) -> Dict[str, Any]:
     began = time.process_time()
     trial = Trial(job)
     found = trial.search()
-    if found["right"]:
+    if found["right"] and job.tour:
         found.update(trial.tour())
     return {**job._asdict(), **found, "collisions": trial.collisions, "cpu_s": time.process_time() - began,
             "all_s": trial.now_s}
@@ -242,9 +250,9 @@ def line(name: str, runs: List[Dict[str, Any]]) -> str:
     """One row of the table."""
     right = [each for each in runs if each["right"]]
     states = [each["state"] for each in runs if not each["right"]]
-    legs = [leg for each in right for leg in each["legs"]]
+    legs = [leg for each in right for leg in each.get("legs", [])]
     def mean(key: str) -> str:
-        known = [each[key] for each in right if not math.isnan(each[key])]  # a small part of a floor has no goals
+        known = [each[key] for each in right if not math.isnan(each.get(key, math.nan))]  # small parts have no goals
         return f"{np.mean(known):.3f}" if known else "-"
     return (f"| {name} | {len(runs)} | {len(right)} | {sum(each['wrong'] for each in runs)} | "
             f"{', '.join(f'{states.count(state)} {state}' for state in sorted(set(states))) or '-'} | "
@@ -265,11 +273,14 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--no-scans", action="store_true", help="candidates are not judged by scans")
     parser.add_argument("--graph-only", action="store_true", help="no poses are followed by the scans")
+    parser.add_argument("--believed", choices=list(shipped_buildings.shipped()), metavar="BUILDING",
+                        help="give all robots the map and atlas of this one: whoever is elsewhere is to be LOST")
+    parser.add_argument("--no-tour", action="store_true", help="a robot that is found drives no tour")
     parser.add_argument("--verbose", action="store_true", help="tell each step")
     parser.add_argument("--out", type=Path, help="file for all figures, json")
     arguments = parser.parse_args()
     jobs = [Job(building, name, arguments.opaque, seed, not arguments.no_scans, not arguments.graph_only,
-                arguments.verbose)
+                not arguments.no_tour, arguments.believed or building, arguments.verbose)
             for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
             for building in arguments.buildings for name in arguments.lidars]
     runs: List[Dict[str, Any]] = []

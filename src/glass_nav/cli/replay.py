@@ -46,11 +46,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--bag", type=Path, metavar="BAG",
                         help="also write a bag for rviz and PlotJuggler: map, tf, scans, poses, particles, status, "
                              "cases, cloud and glass map, on the topics of the node")
-    parser.add_argument("--topology", metavar="ATLAS",
+    parser.add_argument("--topology", nargs="?", const=replay_topology.FROM_MAP, metavar="ATLAS",
                         help="also tell which nodes of an atlas the robot passed, and which of them it saw with lidar "
                              "and odometry alone, as the driver does: a table, topology.csv and topology.png; an atlas "
                              f"file, its folder, a shipped one's name, or {replay_topology.FROM_MAP}: made from "
-                             "the map")
+                             "the map, as without a value at the end of the line")
     parser.add_argument("--fail-if", action="append", default=[], metavar="METRIC>LIMIT",
                         help="exit with 1 if a figure of metrics.json is beyond a limit, such as 'position_p95_m>0.3'; "
                              "may be repeated")

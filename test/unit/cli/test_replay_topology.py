@@ -51,7 +51,7 @@ def run(drive, tmp_path, capsys):
 
 @pytest.mark.long_run
 def test_a_meetpoint_on_the_way_is_seen_and_told(run, tmp_path):
-    code, out, _ = run("--topology", "map")
+    code, out, _ = run("--topology")
     assert code == 0
     figures = json.loads((tmp_path / "out" / "metrics.json").read_text())["topology"]
     assert (figures["passed"], figures["seen"], figures["invented"], figures["degree_right"]) == (1, 1, 0, 1)
