@@ -42,7 +42,7 @@ _LEAST_ENDS = 20       # of beams of known case that a pose is refined by
 _NATS_OF_A_FULL_FIT = 20.0  # of log weight between a scan that fits nowhere and one that fits everywhere
 _FOUND = np.array([0.1, 0.1, 0.05])  # deviations [m, m, rad] of a place that was found among all others
 _SHOWN = 500           # candidates drawn for particlecloud
-_FEWER = 3             # times fewer samples vote on a scan that moves no particle
+_FEWER = 2             # times fewer samples vote on a scan that moves no particle
 _REACH = 3.5           # deviations of a given pose that are searched, where it is given vaguely
 
 
