@@ -14,9 +14,9 @@ from typing import List, Optional, Set, Tuple
 
 import numpy as np
 
+from glass_nav.geometry import angles
 from glass_nav.topology import ambiguity, vote
 from glass_nav.topology.atlas import Atlas, Visits
-from glass_nav.geometry import angles
 from glass_nav.topology.edge_segments import SegmentTest
 from glass_nav.topology.followed_poses import MOST_LEAD, FollowedPoses, MapScans, Standing
 from glass_nav.topology.matching import Explained, Matcher, Tolerances, poses_at
