@@ -64,6 +64,7 @@ class Job(NamedTuple):
     follow: bool  # poses by the scans, too
     tour: bool
     believed: str  # building whose map and atlas the robot is given
+    anywhere: bool  # also behind gaps that no robot gets through
     verbose: bool
 
 
@@ -75,7 +76,8 @@ class Trial:
         self.elsewhere = job.believed != job.building
         if self.elsewhere:
             _, self.grid_map, self.atlas = floors.load(job.believed, job.seed, job.opaque)
-        start = start_place.random_place(building, np.random.default_rng([job.seed, 1]))
+        passage_m = 0.0 if job.anywhere else start_place.PASSAGE_M
+        start = start_place.random_place(building, np.random.default_rng([job.seed, 1]), passage_m)
         self.simulation = Simulation(building, lidar.preset(job.lidar), seed=job.seed, start=start)
         self.limits = BaseLimits()
         self.driver = EdgeDriver(EdgeDriverParams(limits=self.limits))
@@ -275,12 +277,14 @@ def main() -> None:
     parser.add_argument("--graph-only", action="store_true", help="no poses are followed by the scans")
     parser.add_argument("--believed", choices=list(shipped_buildings.shipped()), metavar="BUILDING",
                         help="give all robots the map and atlas of this one: whoever is elsewhere is to be LOST")
+    parser.add_argument("--anywhere", action="store_true",
+                        help="robots begin in any part of a floor, not only in the one that its own start is in")
     parser.add_argument("--no-tour", action="store_true", help="a robot that is found drives no tour")
     parser.add_argument("--verbose", action="store_true", help="tell each step")
     parser.add_argument("--out", type=Path, help="file for all figures, json")
     arguments = parser.parse_args()
     jobs = [Job(building, name, arguments.opaque, seed, not arguments.no_scans, not arguments.graph_only,
-                not arguments.no_tour, arguments.believed or building, arguments.verbose)
+                not arguments.no_tour, arguments.believed or building, arguments.anywhere, arguments.verbose)
             for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
             for building in arguments.buildings for name in arguments.lidars]
     runs: List[Dict[str, Any]] = []

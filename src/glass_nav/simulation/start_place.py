@@ -42,11 +42,20 @@ def start(words: str, building: Building, seed: int) -> Optional[np.ndarray]:
     return pose
 
 
-def random_place(building: Building, rng: np.random.Generator) -> np.ndarray:
-    """(3,) map_from_base with room to every surface, where a robot can come from the building's own start."""
+def random_place(building: Building, rng: np.random.Generator, passage_m: float = PASSAGE_M) -> np.ndarray:
+    """(3,) map_from_base with room to every surface, where a robot can come from the building's own start.
+
+    Args:
+        building: as it is now.
+        rng: draws the place.
+        passage_m: from the middle of the narrowest gap on the way there to its walls; 0: through every gap.
+
+    Raises:
+        ValueError: no room anywhere.
+    """
     grid = building_map.draw(building)
     room_m = ndimage.distance_transform_edt(np.pad(grid.free, 1))[1:-1, 1:-1] * grid.resolution_m
-    parts, _ = ndimage.label(room_m >= PASSAGE_M, np.ones((3, 3), bool))
+    parts, _ = ndimage.label(grid.free & (room_m >= passage_m), np.ones((3, 3), bool))
     nearest = ndimage.distance_transform_edt(parts == 0, return_distances=False, return_indices=True)
     row, column = nearest[(slice(None), *grid.cells(building.start[:2]))]
     rows, columns = np.nonzero((parts == parts[row, column]) & (room_m >= ROOM_M))

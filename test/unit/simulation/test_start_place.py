@@ -35,6 +35,7 @@ def test_it_is_not_behind_a_gap_that_no_robot_gets_through():
              Wall(np.array([[4.0, 0.0], [4.0, 3.3]])))
     two = Building(walls, start=np.array([0.2, 1.0, 0.0]))  # at the wall, where it can stand though not turn well
     assert max(start_place.start("random", two, seed)[0] for seed in range(20)) < 4.0
+    assert max(start_place.random_place(two, np.random.default_rng(seed), 0.0)[0] for seed in range(20)) > 4.0
 
 
 def test_a_place_is_taken_as_it_is_given():
