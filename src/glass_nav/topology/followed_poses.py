@@ -193,5 +193,7 @@ def _same_place(poses: np.ndarray, pose: np.ndarray) -> np.ndarray:
 
 def _first_of_each_cell(poses: np.ndarray) -> np.ndarray:
     """Ascending indices of the poses (K, 3) that are the first in their cell of _SAME_CELL; yaw goes round."""
+    if not len(poses):  # which numpy 1.17 cannot
+        return np.zeros(0, np.int64)
     cells = np.round(np.column_stack([poses[:, :2], angles.wrap(poses[:, 2])]) / _SAME_CELL).astype(np.int64)
     return np.sort(np.unique(cells, axis=0, return_index=True)[1])
