@@ -6,13 +6,17 @@ from pathlib import Path
 import pytest
 
 from glass_nav.cli import main as cli
+from glass_nav.cli import progress
 
 sys.path.append(str(Path(__file__).parent))
 
 
 @pytest.fixture
-def run(tmp_path, capsys):
-    """run(command, option, ...): exit code, stdout, stderr, without the path of the folder."""
+def run(tmp_path, capsys, monkeypatch):
+    """run(command, option, ...): exit code, stdout, stderr, without the path of the folder. However slow the machine is,
+    no progress is told before the end."""
+    monkeypatch.setattr(progress, "LINE_PERIOD_S", 3600.0)
+
     def command(*options):
         code = cli.main([str(option) for option in options])
         captured = capsys.readouterr()
