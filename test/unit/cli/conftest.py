@@ -13,9 +13,8 @@ sys.path.append(str(Path(__file__).parent))
 
 @pytest.fixture
 def run(tmp_path, capsys, monkeypatch):
-    """run(command, option, ...): exit code, stdout, stderr, without the path of the folder. However slow the machine is,
-    no progress is told before the end."""
-    monkeypatch.setattr(progress, "LINE_PERIOD_S", 3600.0)
+    """run(command, option, ...): exit code, stdout, stderr, without the path of the folder."""
+    monkeypatch.setattr(progress, "LINE_PERIOD_S", 3600.0)  # however slow the machine is, nothing is told on the way
 
     def command(*options):
         code = cli.main([str(option) for option in options])

@@ -335,7 +335,7 @@ def test_out_of_a_dead_end_that_narrows_it_comes_as_it_went_in(seed):
     drive.driver.leave(rank_towards(arrival, drive, atlas.darts.bearing_rad[inward]))
     end = drive.arrival()
     assert end.meetpoint.degree == 1
-    assert np.hypot(*(drive.where(end) - atlas.nodes.position_m[NARROW_END])) < 0.6  # there is no sharp end
+    assert np.hypot(*(drive.where(end) - atlas.nodes.position_m[NARROW_END])) < 0.6
     drive.driver.leave(0)
     back = drive.arrival()
     assert node_at(atlas, drive, back)[0] == node and back.meetpoint.degree == 3
