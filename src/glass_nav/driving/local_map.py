@@ -130,10 +130,6 @@ class LocalMap:
         ended, passed = self._ended > 0, self._passed > self._ended
         return self.occupied() & (passed & ~ended).any(axis=0)
 
-    def frame(self) -> GridMap:
-        """The window with nothing in it: which cell is where."""
-        return self._as_map(np.zeros((self._size, self._size), np.int8))
-
     def walls(self) -> GridMap:
         """The window as a map with what stands there; all else is free."""
         return self._as_map(np.where(self.occupied(), np.int8(OCCUPIED), np.int8(FREE)))

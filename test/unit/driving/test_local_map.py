@@ -53,7 +53,7 @@ def cells(grid, mask):
 
 def pane_cells(local, mask, y_m=PANE_Y_M, ends_out=True):
     """x (K,) of cells near the line of the pane, not where it meets the walls."""
-    found = cells(local.frame(), mask)
+    found = cells(local.walls(), mask)
     x = np.unique(np.round(found[np.abs(found[:, 1] - y_m) < 0.08, 0], 3))
     return x[(x > 0.1) & (x < 6.9)] if ends_out else x
 
@@ -74,7 +74,7 @@ def test_walls_stand_where_they_are_and_the_rest_is_free_or_unknown():
     assert (np.abs(free - [3.5, 2.5]) < [3.5, 2.5]).all()
     assert grid.is_free(np.array([[3.0, 2.0], [5.0, 3.0]])).all()
     assert (grid.occupied == local.walls().occupied).all()  # no glass here, nothing is extended
-    assert not local.glass().any() and not local.frame().occupied.any()
+    assert not local.glass().any()
     assert local.params is SMALL
 
 
@@ -84,7 +84,7 @@ def test_who_walks_through_leaves_no_wall_two_seconds_later():
     rng, local, seen = np.random.default_rng(3), LocalMap(SMALL), 0
     for index in range(38):
         local.add(scan_at(building, (2.0, 2.5, 0.0), rng, 0.1 * index), np.array([2.0, 2.5, 0.0]))
-        stands = cells(local.frame(), local.occupied())
+        stands = cells(local.walls(), local.occupied())
         inside = stands[(np.abs(stands - [3.5, 2.5]) < [3.35, 2.35]).all(axis=1)]
         y_m = 0.6 + 0.1 * index
         seen += bool(len(inside))
@@ -100,7 +100,7 @@ def test_a_pane_that_was_driven_along_stands_though_most_beams_pass_it():
     assert (scan.ranges_m[up] * np.sin(scan.angles_rad[up]) > 2.0).all()  # these went through
     assert covered(pane_cells(local, local.occupied()), 1.2, 5.0) > 0.95
     assert covered(pane_cells(local, local.glass()), 1.2, 5.0) > 0.95
-    behind = cells(local.frame(), local.occupied() & ~local.glass())
+    behind = cells(local.walls(), local.occupied() & ~local.glass())
     assert (np.abs(behind[:, 1] - 5.0) < 0.1).sum() > 40  # the wall behind the pane, seen through it
 
 
@@ -139,9 +139,9 @@ def test_where_the_robot_stood_there_is_room_for_it_whatever_a_beam_says():
     post = Building(walled(ROOM_M).walls + (Wall(box(3.0, 2.0, 0.1, 0.1), 0.02),))
     for _ in range(5):
         local.add(scan_at(post, (2.0, 2.0, 0.0), rng), np.array([2.0, 2.0, 0.0]))
-    assert (np.hypot(*(cells(local.frame(), local.occupied()) - [3.0, 2.0]).T) < 0.2).any()
+    assert (np.hypot(*(cells(local.walls(), local.occupied()) - [3.0, 2.0]).T) < 0.2).any()
     local.add(scan_at(walled(ROOM_M), (3.0, 2.0, 0.0), rng), np.array([3.0, 2.0, 0.0]))
-    stands = cells(local.frame(), local.occupied())
+    stands = cells(local.walls(), local.occupied())
     assert (np.hypot(*(stands - [3.0, 2.0]).T) > SMALL.robot_radius_m).all()
 
 
@@ -150,7 +150,7 @@ def test_what_stood_for_long_and_went_away_is_forgotten():
     rng, local, pose = np.random.default_rng(0), LocalMap(LocalMapParams(window_m=8.0, resolution_m=0.1)), (2.0, 2.5, 0)
 
     def stands():
-        found = cells(local.frame(), local.occupied())
+        found = cells(local.walls(), local.occupied())
         return int((np.hypot(*(found - [4.5, 2.5]).T) < 0.4).sum())
 
     for _ in range(200):
@@ -193,7 +193,7 @@ def test_a_beam_that_does_not_come_back_proves_free_space_so_far_and_one_that_fa
     for value, reach_m in ((np.inf, SMALL.unanswered_m), (np.nan, 0.0), (-np.inf, 0.0)):
         local = LocalMap(LocalMapParams(window_m=10.0))
         local.add(Scan(0, np.full(21, value), angles_rad, 0.1, 25.0, np.zeros(3)), np.zeros(3))
-        free = cells(local.frame(), local.grid().free)
+        free = cells(local.walls(), local.grid().free)
         furthest = max(float(free[:, 0].max()), SMALL.robot_radius_m)
         assert furthest == pytest.approx(max(reach_m, SMALL.robot_radius_m), abs=0.1)
 
@@ -202,7 +202,7 @@ def test_a_scan_of_one_beam_is_a_scan():
     local = LocalMap(SMALL)
     for _ in range(2):
         local.add(Scan(0, np.array([2.0]), np.zeros(1), 0.1, 25.0, np.zeros(3)), np.zeros(3))
-    np.testing.assert_allclose(cells(local.frame(), local.occupied()), [[2.025, 0.025]], atol=1e-9)
+    np.testing.assert_allclose(cells(local.walls(), local.occupied()), [[2.025, 0.025]], atol=1e-9)
 
 
 @pytest.mark.parametrize("fields, line", [
