@@ -49,8 +49,10 @@ def room_map(tmp_path_factory: pytest.TempPathFactory) -> Path:
     grey[bottom:, left:] = 0
     write_pgm(folder / "map.pgm", grey[::-1])
     path = folder / "map.yaml"
-    path.write_text(f"image: map.pgm\nresolution: {CELL_M}\norigin: [{-CELL_M}, {-CELL_M}, 0.0]\nnegate: 0\n"
-                    "occupied_thresh: 0.65\nfree_thresh: 0.196\n")
+    path.write_text(
+        f"image: map.pgm\nresolution: {CELL_M}\norigin: [{-CELL_M}, {-CELL_M}, 0.0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
     return path
 
 
@@ -83,20 +85,21 @@ class RoomBag:
 
     Change the fields for the fault under test; scan_fields(index, fields) may change or drop (None) scans.
     """
+
     path: Path
     scans: int = 20
     beams: int = 60
     laser: Tuple[float, float, float] = (0.1, 0.0, 0.3)  # x, y, yaw on the robot
     laser_roll: float = 0.0
-    odometry: str = "tf"          # "tf", "topic" or "none"
+    odometry: str = "tf"  # "tf", "topic" or "none"
     odom_topics: Tuple[str, ...] = ("/odom",)
     odom_child: str = "base_link"
     truth_type: str = "PoseStamped"  # or PoseWithCovarianceStamped
     ground_truth: bool = True
-    static_laser: bool = True     # on /tf_static rather than on /tf
+    static_laser: bool = True  # on /tf_static rather than on /tf
     laser_tf: bool = True
     scan_topics: Tuple[str, ...] = ("/scan",)
-    frame_prefix: str = ""        # "/" as old drivers write it
+    frame_prefix: str = ""  # "/" as old drivers write it
     compressed: bool = False
     amcl_error_m: Optional[float] = None  # another localization's, on /amcl_pose and tf map <- odom: at each fifth scan
     #                                       but the first it is so much more too far along x
@@ -153,15 +156,19 @@ class RoomBag:
             return types["geometry_msgs/msg/Quaternion"](x=x, y=y, z=z, w=w)
 
         def pose(values: np.ndarray) -> Any:
-            return types["geometry_msgs/msg/Pose"](position=vector("Point", values[0], values[1]),
-                                                   orientation=rotation(0.0, values[2]))
+            return types["geometry_msgs/msg/Pose"](
+                position=vector("Point", values[0], values[1]), orientation=rotation(0.0, values[2])
+            )
 
         def stamped(stamp_ns: int, parent: str, child: str, values: Any, roll: float = 0.0) -> Any:
-            transform = types["geometry_msgs/msg/Transform"](translation=vector("Vector3", values[0], values[1]),
-                                                             rotation=rotation(roll, values[2]))
+            transform = types["geometry_msgs/msg/Transform"](
+                translation=vector("Vector3", values[0], values[1]), rotation=rotation(roll, values[2])
+            )
             return types["geometry_msgs/msg/TransformStamped"](
-                header=header(stamp_ns, self.frame_prefix + parent), child_frame_id=self.frame_prefix + child,
-                transform=transform)
+                header=header(stamp_ns, self.frame_prefix + parent),
+                child_frame_id=self.frame_prefix + child,
+                transform=transform,
+            )
 
         def send(topic: str, kind: str, stamp_ns: int, message: Any) -> None:
             if topic not in connections:
@@ -169,14 +176,18 @@ class RoomBag:
             writer.write(connections[topic], int(stamp_ns), store.serialize_ros1(message, kind))
 
         def send_tf(topic: str, stamp_ns: int, *transforms: Any) -> None:
-            send(topic, "tf2_msgs/msg/TFMessage", stamp_ns,
-                 types["tf2_msgs/msg/TFMessage"](transforms=list(transforms)))
+            send(
+                topic, "tf2_msgs/msg/TFMessage", stamp_ns, types["tf2_msgs/msg/TFMessage"](transforms=list(transforms))
+            )
 
         angles = np.linspace(-np.pi, np.pi, self.beams, endpoint=False)
         with writer:
             if self.laser_tf and self.static_laser:
-                send_tf("/tf_static", self.start_ns, stamped(self.start_ns, "base_link", "laser", self.laser,
-                                                             self.laser_roll))
+                send_tf(
+                    "/tf_static",
+                    self.start_ns,
+                    stamped(self.start_ns, "base_link", "laser", self.laser, self.laser_roll),
+                )
             odometry_ns = self.start_ns + 50_000_000 * np.arange(-1, 2 * self.scans + 1)
             start = self.poses(self.stamps_ns[:1])[0]
             for stamp_ns, true in zip(odometry_ns.tolist(), self.poses(odometry_ns)):
@@ -190,12 +201,15 @@ class RoomBag:
                     send_tf("/tf", stamp_ns, *transforms)
                 if self.odometry == "topic":
                     covariance = np.zeros(36)
-                    twist = types["geometry_msgs/msg/Twist"](linear=vector("Vector3", 0, 0),
-                                                             angular=vector("Vector3", 0, 0))
+                    twist = types["geometry_msgs/msg/Twist"](
+                        linear=vector("Vector3", 0, 0), angular=vector("Vector3", 0, 0)
+                    )
                     message = types["nav_msgs/msg/Odometry"](
-                        header=header(stamp_ns, "odom"), child_frame_id=self.odom_child,
+                        header=header(stamp_ns, "odom"),
+                        child_frame_id=self.odom_child,
                         pose=types["geometry_msgs/msg/PoseWithCovariance"](pose=pose(odom), covariance=covariance),
-                        twist=types["geometry_msgs/msg/TwistWithCovariance"](twist=twist, covariance=covariance))
+                        twist=types["geometry_msgs/msg/TwistWithCovariance"](twist=twist, covariance=covariance),
+                    )
                     for topic in self.odom_topics:
                         send(topic, "nav_msgs/msg/Odometry", stamp_ns, message)
             for index, (stamp_ns, true) in enumerate(zip(self.stamps_ns.tolist(), self.poses(self.stamps_ns))):
@@ -204,40 +218,76 @@ class RoomBag:
                 laser = np.array([true[0] + cos * x - sin * y, true[1] + sin * x + cos * y, true[2] + yaw])
                 seen = -angles if abs(self.laser_roll) > np.pi / 2 else angles
                 fields: Optional[Dict[str, Any]] = {
-                    "stamp_ns": stamp_ns, "frame": "laser", "angle_min": float(angles[0]),
-                    "angle_max": float(angles[-1]), "angle_increment": float(angles[1] - angles[0]),
-                    "range_min": 0.05, "range_max": 10.0,
-                    "ranges": room_ranges(laser, seen).astype(np.float32)}
+                    "stamp_ns": stamp_ns,
+                    "frame": "laser",
+                    "angle_min": float(angles[0]),
+                    "angle_max": float(angles[-1]),
+                    "angle_increment": float(angles[1] - angles[0]),
+                    "range_min": 0.05,
+                    "range_max": 10.0,
+                    "ranges": room_ranges(laser, seen).astype(np.float32),
+                }
                 fields = self.scan_fields(index, fields)
                 if fields is None:
                     continue
                 message = types["sensor_msgs/msg/LaserScan"](
                     header=header(fields["stamp_ns"], self.frame_prefix + fields["frame"] if fields["frame"] else ""),
-                    angle_min=fields["angle_min"], angle_max=fields["angle_max"],
+                    angle_min=fields["angle_min"],
+                    angle_max=fields["angle_max"],
                     angle_increment=fields["angle_increment"],
-                    time_increment=fields.get("time_increment", 0.0), scan_time=0.1,
-                    range_min=fields["range_min"], range_max=fields["range_max"],
-                    ranges=np.asarray(fields["ranges"], np.float32), intensities=np.zeros(0, np.float32))
+                    time_increment=fields.get("time_increment", 0.0),
+                    scan_time=0.1,
+                    range_min=fields["range_min"],
+                    range_max=fields["range_max"],
+                    ranges=np.asarray(fields["ranges"], np.float32),
+                    intensities=np.zeros(0, np.float32),
+                )
                 for topic in self.scan_topics:
                     send(topic, "sensor_msgs/msg/LaserScan", stamp_ns, message)
-                truth = self.true_fields(index, {
-                    "stamp_ns": fields["stamp_ns"], "cases": np.ones(self.beams, np.uint8),
-                    "crossing": np.full(self.beams, np.nan)})
+                truth = self.true_fields(
+                    index,
+                    {
+                        "stamp_ns": fields["stamp_ns"],
+                        "cases": np.ones(self.beams, np.uint8),
+                        "crossing": np.full(self.beams, np.nan),
+                    },
+                )
                 for topic, name in self.true_beams if truth is not None else ():
                     nothing = np.zeros(0, np.float32)
-                    rest = ({"exact": np.asarray(fields["ranges"], np.float32),
-                             "crossing": np.asarray(truth["crossing"], np.float32)} if name == "TrueBeams"
-                            else {"expected": nothing, "residual": nothing, "weight": nothing})
+                    rest = (
+                        {
+                            "exact": np.asarray(fields["ranges"], np.float32),
+                            "crossing": np.asarray(truth["crossing"], np.float32),
+                        }
+                        if name == "TrueBeams"
+                        else {"expected": nothing, "residual": nothing, "weight": nothing}
+                    )
                     kind = f"glass_nav/msg/{name}"
-                    send(topic, kind, stamp_ns, types[kind](
-                        header=header(truth["stamp_ns"], "laser"), cases=np.asarray(truth["cases"], np.uint8), **rest))
+                    send(
+                        topic,
+                        kind,
+                        stamp_ns,
+                        types[kind](
+                            header=header(truth["stamp_ns"], "laser"),
+                            cases=np.asarray(truth["cases"], np.uint8),
+                            **rest,
+                        ),
+                    )
                 if self.amcl_error_m is not None and index and index % 5 == 0:
                     off = np.array([self.amcl_error_m * (index // 5), 0.0, 0.0])
                     send_tf("/tf", stamp_ns, stamped(stamp_ns, "map", "odom", off + [*start[:2], 0.0]))
                     kind = "geometry_msgs/msg/PoseWithCovarianceStamped"
-                    send("/amcl_pose", kind, stamp_ns, types[kind](
-                        header=header(stamp_ns, "map"), pose=types["geometry_msgs/msg/PoseWithCovariance"](
-                            pose=pose(true + off), covariance=np.zeros(36))))
+                    send(
+                        "/amcl_pose",
+                        kind,
+                        stamp_ns,
+                        types[kind](
+                            header=header(stamp_ns, "map"),
+                            pose=types["geometry_msgs/msg/PoseWithCovariance"](
+                                pose=pose(true + off), covariance=np.zeros(36)
+                            ),
+                        ),
+                    )
                 if self.ground_truth:
                     there = pose(true)
                     if self.truth_type == "PoseWithCovarianceStamped":

@@ -28,12 +28,30 @@ def test_rostest(path: Path, tmp_path: Path) -> None:
     rostest = shutil.which("rostest")
     assert rostest, "rostest is not installed: run by scripts/test"
     inherited = {name: value for name, value in os.environ.items() if not name.startswith(("COV_CORE", "ROS_IP"))}
-    environment = {**inherited, "ROS_HOME": str(tmp_path / "ros"), "ROS_LOG_DIR": str(tmp_path / "log"),
-                   "ROS_HOSTNAME": "localhost", "ROS_MASTER_URI": "http://localhost:0"}
-    done = subprocess.run([rostest, f"--results-base-dir={tmp_path / 'results'}", "--pkgdir", str(REPO),
-                           "--package", "glass_nav", str(path)],
-                          env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                          text=True, timeout=TIMEOUT_S)
+    environment = {
+        **inherited,
+        "ROS_HOME": str(tmp_path / "ros"),
+        "ROS_LOG_DIR": str(tmp_path / "log"),
+        "ROS_HOSTNAME": "localhost",
+        "ROS_MASTER_URI": "http://localhost:0",
+    }
+    done = subprocess.run(
+        [
+            rostest,
+            f"--results-base-dir={tmp_path / 'results'}",
+            "--pkgdir",
+            str(REPO),
+            "--package",
+            "glass_nav",
+            str(path),
+        ],
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=TIMEOUT_S,
+    )
     suites = [ElementTree.parse(result).getroot() for result in (tmp_path / "results").rglob("rosunit-*.xml")]
     ran = sum(int(suite.get("tests", 0)) for suite in suites)
     bad = sum(int(suite.get(kind, 0)) for suite in suites for kind in ("failures", "errors"))

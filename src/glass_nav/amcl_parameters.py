@@ -10,7 +10,8 @@ from typing import Any, Callable, Dict, List, Mapping, Tuple
 
 from glass_nav import params
 
-NAMES = frozenset("""
+NAMES = frozenset(
+    """
     base_frame_id bag_scan_period beam_skip_distance beam_skip_error_threshold beam_skip_threshold do_beamskip
     first_map_only force_update_after_initialpose force_update_after_set_map global_frame_id
     gui_publish_rate initial_cov_aa initial_cov_xx initial_cov_yy initial_pose_a initial_pose_x
@@ -20,12 +21,14 @@ NAMES = frozenset("""
     odom_alpha4 odom_alpha5 odom_frame_id odom_model_type recovery_alpha_fast recovery_alpha_slow
     resample_interval restore_defaults save_pose_rate selective_resampling std_warn_level_x
     std_warn_level_y std_warn_level_yaw tf_broadcast transform_tolerance update_min_a update_min_d
-    use_map_topic""".split())
+    use_map_topic""".split()
+)
 
 # Ours that is left to its default, the parameter of AMCL that goes before it, and which of the two holds.
 _GIVES_WAY: "Tuple[Tuple[str, str, Callable[[Any, Any], Any]], ...]" = (
     ("min_particles", "max_particles", min),
-    ("laser_sigma_hit_max", "laser_sigma_hit", max))
+    ("laser_sigma_hit_max", "laser_sigma_hit", max),
+)
 
 
 def adapted(mapping: Mapping[str, Any], cls: type) -> Dict[str, Any]:
@@ -46,8 +49,9 @@ def adapted(mapping: Mapping[str, Any], cls: type) -> Dict[str, Any]:
     return changed
 
 
-def without_unused(mapping: Mapping[str, Any], cls: type,
-                   also_unused: "frozenset[str]" = frozenset()) -> "Tuple[Dict[str, Any], List[str]]":
+def without_unused(
+    mapping: Mapping[str, Any], cls: type, also_unused: "frozenset[str]" = frozenset()
+) -> "Tuple[Dict[str, Any], List[str]]":
     """What of the mapping the dataclass cls may be asked for, and the sorted names that were taken off.
 
     Args:

@@ -40,8 +40,7 @@ def load(cls: Type[T], mapping: Mapping[str, Any], owner: str) -> T:
     for name in mapping:
         if name not in known:
             raise ParamError(unknown(name, known, owner))
-    checked: Dict[str, Any] = {name: _typed(owner, name, known[name], value)
-                               for name, value in mapping.items()}
+    checked: Dict[str, Any] = {name: _typed(owner, name, known[name], value) for name, value in mapping.items()}
     return _build(cls, checked, owner)
 
 
@@ -57,8 +56,11 @@ def as_mapping(instance: Any) -> Dict[str, Any]:
     flat: Dict[str, Any] = {}
     for field in dataclasses.fields(instance):
         value = getattr(instance, field.name)
-        flat.update(as_mapping(value) if dataclasses.is_dataclass(value) else
-                    {field.name: list(value) if isinstance(value, tuple) else value})
+        flat.update(
+            as_mapping(value)
+            if dataclasses.is_dataclass(value)
+            else {field.name: list(value) if isinstance(value, tuple) else value}
+        )
     return flat
 
 

@@ -29,7 +29,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import Delaunay, Voronoi
 
-from glass_nav.topology import atlas_builder
+from glass_nav.topology.atlas import atlas_builder
 from glass_nav.world import map_file
 from glass_nav.world.grid_map import GridMap
 
@@ -43,13 +43,13 @@ def office(cells: int, rng: np.random.Generator) -> GridMap:
     block[20:180, 20:180] = 100
     for row in (24, 102):
         for column in (24, 102):
-            block[row:row + 74, column:column + 74] = 0
+            block[row : row + 74, column : column + 74] = 0
     for column in (50, 130):
-        block[20:24, column:column + 20] = block[176:180, column:column + 20] = 0
+        block[20:24, column : column + 20] = block[176:180, column : column + 20] = 0
     occupancy = np.tile(block, (cells // BLOCK + 1, cells // BLOCK + 1))[:cells, :cells]
     for row, column in zip(*(rng.integers(0, cells, cells // 8) for _ in range(2))):  # furniture
         height, width = rng.integers(8, 25, 2)
-        occupancy[row:row + height, column:column + width] = 100
+        occupancy[row : row + height, column : column + width] = 100
     free = occupancy == 0
     wall_edge, free_edge = ~free & ndimage.binary_dilation(free), free & ndimage.binary_dilation(~free)
     rough = rng.random(occupancy.shape) < 0.3
@@ -94,20 +94,26 @@ def main() -> int:
     total_s = cpu_s(lambda: built.append(atlas_builder.build(grid_map, "benchmark", "benchmark", watch=watch)[0]))
     used_mb, atlas = peak_mb(), built[0]
     rows, columns = grid_map.occupancy.shape
-    print(f"{rows} x {columns} cells: {len(atlas.nodes)} nodes, {len(atlas.edges)} edges, "
-          f"{atlas.components()[0]} parts, {atlas.edges.length_m.sum():.0f} m, "
-          f"{len(atlas.darts.segments_m.values)} segments")
+    print(
+        f"{rows} x {columns} cells: {len(atlas.nodes)} nodes, {len(atlas.edges)} edges, "
+        f"{atlas.components()[0]} parts, {atlas.edges.length_m.sum():.0f} m, "
+        f"{len(atlas.darts.segments_m.values)} segments"
+    )
     print(f"  CPU {total_s:.1f} s: " + ", ".join(f"{what} {seconds:.1f} s" for what, seconds in spent_s.items()))
     print(f"  peak memory {used_mb:.0f} MB, {before_mb:.0f} MB of them before")
     if arguments.others:
         free = grid_map.free
         points = np.argwhere(ndimage.binary_dilation(free, np.ones((3, 3), bool)) & ~free).astype(float)
-        print(f"  of {len(points)} cells that bound free space: Delaunay {cpu_s(lambda: Delaunay(points)):.1f} s, "
-              f"Voronoi {cpu_s(lambda: Voronoi(points)):.1f} s; feature transform of the grid "
-              f"{cpu_s(lambda: ndimage.distance_transform_edt(free, return_indices=True)):.1f} s; "
-              f"peak now {peak_mb():.0f} MB")
-    limits = [(f"{arguments.limit_s:g} s CPU", total_s <= arguments.limit_s),
-              (f"{arguments.limit_mb:g} MB", used_mb <= arguments.limit_mb)]
+        print(
+            f"  of {len(points)} cells that bound free space: Delaunay {cpu_s(lambda: Delaunay(points)):.1f} s, "
+            f"Voronoi {cpu_s(lambda: Voronoi(points)):.1f} s; feature transform of the grid "
+            f"{cpu_s(lambda: ndimage.distance_transform_edt(free, return_indices=True)):.1f} s; "
+            f"peak now {peak_mb():.0f} MB"
+        )
+    limits = [
+        (f"{arguments.limit_s:g} s CPU", total_s <= arguments.limit_s),
+        (f"{arguments.limit_mb:g} MB", used_mb <= arguments.limit_mb),
+    ]
     for limit, kept in limits:
         print(f"  limit {limit}: {'kept' if kept else 'missed'}")
     return 0 if all(kept for _, kept in limits) else 1

@@ -18,12 +18,12 @@ from typing import Any, Callable, Dict, NamedTuple, Optional, Tuple, Union
 import numpy as np
 
 from glass_nav.geometry import angles, se2
-from glass_nav.localization import motion, pose_estimate, resampling
-from glass_nav.localization.beam_cases import DIFFUSE, UNCERTAIN, BeamCases
-from glass_nav.localization.glass_mcl import GlassMcl
-from glass_nav.localization.glass_mcl_params import GlassMclParams
-from glass_nav.localization.reference_ranges import ReferenceRanges
-from glass_nav.localization.resampling import ParticleCount
+from glass_nav.localization.particle_filter import motion, pose_estimate, resampling
+from glass_nav.localization.beam_classification.case_votes import DIFFUSE, UNCERTAIN, BeamCases
+from glass_nav.localization.localizer import GlassMcl
+from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.beam_classification.expected_ranges import ExpectedRanges
+from glass_nav.localization.particle_filter.resampling import ParticleCount
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
@@ -34,13 +34,14 @@ _PARTS = 4  # of a cell's edge: how finely the likelihood field is tabulated
 
 class Settings(NamedTuple):
     """Of a sensor model; AMCL's names where it has them."""
+
     sigma_hit_m: float
     z_hit: float
     z_rand: float
-    max_beams: Optional[int] = 60              # None: all that answered
+    max_beams: Optional[int] = 60  # None: all that answered
     independent_beams: Optional[float] = None  # as how many they count; None: as many as they are
-    z_short: float = 0.0                       # of the beam model: something stood in the way
-    lambda_short: float = 0.1                  # [1/m]
+    z_short: float = 0.0  # of the beam model: something stood in the way
+    lambda_short: float = 0.1  # [1/m]
 
 
 class LikelihoodField:
@@ -54,8 +55,10 @@ class LikelihoodField:
         self._grid_from_map = se2.inverse(grid_map.map_from_grid)
         self._parts_per_m = _PARTS / grid_map.resolution_m
         rows, columns = (_PARTS * size for size in grid_map.occupancy.shape)
-        points = se2.transform_points(grid_map.map_from_grid, np.stack(np.meshgrid(
-            np.arange(columns) + 0.5, np.arange(rows) + 0.5), axis=-1) / self._parts_per_m)
+        points = se2.transform_points(
+            grid_map.map_from_grid,
+            np.stack(np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5), axis=-1) / self._parts_per_m,
+        )
         distance_m = DistanceField(grid_map).at(points[..., 0], points[..., 1])[0]
         self._fit = np.exp(-0.5 * (distance_m / settings.sigma_hit_m) ** 2).astype(np.float32)
         self._log_p: Dict[float, np.ndarray] = {}  # by the range of the lidar
@@ -96,15 +99,23 @@ class BeamModel:
         settings = self._settings
         beams = chosen_beams(scan, settings)
         z = scan.ranges_m[beams]
-        expected = self._depth_m + self._caster.cast_first(se2.compose(map_from_base, scan.base_from_laser),
-                                                           scan.angles_rad[beams], scan.range_max_m).range_m
+        expected = (
+            self._depth_m
+            + self._caster.cast_first(
+                se2.compose(map_from_base, scan.base_from_laser), scan.angles_rad[beams], scan.range_max_m
+            ).range_m
+        )
         normal = np.exp(-0.5 * np.minimum(((z - expected) / settings.sigma_hit_m) ** 2, 100.0))
-        density = (settings.z_hit / (np.sqrt(2.0 * np.pi) * settings.sigma_hit_m) * normal
-                   + settings.z_rand / scan.range_max_m)
+        density = (
+            settings.z_hit / (np.sqrt(2.0 * np.pi) * settings.sigma_hit_m) * normal + settings.z_rand / scan.range_max_m
+        )
         if settings.z_short > 0.0:
             rate = settings.lambda_short
-            density += np.where(z < expected, settings.z_short * rate * np.exp(-rate * z)
-                                / -np.expm1(-rate * np.minimum(expected, scan.range_max_m)), 0.0)
+            density += np.where(
+                z < expected,
+                settings.z_short * rate * np.exp(-rate * z) / -np.expm1(-rate * np.minimum(expected, scan.range_max_m)),
+                0.0,
+            )
         return weight_of_a_beam(len(beams), settings) * np.log(density).sum(axis=1)
 
 
@@ -129,6 +140,7 @@ def weight_of_a_beam(beams: int, settings: Settings) -> float:
 @dataclass(frozen=True)
 class PlainEstimate:
     """What plain Monte Carlo localization says after one scan."""
+
     stamp_ns: int
     map_from_base: np.ndarray  # (3,) pose of the best cluster
 
@@ -140,8 +152,14 @@ class PlainMcl:
     of odometry those of our filter.
     """
 
-    def __init__(self, params: GlassMclParams, grid_map: GridMap, rng: np.random.Generator, model: SensorModel,
-                 count: ParticleCount = ParticleCount(min_particles=500, max_particles=5000)) -> None:
+    def __init__(
+        self,
+        params: GlassMclParams,
+        grid_map: GridMap,
+        rng: np.random.Generator,
+        model: SensorModel,
+        count: ParticleCount = ParticleCount(min_particles=500, max_particles=5000),
+    ) -> None:
         self._params, self._count, self._rng, self._model = params, count, rng, model
         self._particles = np.zeros((0, 3))
         self._odom_from_base: Optional[np.ndarray] = None
@@ -175,15 +193,14 @@ class PlainMcl:
     def _is_due(self, odom_from_base: np.ndarray) -> bool:
         if self._odom_from_base is None or self._update_due:
             return True
-        way, turn = motion.travelled(se2.compose(se2.inverse(self._odom_from_base), odom_from_base))
+        way, turn = se2.travelled(se2.compose(se2.inverse(self._odom_from_base), odom_from_base))
         return way >= self._params.schedule.update_min_d or turn >= self._params.schedule.update_min_a
 
 
 class OtherWeights(GlassMcl):
     """Our filter, start to end, but the particles weighed by another sensor model."""
 
-    def __init__(self, params: GlassMclParams, grid_map: GridMap, rng: np.random.Generator,
-                 model: SensorModel) -> None:
+    def __init__(self, params: GlassMclParams, grid_map: GridMap, rng: np.random.Generator, model: SensorModel) -> None:
         super().__init__(params, grid_map, rng)
         self._model = model
 
@@ -194,7 +211,7 @@ class OtherWeights(GlassMcl):
 class DiffuseOnly(GlassMcl):
     """Our filter, going only by the beams that it takes for ended at the first surface."""
 
-    def _vote(self, scan: Scan, *pose: np.ndarray) -> Tuple[BeamCases, ReferenceRanges]:
+    def _vote(self, scan: Scan, *pose: np.ndarray) -> Tuple[BeamCases, ExpectedRanges]:
         cases, references = super()._vote(scan, *pose)
         diffuse = np.where(cases.case == DIFFUSE, cases.case, UNCERTAIN).astype(np.uint8)
         return replace(cases, case=diffuse), references
@@ -205,7 +222,7 @@ class OracleCases(GlassMcl):
 
     true_case = np.zeros(0, np.uint8)
 
-    def _vote(self, scan: Scan, *pose: np.ndarray) -> Tuple[BeamCases, ReferenceRanges]:
+    def _vote(self, scan: Scan, *pose: np.ndarray) -> Tuple[BeamCases, ExpectedRanges]:
         cases, references = super()._vote(scan, *pose)
         return replace(cases, case=np.where(scan.answered, self.true_case, UNCERTAIN).astype(np.uint8)), references
 
@@ -216,15 +233,17 @@ SETTINGS = {
     "amcl_beam60": Settings(sigma_hit_m=0.05, z_hit=0.5, z_rand=0.5, independent_beams=20.0),
     "amcl_beam_all": Settings(sigma_hit_m=0.05, z_hit=0.5, z_rand=0.5, max_beams=None, independent_beams=40.0),
     "ours_field": Settings(sigma_hit_m=0.05, z_hit=0.5, z_rand=0.5, max_beams=None, independent_beams=120.0),
-    "ours_beam": Settings(sigma_hit_m=0.05, z_hit=0.7, z_rand=0.2, max_beams=None, independent_beams=120.0,
-                          z_short=0.1),
+    "ours_beam": Settings(
+        sigma_hit_m=0.05, z_hit=0.7, z_rand=0.2, max_beams=None, independent_beams=120.0, z_short=0.1
+    ),
 }
 
 Localizer = Union[GlassMcl, PlainMcl]
 
 
-def localizer(name: str, params: GlassMclParams, grid_map: GridMap, seed: int,
-              settings: Optional[Settings] = None) -> Localizer:
+def localizer(
+    name: str, params: GlassMclParams, grid_map: GridMap, seed: int, settings: Optional[Settings] = None
+) -> Localizer:
     """One of LOCALIZERS, fresh.
 
     Args:
@@ -243,11 +262,16 @@ def localizer(name: str, params: GlassMclParams, grid_map: GridMap, seed: int,
 
 
 def _with_vote(mode: str) -> Callable[[GlassMclParams, GridMap, np.random.Generator], GlassMcl]:
-    return lambda params, grid_map, rng: GlassMcl(replace(params, vote=replace(params.vote, vote_mode=mode)),
-                                                  grid_map, rng)
+    return lambda params, grid_map, rng: GlassMcl(
+        replace(params, vote=replace(params.vote, vote_mode=mode)), grid_map, rng
+    )
 
 
 OURS: Dict[str, Callable[[GlassMclParams, GridMap, np.random.Generator], GlassMcl]] = {
-    "ours": GlassMcl, "ours_paper": _with_vote("paper"), "ours_case1": DiffuseOnly, "ours_oracle": OracleCases}
+    "ours": GlassMcl,
+    "ours_paper": _with_vote("paper"),
+    "ours_case1": DiffuseOnly,
+    "ours_oracle": OracleCases,
+}
 LOCALIZERS = (*OURS, *SETTINGS)
 BASELINES = ("ours_case1", *SETTINGS)  # honest: they know what a localizer can know; ours_oracle is told more

@@ -28,8 +28,8 @@ sys.path.append(str(Path(__file__).resolve().parent))
 import drives
 from glass_nav.geometry import angles
 from glass_nav.geometry.trajectory import Trajectory
-from glass_nav.localization.glass_mcl import GlassMcl
-from glass_nav.localization.glass_mcl_params import GlassMclParams
+from glass_nav.localization.localizer import GlassMcl
+from glass_nav.localization.localizer_params import GlassMclParams
 from glass_nav.sensing import deskew
 from glass_nav.simulation import building_file, building_map, lidar
 from glass_nav.simulation.path_follower import FollowerParams
@@ -65,7 +65,7 @@ def errors(grid_map: GridMap, frames: List[Frame], straighten: bool, seed: int) 
 
 def rmse(off: np.ndarray) -> np.ndarray:
     """(2,) of position [m] and heading [deg]."""
-    position_m, heading_rad = np.sqrt(np.mean(off ** 2, axis=0))
+    position_m, heading_rad = np.sqrt(np.mean(off**2, axis=0))
     return np.array([position_m, np.degrees(heading_rad)])
 
 

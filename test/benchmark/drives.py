@@ -17,6 +17,7 @@ SCAN_RATE_HZ = 5.0  # a scan every 0.12 m: enough for each to be an update
 
 class Drive(NamedTuple):
     """A robot once along the path of its building."""
+
     grid_map: GridMap  # as it was drawn, before anything changed
     frames: List[Frame]
 
@@ -44,8 +45,7 @@ def drive(name: str, lidar_name: str, seed: int, changed: float = 0.0, max_scans
     return drive_with(lidar.preset(lidar_name), name, seed, changed, max_scans)
 
 
-def drive_with(model: LidarModel, name: str, seed: int, changed: float = 0.0,
-               max_scans: Optional[int] = None) -> Drive:
+def drive_with(model: LidarModel, name: str, seed: int, changed: float = 0.0, max_scans: Optional[int] = None) -> Drive:
     """As drive(), with any lidar."""
     building = building_file.load(MAPS / name / "building.yaml")
     simulation = Simulation(building, model, seed=seed, scan_rate_hz=SCAN_RATE_HZ, changed_share=changed)

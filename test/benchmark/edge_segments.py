@@ -35,11 +35,12 @@ from glass_nav.sensing.scan import Scan
 from glass_nav.simulation import building_file, lidar
 from glass_nav.simulation.building import Building
 from glass_nav.simulation.lidar import LidarModel
-from glass_nav.topology import atlas_file, edge_segments
-from glass_nav.topology.atlas import Atlas
-from glass_nav.topology.edge_segments import SegmentTest
-from glass_nav.topology.edge_views import poses_along
-from glass_nav.topology.matching import Matcher, Tolerances
+from glass_nav.topology.atlas import atlas_file
+from glass_nav.topology.search import edge_segments
+from glass_nav.topology.atlas.atlas import Atlas
+from glass_nav.topology.search.edge_segments import SegmentTest
+from glass_nav.topology.atlas.edge_views import poses_along
+from glass_nav.topology.search.matching import Matcher, Tolerances
 from glass_nav.topology.observations import Traversal
 
 ATLASES = Path(__file__).resolve().parents[2] / "atlas"
@@ -60,13 +61,15 @@ def driven(atlas: Atlas, building: Building, model: LidarModel, dart: int, rng: 
             step[2] += drift_rad_m * np.hypot(step[0], step[1])
             odom.append(se2.compose(odom[-1], step * [scale, scale, 1.0]))
         seen = lidar.scan(model, building, map_from_base, number * STEP_M / SPEED_M_S, rng)
-        local_map.add(Scan(number, seen.ranges_m, model.angles_rad, model.range_min_m, model.range_max_m, np.zeros(3)),
-                      odom[-1])
+        local_map.add(
+            Scan(number, seen.ranges_m, model.angles_rad, model.range_min_m, model.range_max_m, np.zeros(3)), odom[-1]
+        )
     return edge_report.traversal(np.array(odom)[:, :2], 0, local_map.grid())
 
 
-def compare(arguments: argparse.Namespace, name: str) -> Tuple[List[Tuple[float, float]], List[Tuple[float, float]],
-                                                               float]:
+def compare(
+    arguments: argparse.Namespace, name: str
+) -> Tuple[List[Tuple[float, float]], List[Tuple[float, float]], float]:
     """(share, metres) of true edges, and of others that fit by numbers; CPU ms of a comparison."""
     atlas = atlas_file.load(ATLASES / name / "atlas.json")
     matcher = Matcher(atlas, Tolerances(), use_angles=True)
@@ -78,10 +81,10 @@ def compare(arguments: argparse.Namespace, name: str) -> Tuple[List[Tuple[float,
     true: List[Tuple[float, float]] = []
     wrong: List[Tuple[float, float]] = []
     spent = 0.0
-    for number, dart in enumerate(rng.permutation(darts)[:arguments.edges].tolist()):
+    for number, dart in enumerate(rng.permutation(darts)[: arguments.edges].tolist()):
         report = driven(atlas, building, lidar.preset(drives.lidars()[number % len(drives.lidars())]), dart, rng)
         others = darts[matcher.edges_along(darts, report)]
-        others = rng.permutation(others[others != dart])[:arguments.others].tolist()
+        others = rng.permutation(others[others != dart])[: arguments.others].tolist()
         began = time.process_time()
         true.append(matcher.contradiction(dart, report))
         wrong += [matcher.contradiction(other, report) for other in others]
@@ -96,19 +99,28 @@ def main() -> int:
     parser.add_argument("--edges", type=int, default=60, help="of each building, with their direction (default 60)")
     parser.add_argument("--others", type=int, default=20, help="candidates beside the true one (default 20)")
     parser.add_argument("--changed", type=float, default=0.0, help="share of the furniture that moved (default 0)")
-    parser.add_argument("--limit", type=float, default=SegmentTest().segments_max_contradiction,
-                        help="segments_max_contradiction (default as the node's)")
+    parser.add_argument(
+        "--limit",
+        type=float,
+        default=SegmentTest().segments_max_contradiction,
+        help="segments_max_contradiction (default as the node's)",
+    )
     arguments = parser.parse_args()
     test = SegmentTest(segments_max_contradiction=arguments.limit)
-    print("| building | edges driven | ruled out | largest contradiction | others that fit by numbers | ruled out | "
-          "ms each |\n|---|---|---|---|---|---|---|")
+    print(
+        "| building | edges driven | ruled out | largest contradiction | others that fit by numbers | ruled out | "
+        "ms each |\n|---|---|---|---|---|---|---|"
+    )
     lost, count, told_apart, others = 0, 0, 0, 0
     for name in arguments.buildings:
         true, wrong, each_ms = compare(arguments, name)
         out_true = sum(not edge_segments.fits(*each, test) for each in true)
         out_wrong = sum(not edge_segments.fits(*each, test) for each in wrong)
-        print(f"| {name} | {len(true)} | {out_true} | {max(share for share, _ in true):.2f} | {len(wrong)} | "
-              f"{out_wrong / max(len(wrong), 1):.2f} | {each_ms:.1f} |", flush=True)
+        print(
+            f"| {name} | {len(true)} | {out_true} | {max(share for share, _ in true):.2f} | {len(wrong)} | "
+            f"{out_wrong / max(len(wrong), 1):.2f} | {each_ms:.1f} |",
+            flush=True,
+        )
         lost, count = lost + out_true, count + len(true)
         told_apart, others = told_apart + out_wrong, others + len(wrong)
     print(f"| all | {count} | {lost} | | {others} | {told_apart / max(others, 1):.2f} | |")

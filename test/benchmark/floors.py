@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from glass_nav.simulation import building_file, building_map, mapped_building, random_building, shipped_buildings
 from glass_nav.simulation.building import Building
-from glass_nav.topology import atlas_builder, atlas_file, shipped_atlases
-from glass_nav.topology.atlas import Atlas
+from glass_nav.topology.atlas import atlas_builder, atlas_file, shipped_atlases
+from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.world import map_file
 from glass_nav.world.grid_map import GridMap
 
@@ -18,6 +18,7 @@ HELP = "names of shipped buildings, map_server .yaml files, or random: another f
 
 class Floor(NamedTuple):
     """A building, and what the robot has of it."""
+
     building: Building
     grid_map: GridMap
     atlas: Atlas

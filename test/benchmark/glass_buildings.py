@@ -36,11 +36,11 @@ sys.path.append(str(Path(__file__).resolve().parent))
 import baselines
 import drives
 from glass_nav import params
-from glass_nav.evaluation import case_scores, pose_errors, replay_result
-from glass_nav.evaluation.case_scores import CaseScores, SurfaceScores
+from glass_nav.evaluation.metrics import case_scores, pose_errors, replay_result
+from glass_nav.evaluation.metrics.case_scores import CaseScores, SurfaceScores
 from glass_nav.geometry.trajectory import Trajectory
-from glass_nav.localization.glass_mcl import Estimate
-from glass_nav.localization.glass_mcl_params import GlassMclParams
+from glass_nav.localization.localizer import Estimate
+from glass_nav.localization.localizer_params import GlassMclParams
 
 START_DEVIATION = np.array([0.1, 0.1, np.radians(3.0)])  # of the pose the localizers are told, and what they are told
 CASE_NAMES = ("uncertain", "diffuse", "specular", "1st penetration", "2nd penetration")
@@ -49,6 +49,7 @@ FIGURES = ("position_rmse_m", "position_median_m", "yaw_mean_deg")
 
 class Job(NamedTuple):
     """One drive, for all localizers."""
+
     building: str
     lidar: str
     seed: int
@@ -60,20 +61,24 @@ class Job(NamedTuple):
 
 class Run(NamedTuple):
     """What one localizer made of one drive."""
+
     building: str
     lidar: str
     seed: int
     localizer: str
-    pose: Dict[str, Optional[float]]     # pose_errors.summary()
-    cases: Optional[CaseScores]          # None: it tells none
+    pose: Dict[str, Optional[float]]  # pose_errors.summary()
+    cases: Optional[CaseScores]  # None: it tells none
     surfaces: Optional[SurfaceScores]
     scans: int
     updates: int
     cpu_s: float
 
     def as_json(self) -> Dict[str, Any]:
-        values = {**self._asdict(), "cases": None if self.cases is None else self.cases.metrics(),
-                  "scan_surfaces": None if self.surfaces is None else self.surfaces.metrics()}
+        values = {
+            **self._asdict(),
+            "cases": None if self.cases is None else self.cases.metrics(),
+            "scan_surfaces": None if self.surfaces is None else self.surfaces.metrics(),
+        }
         del values["surfaces"]
         return values
 
@@ -104,33 +109,52 @@ def follow(name: str, job: Job, drive: drives.Drive, settings: Optional[baseline
             cases += case_scores.of_cases(frame.truth.case, estimate.cases.case, frame.scan.answered)
             surface = getattr(estimate, "surface_scan", None)
             if surface is not None:
-                surfaces += case_scores.of_surfaces(frame.truth.crossing_m, surface.ranges_m, surface.cut,
-                                                    surface.trusted)
+                surfaces += case_scores.of_surfaces(
+                    frame.truth.crossing_m, surface.ranges_m, surface.cut, surface.trusted
+                )
     stamps = np.array([frame.scan.stamp_ns for frame in drive.frames])
     true = Trajectory(stamps, np.array([frame.map_from_base for frame in drive.frames]))
     tells = name in baselines.OURS
-    return Run(job.building, job.lidar, job.seed, name,
-               pose_errors.summary(pose_errors.of(stamps, np.array(poses), true)), cases if tells else None,
-               surfaces if tells and surfaces.scans else None, len(poses), updates, cpu_s)
+    return Run(
+        job.building,
+        job.lidar,
+        job.seed,
+        name,
+        pose_errors.summary(pose_errors.of(stamps, np.array(poses), true)),
+        cases if tells else None,
+        surfaces if tells and surfaces.scans else None,
+        len(poses),
+        updates,
+        cpu_s,
+    )
 
 
 def print_cases(runs: Sequence[Run], ways: Sequence[Callable[[Run], str]]) -> None:
     """A line for each group of runs, grouped one way after the other, and each way to tell cases."""
-    print("| runs | vote | accuracy | answering | macro F1 | " + " | ".join(
-        f"P {case}" for case in range(1, 5)) + " | " + " | ".join(f"R {case}" for case in range(5))
-          + " | true share of 0..4 % | used |\n|---|---|" + "---|" * 14)
+    print(
+        "| runs | vote | accuracy | answering | macro F1 | "
+        + " | ".join(f"P {case}" for case in range(1, 5))
+        + " | "
+        + " | ".join(f"R {case}" for case in range(5))
+        + " | true share of 0..4 % | used |\n|---|---|"
+        + "---|" * 14
+    )
     groups = [(by, group) for by in ways for group in unique(by(each) for each in runs)]
     for (by, group), localizer in itertools.product(groups, ("ours", "ours_paper")):
-        parts = [each.cases for each in runs
-                 if by(each) == group and each.localizer == localizer and each.cases is not None]
+        parts = [
+            each.cases for each in runs if by(each) == group and each.localizer == localizer and each.cases is not None
+        ]
         if not parts:
             continue
         figures = sum(parts, case_scores.none_yet()).metrics()
         shares = " ".join(f"{100 * (share or 0.0):.0f}" for share in figures["true_share"])
-        print(f"| {group} | {'paper' if localizer == 'ours_paper' else 'soft'} | {number(figures['accuracy'])} | "
-              f"{number(figures['accuracy_answered'])} | {number(figures['macro_f1'])} | "
-              + " | ".join(number(value) for value in figures["precision"][1:] + figures["recall"])
-              + f" | {shares} | {number(figures['used_share'])} |", flush=True)
+        print(
+            f"| {group} | {'paper' if localizer == 'ours_paper' else 'soft'} | {number(figures['accuracy'])} | "
+            f"{number(figures['accuracy_answered'])} | {number(figures['macro_f1'])} | "
+            + " | ".join(number(value) for value in figures["precision"][1:] + figures["recall"])
+            + f" | {shares} | {number(figures['used_share'])} |",
+            flush=True,
+        )
 
 
 def print_confusion(runs: Sequence[Run]) -> None:
@@ -141,27 +165,39 @@ def print_confusion(runs: Sequence[Run]) -> None:
     confusion = sum(parts, case_scores.none_yet()).confusion
     print("| true \\ told | " + " | ".join(CASE_NAMES) + " | beams |\n|---|" + "---|" * 6)
     for name, row in zip(CASE_NAMES, confusion):
-        print(f"| {name} | " + " | ".join(f"{100 * count / max(row.sum(), 1):.1f} %" for count in row)
-              + f" | {row.sum()} |")
+        print(
+            f"| {name} | "
+            + " | ".join(f"{100 * count / max(row.sum(), 1):.1f} %" for count in row)
+            + f" | {row.sum()} |"
+        )
 
 
 def print_poses(runs: Sequence[Run]) -> None:
     """A line for each building and localizer, then the ratio of ours to the best baseline."""
-    print("| building | localizer | rmse m | median m | yaw mean deg | lost (max) | ms CPU/scan | ms CPU/update |\n|"
-          + "---|" * 8)
+    print(
+        "| building | localizer | rmse m | median m | yaw mean deg | lost (max) | ms CPU/scan | ms CPU/update |\n|"
+        + "---|" * 8
+    )
     for building in unique(each.building for each in runs):
         for localizer in unique(each.localizer for each in runs):
             own = [each for each in runs if (each.building, each.localizer) == (building, localizer)]
             if own:
                 lost = [each.pose["lost_share"] or 0.0 for each in own]
                 cpu_ms, updates = 1e3 * sum(each.cpu_s for each in own), sum(each.updates for each in own)
-                print(f"| {building} | {localizer} | " + " | ".join(f"{mean(own, figure):.3f}" for figure in FIGURES)
-                      + f" | {np.mean(lost):.3f} ({max(lost):.3f}) | {cpu_ms / sum(each.scans for each in own):.1f} | "
-                      + (f"{cpu_ms / updates:.1f} |" if updates else "|"))
+                print(
+                    f"| {building} | {localizer} | "
+                    + " | ".join(f"{mean(own, figure):.3f}" for figure in FIGURES)
+                    + f" | {np.mean(lost):.3f} ({max(lost):.3f}) | {cpu_ms / sum(each.scans for each in own):.1f} | "
+                    + (f"{cpu_ms / updates:.1f} |" if updates else "|")
+                )
     if not {"ours"} < {each.localizer for each in runs} & {"ours", *baselines.BASELINES}:
         return
-    print("\n| building | " + " | ".join(f"{figure}: ours / best baseline | / oracle" for figure in FIGURES)
-          + " |\n|---|" + "---|" * 6)
+    print(
+        "\n| building | "
+        + " | ".join(f"{figure}: ours / best baseline | / oracle" for figure in FIGURES)
+        + " |\n|---|"
+        + "---|" * 6
+    )
     for building in unique(each.building for each in runs):
         cells = []
         for figure in FIGURES:
@@ -172,8 +208,10 @@ def print_poses(runs: Sequence[Run]) -> None:
 
 def to(runs: Sequence[Run], building: str, figure: str, rival: str) -> float:
     """Ours over the rival's, means of the building; NaN when one of them did not run."""
-    ours, other = (mean([each for each in runs if (each.building, each.localizer) == (building, name)], figure)
-                   for name in ("ours", rival))
+    ours, other = (
+        mean([each for each in runs if (each.building, each.localizer) == (building, name)], figure)
+        for name in ("ours", rival)
+    )
     return ours / other
 
 
@@ -185,37 +223,55 @@ def to_best_baseline(runs: Sequence[Run], building: str, figure: str) -> Tuple[f
 
 def print_surfaces(runs: Sequence[Run]) -> None:
     """A line for each building and lidar."""
-    print("| building | lidar | beams at panes | of them cut within 0.15 m | cut elsewhere | of the others cut | "
-          "scans trusted |\n|" + "---|" * 7)
+    print(
+        "| building | lidar | beams at panes | of them cut within 0.15 m | cut elsewhere | of the others cut | "
+        "scans trusted |\n|" + "---|" * 7
+    )
     told = [each for each in runs if each.localizer == "ours" and each.surfaces is not None]
     groups = unique((each.building, each.lidar) for each in told)
     for group in [*groups, ("all", "all")]:
         parts = [each.surfaces for each in told if group in ((each.building, each.lidar), ("all", "all"))]
         figures = sum((part for part in parts if part is not None), SurfaceScores()).metrics()
         elsewhere = figures["at_pane_cut"] - figures["at_pane_cut_near"]
-        print(f"| {group[0]} | {group[1]} | {figures['at_pane']} | {number(figures['cut_at_pane_share'])} | "
-              f"{number(elsewhere / figures['at_pane'] if figures['at_pane'] else None)} | "
-              f"{number(figures['cut_wrongly_share'], 4)} | {number(figures['trusted_share'])} |")
+        print(
+            f"| {group[0]} | {group[1]} | {figures['at_pane']} | {number(figures['cut_at_pane_share'])} | "
+            f"{number(elsewhere / figures['at_pane'] if figures['at_pane'] else None)} | "
+            f"{number(figures['cut_wrongly_share'], 4)} | {number(figures['trusted_share'])} |"
+        )
 
 
 def print_bars(runs: Sequence[Run]) -> bool:
     """What is asked of ours, and whether it is so; all of it?"""
     own = [each for each in runs if each.localizer == "ours"]
-    cases = {building: sum((each.cases for each in own if each.building == building and each.cases is not None),
-                           case_scores.none_yet()) for building in unique(each.building for each in own)}
+    cases = {
+        building: sum(
+            (each.cases for each in own if each.building == building and each.cases is not None), case_scores.none_yet()
+        )
+        for building in unique(each.building for each in own)
+    }
     figures = sum(cases.values(), case_scores.none_yet()).metrics()
     surfaces = sum((each.surfaces for each in own if each.surfaces is not None), SurfaceScores()).metrics()
     bars = [Bar("case accuracy", figures["accuracy"], 0.93), Bar("macro F1", figures["macro_f1"], 0.85)]
-    bars += [Bar(f"precision of case {case}", figures["precision"][case], least)
-             for case, least in ((1, 0.95), (2, 0.8), (3, 0.95), (4, 0.95))]
-    bars += [Bar("cut within 0.15 m of the pane", surfaces["cut_at_pane_share"], 0.95),
-             Bar("cut of other beams", surfaces["cut_wrongly_share"], most=0.01),
-             Bar("largest lost share", max((each.pose["lost_share"] or 0.0 for each in own), default=None), most=0.0)]
+    bars += [
+        Bar(f"precision of case {case}", figures["precision"][case], least)
+        for case, least in ((1, 0.95), (2, 0.8), (3, 0.95), (4, 0.95))
+    ]
+    bars += [
+        Bar("cut within 0.15 m of the pane", surfaces["cut_at_pane_share"], 0.95),
+        Bar("cut of other beams", surfaces["cut_wrongly_share"], most=0.01),
+        Bar("largest lost share", max((each.pose["lost_share"] or 0.0 for each in own), default=None), most=0.0),
+    ]
     if any(each.localizer in baselines.BASELINES for each in runs):
         for building, scores in cases.items():
             glass = scores.confusion[2:].sum() > 0.01 * scores.confusion.sum()
-            bars += [Bar(f"{building}: {figure} / best baseline", to_best_baseline(runs, building, figure)[0],
-                         most=0.7 if glass else 1.0) for figure in ("position_rmse_m", "yaw_mean_deg")]
+            bars += [
+                Bar(
+                    f"{building}: {figure} / best baseline",
+                    to_best_baseline(runs, building, figure)[0],
+                    most=0.7 if glass else 1.0,
+                )
+                for figure in ("position_rmse_m", "yaw_mean_deg")
+            ]
     print("| bar | asked | found | |\n|---|---|---|---|")
     for bar in bars:
         asked = f">= {bar.least:g}" if bar.least is not None else f"<= {bar.most:g}"
@@ -226,6 +282,7 @@ def print_bars(runs: Sequence[Run]) -> bool:
 
 class Bar(NamedTuple):
     """What a figure has to be."""
+
     what: str
     found: Optional[float]  # None: there was nothing to measure it by
     least: Optional[float] = None
@@ -233,8 +290,9 @@ class Bar(NamedTuple):
 
     @property
     def kept(self) -> bool:
-        return self.found is None or ((self.least is None or self.found >= self.least)
-                                      and (self.most is None or self.found <= self.most))
+        return self.found is None or (
+            (self.least is None or self.found >= self.least) and (self.most is None or self.found <= self.most)
+        )
 
 
 def mean(runs: Sequence[Run], figure: str) -> float:
@@ -257,10 +315,26 @@ def baselines_from(path: Path, jobs: Sequence[Job]) -> List[Run]:
     runs = []
     for each in found["runs"]:
         job = wanted.get((each["building"], each["lidar"], each["seed"]))
-        if (job is not None and found["changed"] == job.changed and each["localizer"] in baselines.BASELINES
-                and each["localizer"] not in job.localizers):
-            runs.append(Run(job.building, job.lidar, job.seed, each["localizer"], each["pose"], None, None,
-                            each["scans"], each["updates"], each["cpu_s"]))
+        if (
+            job is not None
+            and found["changed"] == job.changed
+            and each["localizer"] in baselines.BASELINES
+            and each["localizer"] not in job.localizers
+        ):
+            runs.append(
+                Run(
+                    job.building,
+                    job.lidar,
+                    job.seed,
+                    each["localizer"],
+                    each["pose"],
+                    None,
+                    None,
+                    each["scans"],
+                    each["updates"],
+                    each["cpu_s"],
+                )
+            )
     return runs
 
 
@@ -276,31 +350,48 @@ def main() -> int:
     parser.add_argument("--mixed", action="store_true", help="one lidar for each seed, in turn, not all of them")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--first-seed", type=int, default=100)
-    parser.add_argument("--changed", type=float, default=0.0, metavar="SHARE", help="of the furniture, moved since "
-                        "the map was drawn")
-    parser.add_argument("--localizers", nargs="+", choices=baselines.LOCALIZERS, default=list(baselines.LOCALIZERS),
-                        metavar="NAME", help=" ".join(baselines.LOCALIZERS))
+    parser.add_argument(
+        "--changed", type=float, default=0.0, metavar="SHARE", help="of the furniture, moved since the map was drawn"
+    )
+    parser.add_argument(
+        "--localizers",
+        nargs="+",
+        choices=baselines.LOCALIZERS,
+        default=list(baselines.LOCALIZERS),
+        metavar="NAME",
+        help=" ".join(baselines.LOCALIZERS),
+    )
     parser.add_argument("--max-scans", type=int, metavar="N", help="of each drive")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="one parameter of our filter")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=Path, help="JSON with all figures of all runs")
-    parser.add_argument("--reuse", type=Path, metavar="JSON", help="an earlier --out: its baselines, where they drove "
-                        "the same drives and are not to run again (as long as the simulator is the same)")
+    parser.add_argument(
+        "--reuse",
+        type=Path,
+        metavar="JSON",
+        help="an earlier --out: its baselines, where they drove "
+        "the same drives and are not to run again (as long as the simulator is the same)",
+    )
     arguments = parser.parse_args()
     settings = settings_from(arguments.set)
     lidars = arguments.lidars or drives.lidars()
-    jobs = [Job(building, lidar, seed, arguments.changed, arguments.max_scans, tuple(arguments.localizers), settings)
-            for building in arguments.buildings or drives.buildings()
-            for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
-            for lidar in ([lidars[seed % len(lidars)]] if arguments.mixed else lidars)]
+    jobs = [
+        Job(building, lidar, seed, arguments.changed, arguments.max_scans, tuple(arguments.localizers), settings)
+        for building in arguments.buildings or drives.buildings()
+        for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
+        for lidar in ([lidars[seed % len(lidars)]] if arguments.mixed else lidars)
+    ]
     runs: List[Run] = []
     began = time.monotonic()
     with multiprocessing.Pool(arguments.jobs) as pool:
         for done, found in enumerate(pool.imap(run, jobs), 1):
             runs += found
             first = found[0]
-            print(f"{done} of {len(jobs)} drives, {time.monotonic() - began:.0f} s: {first.building} {first.lidar} "
-                  f"{first.seed}, {first.scans} scans", file=sys.stderr)
+            print(
+                f"{done} of {len(jobs)} drives, {time.monotonic() - began:.0f} s: {first.building} {first.lidar} "
+                f"{first.seed}, {first.scans} scans",
+                file=sys.stderr,
+            )
     if arguments.reuse is not None:
         runs += baselines_from(arguments.reuse, jobs)
     print("\nCases (P precision, R recall)\n")
@@ -313,11 +404,16 @@ def main() -> int:
         print("\nscan_surfaces\n")
         print_surfaces(runs)
     if arguments.out is not None:
-        replay_result.write_json(arguments.out, {
-            "seeds": [arguments.first_seed, arguments.first_seed + arguments.seeds - 1], "changed": arguments.changed,
-            "params": params.as_mapping(settings), "baselines": {name: baselines.SETTINGS[name]._asdict()
-                                                                 for name in baselines.SETTINGS},
-            "runs": [each.as_json() for each in runs]})
+        replay_result.write_json(
+            arguments.out,
+            {
+                "seeds": [arguments.first_seed, arguments.first_seed + arguments.seeds - 1],
+                "changed": arguments.changed,
+                "params": params.as_mapping(settings),
+                "baselines": {name: baselines.SETTINGS[name]._asdict() for name in baselines.SETTINGS},
+                "runs": [each.as_json() for each in runs],
+            },
+        )
     print("\nBars\n")
     return 0 if print_bars(runs) else 1
 

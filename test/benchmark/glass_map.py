@@ -24,10 +24,10 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np
 
 from glass_nav import params
-from glass_nav.cli import replay_run
-from glass_nav.evaluation import glass_agreement
-from glass_nav.localization.glass_mcl import GlassMcl
-from glass_nav.localization.glass_mcl_params import GlassMclParams
+from glass_nav.replay import replay_run
+from glass_nav.evaluation.metrics import glass_agreement
+from glass_nav.localization.localizer import GlassMcl
+from glass_nav.localization.localizer_params import GlassMclParams
 from glass_nav.recording.log_file import open_log
 from glass_nav.recording.recording import LogOptions
 from glass_nav.world import map_file
@@ -67,8 +67,9 @@ def draw(path: Path, grid_map: GridMap, percent: np.ndarray, other_m: Optional[n
     walls = grid_map.centres(*np.nonzero(grid_map.occupied))
     axes.scatter(*walls.T, s=1, c="0.75", label="walls")
     rows, columns = np.nonzero(percent >= 0)
-    points = axes.scatter(*grid_map.centres(rows, columns).T, s=4, c=percent[rows, columns], cmap="coolwarm", vmin=0,
-                          vmax=100)
+    points = axes.scatter(
+        *grid_map.centres(rows, columns).T, s=4, c=percent[rows, columns], cmap="coolwarm", vmin=0, vmax=100
+    )
     if other_m is not None:
         axes.scatter(*other_m.T, s=30, facecolors="none", edgecolors="k", linewidths=0.6, label="seen through")
     axes.plot(*result.map_from_base[:, :2].T, "g-", lw=0.6)
@@ -83,8 +84,9 @@ def draw(path: Path, grid_map: GridMap, percent: np.ndarray, other_m: Optional[n
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--logs", nargs="+",
-                        default=["uob_trace0", "olin_mac", "mit_csail", "intel", "aces", "seattle"])
+    parser.add_argument(
+        "--logs", nargs="+", default=["uob_trace0", "olin_mac", "mit_csail", "intel", "aces", "seattle"]
+    )
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--threshold", type=float, default=50.0, help="percent from which a cell is called glass")
@@ -95,22 +97,31 @@ def main() -> int:
     given = {name: json.loads(value) for name, _, value in (each.partition("=") for each in arguments.set)}
     settings = params.load(GlassMclParams, given, "glass_map")
     rows: List[Dict[str, Any]] = []
-    print("| log | seed | glass cells | share of walls | seen through | precision | recall | case 3 | case 4 | case 2 "
-          "|\n"
-          "|---|---|---|---|---|---|---|---|---|---|")
+    print(
+        "| log | seed | glass cells | share of walls | seen through | precision | recall | case 3 | case 4 | case 2 "
+        "|\n"
+        "|---|---|---|---|---|---|---|---|---|---|"
+    )
     for name in arguments.logs:
         other_m = see_through(name)
         for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds):
             grid_map, percent, result = learnt(name, seed, settings)
             told_m = grid_map.centres(*np.nonzero(percent >= arguments.threshold))
-            agreement = glass_agreement.of(told_m, np.zeros((0, 2)) if other_m is None else other_m,
-                                           int(grid_map.occupied.sum()))
+            agreement = glass_agreement.of(
+                told_m, np.zeros((0, 2)) if other_m is None else other_m, int(grid_map.occupied.sum())
+            )
             share = result.metrics()["case_share"]
             rows.append({"log": name, "seed": seed, **agreement.summary(), "case_share": share})
-            print(f"| {name} | {seed} | {agreement.told} | {100 * agreement.wall_share:.2f} % | "
-                  + (f"{agreement.other} | {agreement.precision:.2f} | {agreement.recall:.2f}" if other_m is not None
-                     else "no mask | – | –")
-                  + f" | {share['3']:.3f} | {share['4']:.3f} | {share['2']:.3f} |", flush=True)
+            print(
+                f"| {name} | {seed} | {agreement.told} | {100 * agreement.wall_share:.2f} % | "
+                + (
+                    f"{agreement.other} | {agreement.precision:.2f} | {agreement.recall:.2f}"
+                    if other_m is not None
+                    else "no mask | – | –"
+                )
+                + f" | {share['3']:.3f} | {share['4']:.3f} | {share['2']:.3f} |",
+                flush=True,
+            )
             if arguments.pictures is not None:
                 arguments.pictures.mkdir(parents=True, exist_ok=True)
                 draw(arguments.pictures / f"{name}_{seed}.png", grid_map, percent, other_m, result)

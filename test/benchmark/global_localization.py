@@ -28,14 +28,14 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # a process a core: th
 import numpy as np
 
 import tracks
-from glass_nav.localization.glass_mcl import GlassMcl
-from glass_nav.localization.glass_mcl_params import GlassMclParams
-from glass_nav.localization.pose_quality import LOCALIZED
+from glass_nav.localization.localizer import GlassMcl
+from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.integrity.pose_state import LOCALIZED
 
-MOST_M = 60.0          # of a search
-KNOWN_M = 5.0          # driven with the right pose before the robot is carried away
-LEFT_M = 3.0           # within which LOCALIZED has to be left
-BACK_M = 30.0          # within which the right place has to be found again
+MAX_M = 60.0  # of a search
+KNOWN_M = 5.0  # driven with the right pose before the robot is carried away
+LEFT_M = 3.0  # within which LOCALIZED has to be left
+BACK_M = 30.0  # within which the right place has to be found again
 COVARIANCE = np.diag([0.05, 0.05, 0.01])
 
 Job = Tuple[str, str, int]
@@ -50,7 +50,7 @@ def find(track: tracks.Track, seed: int) -> Dict[str, Any]:
     found_m: Optional[float] = None
     wrong = right_now = False
     last_m = 0.0
-    for way_m, moment in tracks.moments_of(track, start, MOST_M):
+    for way_m, moment in tracks.moments_of(track, start, MAX_M):
         estimate = mcl.update(moment.scan, moment.odom_from_base)
         right_now = tracks.is_right(estimate.map_from_base, moment.map_from_base)
         last_m = way_m
@@ -59,8 +59,14 @@ def find(track: tracks.Track, seed: int) -> Dict[str, Any]:
             found_m = way_m if found_m is None else found_m
             if way_m > found_m + 3.0:
                 break
-    return {"found_m": found_m, "right": found_m is not None and not wrong, "wrong": wrong,
-            "leads": right_now, "driven_m": last_m, "start": start}
+    return {
+        "found_m": found_m,
+        "right": found_m is not None and not wrong,
+        "wrong": wrong,
+        "leads": right_now,
+        "driven_m": last_m,
+        "start": start,
+    }
 
 
 def kidnap(track: tracks.Track, seed: int) -> Dict[str, Any]:
@@ -82,8 +88,13 @@ def kidnap(track: tracks.Track, seed: int) -> Dict[str, Any]:
         if estimate.state == LOCALIZED and right:
             back_m = float(way_m)
             break
-    return {"localized_before": before[-1] == LOCALIZED, "left_m": left_m, "back_m": back_m,
-            "left": left_m is not None and left_m <= LEFT_M, "back": back_m is not None}
+    return {
+        "localized_before": before[-1] == LOCALIZED,
+        "left_m": left_m,
+        "back_m": back_m,
+        "left": left_m is not None and left_m <= LEFT_M,
+        "back": back_m is not None,
+    }
 
 
 def elsewhere(track: tracks.Track, seed: int) -> Dict[str, Any]:
@@ -117,8 +128,14 @@ def run(job: Job) -> Dict[str, Any]:
     track = tracks.load(name, seed if name not in tracks.LOGS else 0)
     loaded = time.process_time()
     figures = TASKS[task](track, seed)
-    return {"task": task, "track": name, "seed": seed, **figures, "cpu_s": time.process_time() - loaded,
-            "loading_s": loaded - began}
+    return {
+        "task": task,
+        "track": name,
+        "seed": seed,
+        **figures,
+        "cpu_s": time.process_time() - loaded,
+        "loading_s": loaded - began,
+    }
 
 
 def median(runs: List[Dict[str, Any]], key: str) -> str:
@@ -133,21 +150,26 @@ def count(runs: List[Dict[str, Any]], key: str) -> int:
 def row(task: str, name: str, runs: List[Dict[str, Any]]) -> str:
     """A line of the table of a task."""
     if task == "global":
-        return (f"| {name} | {count(runs, 'right')}/{len(runs)} | {count(runs, 'wrong')} | {median(runs, 'found_m')} | "
-                f"{count(runs, 'leads')} | {median(runs, 'driven_m')} | {median(runs, 'cpu_s')} |")
+        return (
+            f"| {name} | {count(runs, 'right')}/{len(runs)} | {count(runs, 'wrong')} | {median(runs, 'found_m')} | "
+            f"{count(runs, 'leads')} | {median(runs, 'driven_m')} | {median(runs, 'cpu_s')} |"
+        )
     if task == "kidnap":
-        return (f"| {name} | {count(runs, 'localized_before')}/{len(runs)} | {count(runs, 'left')} | "
-                f"{median(runs, 'left_m')} | {count(runs, 'back')} | {median(runs, 'back_m')} | "
-                f"{median(runs, 'cpu_s')} |")
+        return (
+            f"| {name} | {count(runs, 'localized_before')}/{len(runs)} | {count(runs, 'left')} | "
+            f"{median(runs, 'left_m')} | {count(runs, 'back')} | {median(runs, 'back_m')} | "
+            f"{median(runs, 'cpu_s')} |"
+        )
     return f"| {name} | {count(runs, 'wrong')}/{len(runs)} | {median(runs, 'driven_m')} | {median(runs, 'cpu_s')} |"
 
 
 HEADERS = {
     "global": "| track | right place | wrong LOCALIZED | found after m | right at the end | driven m | CPU s |\n"
-              "|---|---|---|---|---|---|---|",
+    "|---|---|---|---|---|---|---|",
     "kidnap": "| track | LOCALIZED before | left within 3 m | left after m | right place again | after m | CPU s |\n"
-              "|---|---|---|---|---|---|---|",
-    "elsewhere": "| track | wrong LOCALIZED | driven m | CPU s |\n|---|---|---|---|"}
+    "|---|---|---|---|---|---|---|",
+    "elsewhere": "| track | wrong LOCALIZED | driven m | CPU s |\n|---|---|---|---|",
+}
 
 
 def bars(task: str, runs: List[Dict[str, Any]]) -> bool:
@@ -157,11 +179,17 @@ def bars(task: str, runs: List[Dict[str, Any]]) -> bool:
     def share(key: str) -> float:
         return count(runs, key) / total
 
-    checks = {"global": [("right place found", share("right") if task == "global" else 0.0, ">=", 0.95),
-                         ("wrong LOCALIZED", share("wrong") if "wrong" in runs[0] else 0.0, "<=", 0.0)],
-              "kidnap": [("LOCALIZED left within 3 m", share("left") if task == "kidnap" else 0.0, ">=", 0.95),
-                         ("right place again", share("back") if task == "kidnap" else 0.0, ">=", 0.90)],
-              "elsewhere": [("wrong LOCALIZED", share("wrong") if "wrong" in runs[0] else 0.0, "<=", 0.0)]}[task]
+    checks = {
+        "global": [
+            ("right place found", share("right") if task == "global" else 0.0, ">=", 0.95),
+            ("wrong LOCALIZED", share("wrong") if "wrong" in runs[0] else 0.0, "<=", 0.0),
+        ],
+        "kidnap": [
+            ("LOCALIZED left within 3 m", share("left") if task == "kidnap" else 0.0, ">=", 0.95),
+            ("right place again", share("back") if task == "kidnap" else 0.0, ">=", 0.90),
+        ],
+        "elsewhere": [("wrong LOCALIZED", share("wrong") if "wrong" in runs[0] else 0.0, "<=", 0.0)],
+    }[task]
     kept = True
     for what, value, sign, bar in checks:
         holds = value >= bar if sign == ">=" else value <= bar
@@ -190,7 +218,7 @@ def main() -> int:
             for figures in pool.imap(run, jobs):
                 runs.append(figures)
                 if len(runs) % arguments.seeds == 0:
-                    print(row(task, figures["track"], runs[-arguments.seeds:]), flush=True)
+                    print(row(task, figures["track"], runs[-arguments.seeds :]), flush=True)
             kept = bars(task, runs) and kept
             everything += runs
     if arguments.out is not None:

@@ -24,22 +24,36 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np
 
 from glass_nav.geometry import angles
-from glass_nav.localization import bearing_errors, triangulation
-from glass_nav.localization.triangulation import TriangulationError, TriangulationLimits
+from glass_nav.localization.bearings import bearing_errors, triangulation
+from glass_nav.localization.bearings.triangulation import TriangulationError, TriangulationLimits
 from glass_nav.sensing import bearings
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.world import landmark_map
 from glass_nav.world.landmark_map import LandmarkMap
 
-FIELD = LandmarkMap(tuple("ABCD"), np.array([[-5.0, 4.5], [-3.0, 8.0], [3.0, 7.0], [5.0, 4.0]]),
-                    np.radians([-45.0, -90.0, -90.0, -135.0]), np.full(4, np.pi / 2.0), np.full(4, 15.0), 0.0)
-ROOM = landmark_map.seen_from_all_sides("abcdef", np.array([[0.2, 3.0], [5.0, 0.1], [9.9, 2.0], [9.0, 7.9], [4.0, 7.8],
-                                                            [0.3, 6.5]]), 15.0)
+FIELD = LandmarkMap(
+    tuple("ABCD"),
+    np.array([[-5.0, 4.5], [-3.0, 8.0], [3.0, 7.0], [5.0, 4.0]]),
+    np.radians([-45.0, -90.0, -90.0, -135.0]),
+    np.full(4, np.pi / 2.0),
+    np.full(4, 15.0),
+    0.0,
+)
+ROOM = landmark_map.seen_from_all_sides(
+    "abcdef", np.array([[0.2, 3.0], [5.0, 0.1], [9.9, 2.0], [9.0, 7.9], [4.0, 7.8], [0.3, 6.5]]), 15.0
+)
 FIVE = landmark_map.seen_from_all_sides(ROOM.ids[:5], ROOM.positions_m[:5], 15.0)
 VIEWERS = np.array([[-1.0, 3.0], [1.0, 3.0], [1.0, 2.0], [-1.0, 2.0]])
 RANGES_M, BETWEEN_DEG = np.array([8.563, 7.937, 7.573]), (46.0, 54.0)
-TABLE_1_CM = np.array([[19.2, 19.4, 23.7, 30.2, 37.7], [15.1, 9.5, 11.7, 18.8, 27.0], [19.2, 9.5, 0.0, 9.3, 18.4],
-                       [27.7, 18.7, 11.4, 9.4, 14.7], [37.6, 29.3, 22.6, 18.5, 18.6]])
+TABLE_1_CM = np.array(
+    [
+        [19.2, 19.4, 23.7, 30.2, 37.7],
+        [15.1, 9.5, 11.7, 18.8, 27.0],
+        [19.2, 9.5, 0.0, 9.3, 18.4],
+        [27.7, 18.7, 11.4, 9.4, 14.7],
+        [37.6, 29.3, 22.6, 18.5, 18.6],
+    ]
+)
 LENIENT = TriangulationLimits(max_position_sigma_m=5.0)
 
 
@@ -54,8 +68,9 @@ def read_in_steps(landmarks: LandmarkMap, pose: np.ndarray, step_deg: float) -> 
 
 
 def fixes_per_second(rng: np.random.Generator, draws: int) -> float:
-    read = [read_in_steps(FIELD, np.append(VIEWERS[draw % 4], rng.uniform(-np.pi, np.pi)), 1.0)
-            for draw in range(draws)]
+    read = [
+        read_in_steps(FIELD, np.append(VIEWERS[draw % 4], rng.uniform(-np.pi, np.pi)), 1.0) for draw in range(draws)
+    ]
     started = time.process_time()
     for each in read:
         try:
@@ -68,8 +83,9 @@ def fixes_per_second(rng: np.random.Generator, draws: int) -> float:
 def table_1_off_cm() -> float:
     direction = np.radians([0.0, BETWEEN_DEG[0], sum(BETWEEN_DEG)])
     landmarks_m = RANGES_M[:, None] * np.stack([np.cos(direction), np.sin(direction)], axis=-1)
-    return float(np.abs(100.0 * bearing_errors.limits_of_error(landmarks_m, np.zeros(2), np.radians(1.0))
-                        - TABLE_1_CM).max())
+    return float(
+        np.abs(100.0 * bearing_errors.limits_of_error(landmarks_m, np.zeros(2), np.radians(1.0)) - TABLE_1_CM).max()
+    )
 
 
 def figure_7(rng: np.random.Generator, draws: int) -> float:
@@ -90,8 +106,9 @@ def figure_7(rng: np.random.Generator, draws: int) -> float:
     rows = {name: np.array(of_triples)[:, number] for number, name in enumerate(("A,B,C", "A,B,D", "A,C,D", "B,C,D"))}
     rows.update({"average": np.array(of_average), "least squares": np.array(of_fit)})
     for name, errors in rows.items():
-        print(f"  {name:14s} {errors.min():.3f} to {errors.max():.3f} m, median {np.median(errors):.3f} m "
-              f"({len(errors)})")
+        print(
+            f"  {name:14s} {errors.min():.3f} to {errors.max():.3f} m, median {np.median(errors):.3f} m ({len(errors)})"
+        )
     return better / draws
 
 

@@ -34,11 +34,10 @@ import numpy as np
 
 import tracks
 from glass_nav.geometry import se2
-from glass_nav.localization import motion
-from glass_nav.localization.glass_mcl_params import GlassMclParams
+from glass_nav.localization.localizer_params import GlassMclParams
 from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import GridMap
-from global_localization import MOST_M, count, median
+from global_localization import MAX_M, count, median
 
 REPO = Path(__file__).resolve().parents[2]
 WRITER = Path(__file__).resolve().with_name("mrpt_track_writer.cpp")
@@ -50,39 +49,71 @@ find_package(mrpt-maps REQUIRED)
 add_executable(mrpt_track_writer {source})
 target_link_libraries(mrpt_track_writer mrpt::obs mrpt::maps)
 """
-KEPT_M = 3.0                                         # of way in the right place make it found
-FREE, UNKNOWN, OCCUPIED = 0.99, 0.5, 0.01            # of a cell in MRPT's grids: how surely it is free
+KEPT_M = 3.0  # of way in the right place make it found
+FREE, UNKNOWN, OCCUPIED = 0.99, 0.5, 0.01  # of a cell in MRPT's grids: how surely it is free
 ESTIMATE = re.compile(r"PDF estimation: \(([^,]+),([^,]+),([^)]+)deg\)")
 
 SETTINGS: Dict[str, Dict[str, str]] = {
     "KLD_options": {
-        "KLD_binSize_PHI_deg": "10", "KLD_binSize_XY": "0.10", "KLD_delta": "0.01", "KLD_epsilon": "0.01",
-        "KLD_minSampleSize": "150", "KLD_maxSampleSize": "40000", "KLD_minSamplesPerBin": "0"},
+        "KLD_binSize_PHI_deg": "10",
+        "KLD_binSize_XY": "0.10",
+        "KLD_delta": "0.01",
+        "KLD_epsilon": "0.01",
+        "KLD_minSampleSize": "150",
+        "KLD_maxSampleSize": "40000",
+        "KLD_minSamplesPerBin": "0",
+    },
     "PF_options": {
-        "PF_algorithm": "0", "resamplingMethod": "0", "adaptiveSampleSize": "1", "BETA": "0.5", "sampleSize": "1"},
+        "PF_algorithm": "0",
+        "resamplingMethod": "0",
+        "adaptiveSampleSize": "1",
+        "BETA": "0.5",
+        "sampleSize": "1",
+    },
     "DummyOdometryParams": {"minStdXY": "0.10", "minStdPHI": "2.0"},
     "LocalizationExperiment": {
-        "use_3D_poses": "false", "particles_count": "40000", "init_PDF_mode": "0", "init_PDF_min_x": "0",
-        "init_PDF_min_y": "0", "experimentRepetitions": "1", "3DSceneFrequency": "-1",
-        "SHOW_PROGRESS_3D_REAL_TIME": "0"},
+        "use_3D_poses": "false",
+        "particles_count": "40000",
+        "init_PDF_mode": "0",
+        "init_PDF_min_x": "0",
+        "init_PDF_min_y": "0",
+        "experimentRepetitions": "1",
+        "3DSceneFrequency": "-1",
+        "SHOW_PROGRESS_3D_REAL_TIME": "0",
+    },
     "MetricMap": {
-        "occupancyGrid_count": "1", "gasGrid_count": "0", "landmarksMap_count": "0", "pointsMap_count": "0",
-        "beaconMap_count": "0", "likelihoodMapSelection": "-1"},
+        "occupancyGrid_count": "1",
+        "gasGrid_count": "0",
+        "landmarksMap_count": "0",
+        "pointsMap_count": "0",
+        "beaconMap_count": "0",
+        "likelihoodMapSelection": "-1",
+    },
     "MetricMap_occupancyGrid_00_likelihoodOpts": {
-        "likelihoodMethod": "4", "LF_decimation": "20", "LF_stdHit": "0.20", "LF_maxCorrsDistance": "0.30",
-        "LF_zHit": "0.95", "LF_zRandom": "0.05", "LF_maxRange": "80", "LF_alternateAverageMethod": "0"}}
+        "likelihoodMethod": "4",
+        "LF_decimation": "20",
+        "LF_stdHit": "0.20",
+        "LF_maxCorrsDistance": "0.30",
+        "LF_zHit": "0.95",
+        "LF_zRandom": "0.05",
+        "LF_maxRange": "80",
+        "LF_alternateAverageMethod": "0",
+    },
+}
 
 Job = Tuple[str, int, Dict[str, str], float]
 
 
 class Step(NamedTuple):
     """A scan that is given, and how far the robot has come."""
+
     way_m: float
     moment: tracks.Moment
 
 
 class Answer(NamedTuple):
     """Of one run of pf-localization."""
+
     grid_from_base: np.ndarray  # (U, 3) its mean after each scan, as many as it came to
     cpu_s: float
     out_of_time: bool
@@ -98,16 +129,22 @@ def settings_with(changes: Mapping[str, str]) -> Dict[str, Dict[str, str]]:
     for name in changes:
         if name not in known:
             raise ValueError(f"pf-localization has no setting {name!r} here, it has {', '.join(sorted(known))}")
-    return {section: {name: changes.get(name, value) for name, value in values.items()}
-            for section, values in SETTINGS.items()}
+    return {
+        section: {name: changes.get(name, value) for name, value in values.items()}
+        for section, values in SETTINGS.items()
+    }
 
 
 def config_text(folder: Path, grid_map: GridMap, settings: Mapping[str, Mapping[str, str]]) -> str:
     """The .ini for the map and the log in that folder; particles anywhere on the grid, whose corner is the origin."""
     rows, columns = grid_map.occupancy.shape
-    place = {"map_file": folder / "map.gridmap.gz", "rawlog_file": folder / "track.rawlog",
-             "logOutput_dir": folder / "log", "init_PDF_max_x": columns * grid_map.resolution_m,
-             "init_PDF_max_y": rows * grid_map.resolution_m}
+    place = {
+        "map_file": folder / "map.gridmap.gz",
+        "rawlog_file": folder / "track.rawlog",
+        "logOutput_dir": folder / "log",
+        "init_PDF_max_x": columns * grid_map.resolution_m,
+        "init_PDF_max_y": rows * grid_map.resolution_m,
+    }
     lines: List[str] = []
     for section, values in settings.items():
         everything = {**values, **place} if section == "LocalizationExperiment" else values
@@ -135,8 +172,15 @@ def scan_numbers(scan: Scan, odom_from_base: np.ndarray) -> np.ndarray:
     middle_rad = 0.5 * (bearings_rad[0] + bearings_rad[-1])
     base_from_middle = se2.compose(scan.base_from_laser, np.array([0.0, 0.0, middle_rad]))
     ranges_m = np.where(scan.answered, scan.ranges_m, np.nan)
-    return np.concatenate([[scan.stamp_ns * 1e-9], odom_from_base, base_from_middle,
-                           [abs(aperture_rad), aperture_rad > 0.0, scan.range_max_m, len(scan)], ranges_m])
+    return np.concatenate(
+        [
+            [scan.stamp_ns * 1e-9],
+            odom_from_base,
+            base_from_middle,
+            [abs(aperture_rad), aperture_rad > 0.0, scan.range_max_m, len(scan)],
+            ranges_m,
+        ]
+    )
 
 
 def steps_of(track: tracks.Track, start: int) -> List[Step]:
@@ -145,10 +189,10 @@ def steps_of(track: tracks.Track, start: int) -> List[Step]:
     steps: List[Step] = []
     taken: List[str] = []
     odom_from_last: Optional[np.ndarray] = None
-    for way_m, moment in tracks.moments_of(track, start, MOST_M):
+    for way_m, moment in tracks.moments_of(track, start, MAX_M):
         if odom_from_last is not None:
             ahead = se2.compose(se2.inverse(odom_from_last), moment.odom_from_base)
-            drove_m, turned_rad = motion.travelled(ahead)
+            drove_m, turned_rad = se2.travelled(ahead)
             if drove_m >= schedule.update_min_d or turned_rad >= schedule.update_min_a:
                 taken = []
         if moment.scan.lidar not in taken:
@@ -204,8 +248,13 @@ def localize(config: Path, most_s: float) -> Answer:
     out_of_time = False
     with log.open("w") as out:
         try:
-            done = subprocess.run(["pf-localization", str(config)], stdin=subprocess.DEVNULL, stdout=out,
-                                  stderr=subprocess.STDOUT, timeout=most_s)
+            done = subprocess.run(
+                ["pf-localization", str(config)],
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=subprocess.STDOUT,
+                timeout=most_s,
+            )
             if done.returncode:
                 raise RuntimeError(f"pf-localization: exit code {done.returncode}:\n{log.read_text()[-2000:]}")
         except subprocess.TimeoutExpired:
@@ -225,26 +274,41 @@ def run(job: Job) -> Dict[str, Any]:
         config = write(Path(folder), track.grid_map, steps, settings_with(changes))
         answer = localize(config, most_s)
     if len(answer.grid_from_base) != len(steps) and not answer.out_of_time:
-        raise RuntimeError(f"{name}: pf-localization got {len(steps)} scans and told "
-                           f"{len(answer.grid_from_base)} poses")
+        raise RuntimeError(
+            f"{name}: pf-localization got {len(steps)} scans and told {len(answer.grid_from_base)} poses"
+        )
     map_from_base = se2.compose(track.grid_map.map_from_grid, answer.grid_from_base)
-    way_m = np.array([step.way_m for step in steps[:len(map_from_base)]])
-    right = np.array([tracks.is_right(pose, step.moment.map_from_base)
-                      for pose, step in zip(map_from_base, steps)], bool)
+    way_m = np.array([step.way_m for step in steps[: len(map_from_base)]])
+    right = np.array(
+        [tracks.is_right(pose, step.moment.map_from_base) for pose, step in zip(map_from_base, steps)], bool
+    )
     found_m = found_after(way_m, right)
-    return {"track": name, "seed": seed, "start": start, "found": found_m is not None, "found_m": found_m,
-            "wrong": not len(right) or not right[-1], "driven_m": float(way_m[-1]) if len(way_m) else 0.0,
-            "scans": len(right), "out_of_time": answer.out_of_time, "cpu_s": answer.cpu_s}
+    return {
+        "track": name,
+        "seed": seed,
+        "start": start,
+        "found": found_m is not None,
+        "found_m": found_m,
+        "wrong": not len(right) or not right[-1],
+        "driven_m": float(way_m[-1]) if len(way_m) else 0.0,
+        "scans": len(right),
+        "out_of_time": answer.out_of_time,
+        "cpu_s": answer.cpu_s,
+    }
 
 
-HEADER = ("| track | right place | found after m | wrong at the end | out of time | driven m | CPU s |\n"
-          "|---|---|---|---|---|---|---|")
+HEADER = (
+    "| track | right place | found after m | wrong at the end | out of time | driven m | CPU s |\n"
+    "|---|---|---|---|---|---|---|"
+)
 
 
 def row(name: str, runs: List[Dict[str, Any]]) -> str:
     """A line of the table."""
-    return (f"| {name} | {count(runs, 'found')}/{len(runs)} | {median(runs, 'found_m')} | {count(runs, 'wrong')} | "
-            f"{count(runs, 'out_of_time')} | {median(runs, 'driven_m')} | {median(runs, 'cpu_s')} |")
+    return (
+        f"| {name} | {count(runs, 'found')}/{len(runs)} | {median(runs, 'found_m')} | {count(runs, 'wrong')} | "
+        f"{count(runs, 'out_of_time')} | {median(runs, 'driven_m')} | {median(runs, 'cpu_s')} |"
+    )
 
 
 def changes_from(assignments: List[str]) -> Dict[str, str]:
@@ -279,7 +343,7 @@ def main() -> int:
         for figures in pool.imap(run, jobs):
             runs.append(figures)
             if len(runs) % arguments.seeds == 0:
-                print(row(figures["track"], runs[-arguments.seeds:]), flush=True)
+                print(row(figures["track"], runs[-arguments.seeds :]), flush=True)
     print(f"\nfound {count(runs, 'found')} of {len(runs)}, wrong at the end {count(runs, 'wrong')}")
     if arguments.out is not None:
         arguments.out.write_text(json.dumps(runs, indent=1))

@@ -55,12 +55,17 @@ def main() -> int:
     ranges_m = casts["exact"]()
     checked = rng.choice(ranges_m.size, CHECKED_RAYS, replace=False)
     truth_m = slow_ranges(world, poses, angles_rad, args.max_range_m, checked)
-    wrong = {name: count_wrong(cast().ravel()[checked], truth_m,
-                               2.0 * world.resolution_m if name == "simulateScanRay" else 1e-6)
-             for name, cast in casts.items()}
+    wrong = {
+        name: count_wrong(
+            cast().ravel()[checked], truth_m, 2.0 * world.resolution_m if name == "simulateScanRay" else 1e-6
+        )
+        for name, cast in casts.items()
+    }
     height, width = world.occupancy.shape
-    print(f"{args.map}: {width} x {height} cells of {world.resolution_m} m, {POSES} poses x {BEAMS} beams "
-          f"to {args.max_range_m:g} m, mean {ranges_m[np.isfinite(ranges_m)].mean():.1f} m")
+    print(
+        f"{args.map}: {width} x {height} cells of {world.resolution_m} m, {POSES} poses x {BEAMS} beams "
+        f"to {args.max_range_m:g} m, mean {ranges_m[np.isfinite(ranges_m)].mean():.1f} m"
+    )
     print(f"{'':17}{'million rays / CPU s':>21}{'wrong of ' + str(CHECKED_RAYS):>16}")
     for name in casts:
         print(f"{name:17}{rates[name] / 1e6:21.1f}{wrong[name]:16d}")
@@ -68,8 +73,10 @@ def main() -> int:
 
     speed_up = rates["exact"] / rates["simulateScanRay"]
     passed = speed_up >= MIN_SPEED_UP and wrong["exact"] == 0
-    print(f"exact is {speed_up:.1f} times simulateScanRay (bar {MIN_SPEED_UP:g}), {wrong['exact']} rays wrong (bar 0): "
-          f"{'passed' if passed else 'MISSED'}")
+    print(
+        f"exact is {speed_up:.1f} times simulateScanRay (bar {MIN_SPEED_UP:g}), {wrong['exact']} rays wrong (bar 0): "
+        f"{'passed' if passed else 'MISSED'}"
+    )
     return 0 if passed else 1
 
 
@@ -93,14 +100,17 @@ def alternate(casts: Dict[str, Callable[[], np.ndarray]], rays: int) -> Dict[str
     return {name: rays / seconds for name, seconds in best.items()}
 
 
-def slow_ranges(world: GridMap, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float,
-                rays: np.ndarray) -> np.ndarray:
+def slow_ranges(
+    world: GridMap, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float, rays: np.ndarray
+) -> np.ndarray:
     """(N,) ranges of the rays with these flat indices, by the slow traversal."""
     in_grid = se2.compose(se2.inverse(world.map_from_grid), poses)
     in_grid[:, :2] /= world.resolution_m
     occupied, t_max = world.occupied, max_range_m / world.resolution_m
-    lengths = [slow_raycast.first_hit(occupied, *in_grid[pose, :2], in_grid[pose, 2] + angles_rad[beam], t_max)[0]
-               for pose, beam in zip(*np.divmod(rays, len(angles_rad)))]
+    lengths = [
+        slow_raycast.first_hit(occupied, *in_grid[pose, :2], in_grid[pose, 2] + angles_rad[beam], t_max)[0]
+        for pose, beam in zip(*np.divmod(rays, len(angles_rad)))
+    ]
     return np.array(lengths) * world.resolution_m
 
 
@@ -114,12 +124,15 @@ def print_surfaces(world: GridMap, caster: RayCaster, rng: np.random.Generator, 
     caster.normals()
     print(f"normals of the whole map: {1e3 * (time.process_time() - start):.0f} ms")
     near = poses_in(world, rng, 1) + rng.normal(0.0, [0.1, 0.1, 0.05], (60, 3))
-    batches = {f"{POSES} x {BEAMS} anywhere": (poses_in(world, rng, POSES), BEAMS),
-               "60 x 720 around one pose": (near, 720)}
+    batches = {
+        f"{POSES} x {BEAMS} anywhere": (poses_in(world, rng, POSES), BEAMS),
+        "60 x 720 around one pose": (near, 720),
+    }
     for name, (poses, beams) in batches.items():
         angles_rad = np.linspace(-np.pi, np.pi, beams, endpoint=False)
-        rate = alternate({name: lambda p=poses, a=angles_rad: caster.cast_surfaces(p, a, max_range_m).first_m},
-                         len(poses) * beams)[name]
+        rate = alternate(
+            {name: lambda p=poses, a=angles_rad: caster.cast_surfaces(p, a, max_range_m).first_m}, len(poses) * beams
+        )[name]
         print(f"cast_surfaces, {name}: {rate / 1e6:.1f} million rays / CPU s, {1e3 * len(poses) * beams / rate:.1f} ms")
 
 

@@ -27,9 +27,9 @@ import numpy as np
 
 import global_localization
 import tracks
-from glass_nav.localization.glass_mcl import GlassMcl
-from glass_nav.localization.glass_mcl_params import GlassMclParams
-from glass_nav.localization.pose_quality import LOCALIZED
+from glass_nav.localization.localizer import GlassMcl
+from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.integrity.pose_state import LOCALIZED
 
 AFTER_M = 10.0  # driven after each beginning
 WRONG_START = np.diag([0.25, 0.25, (np.pi / 12.0) ** 2])
@@ -38,6 +38,7 @@ CLASSES = np.linspace(0.0, 1.0, 11)
 
 class Told(NamedTuple):
     """One pose that was published."""
+
     reliability: float
     right: bool
     localized: bool
@@ -48,7 +49,7 @@ def carried(track: tracks.Track, rng: np.random.Generator) -> List[Told]:
     mcl = GlassMcl(GlassMclParams(), track.grid_map, rng)
     mcl.set_pose(moments[0].map_from_base, global_localization.COVARIANCE)
     after = int(np.searchsorted(tracks.ways(moments[down:]), AFTER_M))
-    return _follow(mcl, moments[:down + after])
+    return _follow(mcl, moments[: down + after])
 
 
 def started_wrong(track: tracks.Track, rng: np.random.Generator) -> List[Told]:
@@ -72,9 +73,13 @@ def _follow(mcl: GlassMcl, moments: List[tracks.Moment]) -> List[Told]:
     for moment in moments:
         estimate = mcl.update(moment.scan, moment.odom_from_base)
         if estimate.updated:
-            told.append(Told(float(estimate.reliability),
-                             tracks.is_right(estimate.map_from_base, moment.map_from_base),
-                             estimate.state == LOCALIZED))
+            told.append(
+                Told(
+                    float(estimate.reliability),
+                    tracks.is_right(estimate.map_from_base, moment.map_from_base),
+                    estimate.state == LOCALIZED,
+                )
+            )
     return told
 
 
@@ -93,8 +98,10 @@ def table(told: np.ndarray, right: np.ndarray) -> Tuple[List[str], float]:
     for index in range(len(CLASSES) - 1):
         chosen = which == index
         if chosen.any():
-            rows.append(f"| {CLASSES[index]:.1f} to {CLASSES[index + 1]:.1f} | {told[chosen].mean():.2f} | "
-                        f"{right[chosen].mean():.2f} | {int(chosen.sum())} |")
+            rows.append(
+                f"| {CLASSES[index]:.1f} to {CLASSES[index + 1]:.1f} | {told[chosen].mean():.2f} | "
+                f"{right[chosen].mean():.2f} | {int(chosen.sum())} |"
+            )
             error += chosen.mean() * abs(told[chosen].mean() - right[chosen].mean())
     return rows, float(error)
 
@@ -102,6 +109,7 @@ def table(told: np.ndarray, right: np.ndarray) -> Tuple[List[str], float]:
 def draw(told: np.ndarray, right: np.ndarray, path: Path) -> None:
     """The reliability plot: told against true, and how often each was told."""
     import matplotlib
+
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
@@ -126,8 +134,11 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=Path, help="folder for reliability.png and reliability.json")
     arguments = parser.parse_args()
-    jobs = [(name, seed) for name in arguments.tracks
-            for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)]
+    jobs = [
+        (name, seed)
+        for name in arguments.tracks
+        for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
+    ]
     with multiprocessing.Pool(arguments.jobs) as pool:
         everything = [told for each in pool.imap(run, jobs) for told in each]
     told = np.array([each.reliability for each in everything])
@@ -135,13 +146,16 @@ def main() -> int:
     localized = np.array([each.localized for each in everything])
     rows, error = table(told, right)
     print("| told | mean told | right | poses |\n|---|---|---|---|\n" + "\n".join(rows))
-    print(f"\nexpected calibration error {error:.3f} over {len(told)} poses; wrong among LOCALIZED "
-          f"{np.mean(~right[localized]):.4f} of {int(localized.sum())}")
+    print(
+        f"\nexpected calibration error {error:.3f} over {len(told)} poses; wrong among LOCALIZED "
+        f"{np.mean(~right[localized]):.4f} of {int(localized.sum())}"
+    )
     if arguments.out is not None:
         arguments.out.mkdir(parents=True, exist_ok=True)
         draw(told, right, arguments.out / "reliability.png")
-        (arguments.out / "reliability.json").write_text(json.dumps({"error": error, "told": told.tolist(),
-                                                                    "right": right.tolist()}))
+        (arguments.out / "reliability.json").write_text(
+            json.dumps({"error": error, "told": told.tolist(), "right": right.tolist()})
+        )
     return 0
 
 

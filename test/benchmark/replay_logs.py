@@ -6,7 +6,7 @@
     python test/benchmark/replay_logs.py --set laser_max_beams=90 --set vote_mode=paper
     python test/benchmark/replay_logs.py --even                  maps of the even scans, errors of the odd ones
 
-Starts as AMCL did for its figures: at the first reference pose. The logs are in GLASS_NAV_DATA (default
+InitialPoses as AMCL did for its figures: at the first reference pose. The logs are in GLASS_NAV_DATA (default
 ../shared/data beside the repository), the rawlog comes with apt's mrpt-common. A log is read once a process.
 """
 
@@ -29,10 +29,10 @@ import numpy as np
 import yaml
 
 from glass_nav import params
-from glass_nav.cli import replay_run
-from glass_nav.evaluation import pose_errors
-from glass_nav.localization.glass_mcl import GlassMcl
-from glass_nav.localization.glass_mcl_params import GlassMclParams
+from glass_nav.replay import replay_run
+from glass_nav.evaluation.metrics import pose_errors
+from glass_nav.localization.localizer import GlassMcl
+from glass_nav.localization.localizer_params import GlassMclParams
 from glass_nav.recording.log_file import open_log
 from glass_nav.recording.recording import LogOptions, Recording
 from glass_nav.world import map_file
@@ -45,15 +45,25 @@ COVARIANCE = np.diag([0.25, 0.25, (np.pi / 12.0) ** 2])  # AMCL's default
 
 class Peer(NamedTuple):
     """What another localizer did on the log, from INDEX.md beside the data."""
+
     rmse_m: float
     lost_1m_share: float
 
 
 PEERS = {  # AMCL 1.17.3, the better of two parameter sets; on the uwb log MRPT's pf-localization
-    "intel": Peer(0.247, 0.006), "mit_csail": Peer(0.182, 0.0), "aces": Peer(0.147, 0.0),
-    "acapulco": Peer(0.284, 0.006), "seattle": Peer(0.611, 0.066), "uob_trace0": Peer(0.085, 0.0),
-    "wean1": Peer(0.154, 0.0), "wean2": Peer(0.185, 0.0), "wean4": Peer(0.229, 0.0),
-    "olin_mac": Peer(0.059, 0.0), "mit_racecar2": Peer(0.097, 0.0), "uwb": Peer(0.149, 0.0)}
+    "intel": Peer(0.247, 0.006),
+    "mit_csail": Peer(0.182, 0.0),
+    "aces": Peer(0.147, 0.0),
+    "acapulco": Peer(0.284, 0.006),
+    "seattle": Peer(0.611, 0.066),
+    "uob_trace0": Peer(0.085, 0.0),
+    "wean1": Peer(0.154, 0.0),
+    "wean2": Peer(0.185, 0.0),
+    "wean4": Peer(0.229, 0.0),
+    "olin_mac": Peer(0.059, 0.0),
+    "mit_racecar2": Peer(0.097, 0.0),
+    "uwb": Peer(0.149, 0.0),
+}
 
 
 def files(name: str, even: bool) -> Tuple[Path, Path]:
@@ -87,6 +97,7 @@ def run(job: Tuple[str, int, GlassMclParams, bool]) -> Dict[str, Any]:
 
 def row(name: str, runs: List[Dict[str, Any]]) -> str:
     """A line of the table: means over the seeds."""
+
     def mean(key: str) -> float:
         return float(np.mean([np.inf if each[key] is None else each[key] for each in runs]))
 
@@ -95,13 +106,17 @@ def row(name: str, runs: List[Dict[str, Any]]) -> str:
     peer = PEERS[name]
     ratio = float(np.mean(rmse)) / peer.rmse_m
     marks = "".join([" > peer" if ratio > 1.0 else "", " LOST" if max(lost) > peer.lost_1m_share else ""])
-    return (f"| {name} | {np.mean(rmse):.3f} ({min(rmse):.3f}..{max(rmse):.3f}) | {mean('position_median_m'):.3f} | "
-            f"{mean('position_p95_m'):.3f} | {mean('yaw_mean_deg'):.2f} | {np.mean(lost):.3f} ({max(lost):.3f}) | "
-            f"{peer.rmse_m:.3f} | {peer.lost_1m_share:.3f} | {ratio:.2f}{marks} | {mean('cpu_ms_per_scan'):.1f} |")
+    return (
+        f"| {name} | {np.mean(rmse):.3f} ({min(rmse):.3f}..{max(rmse):.3f}) | {mean('position_median_m'):.3f} | "
+        f"{mean('position_p95_m'):.3f} | {mean('yaw_mean_deg'):.2f} | {np.mean(lost):.3f} ({max(lost):.3f}) | "
+        f"{peer.rmse_m:.3f} | {peer.lost_1m_share:.3f} | {ratio:.2f}{marks} | {mean('cpu_ms_per_scan'):.1f} |"
+    )
 
 
-HEADER = ("| log | rmse m (min..max) | median m | p95 m | yaw mean deg | > 1 m (max) | AMCL rmse m | AMCL > 1 m | "
-          "ratio | ms/scan |\n|---|---|---|---|---|---|---|---|---|---|")
+HEADER = (
+    "| log | rmse m (min..max) | median m | p95 m | yaw mean deg | > 1 m (max) | AMCL rmse m | AMCL > 1 m | "
+    "ratio | ms/scan |\n|---|---|---|---|---|---|---|---|---|---|"
+)
 
 
 def settings_from(path: Optional[Path], assignments: List[str]) -> GlassMclParams:
@@ -113,15 +128,19 @@ def settings_from(path: Optional[Path], assignments: List[str]) -> GlassMclParam
         mapping[name] = yaml.safe_load(value)
     known = set(params.names(GlassMclParams))
     if path is not None:  # a node's file has names of the node as well
-        mapping = {name: value for name, value in mapping.items()
-                   if name in known or name in {each.partition("=")[0] for each in assignments}}
+        mapping = {
+            name: value
+            for name, value in mapping.items()
+            if name in known or name in {each.partition("=")[0] for each in assignments}
+        }
     return params.load(GlassMclParams, mapping, "replay_logs")
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--logs", nargs="+", choices=sorted(PEERS), default=list(PEERS), metavar="NAME",
-                        help=" ".join(PEERS))
+    parser.add_argument(
+        "--logs", nargs="+", choices=sorted(PEERS), default=list(PEERS), metavar="NAME", help=" ".join(PEERS)
+    )
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
@@ -131,10 +150,16 @@ def main() -> int:
     parser.add_argument("--out", type=Path, help="JSON with all figures of all runs")
     arguments = parser.parse_args()
     settings = settings_from(arguments.params, arguments.set)
-    logs = [name for name in arguments.logs if not arguments.even or files(name, True)[1].name == "map_even.yaml"
-            and files(name, True)[1].is_file()]
-    jobs = [(name, seed, settings, arguments.even) for name in logs
-            for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)]
+    logs = [
+        name
+        for name in arguments.logs
+        if not arguments.even or files(name, True)[1].name == "map_even.yaml" and files(name, True)[1].is_file()
+    ]
+    jobs = [
+        (name, seed, settings, arguments.even)
+        for name in logs
+        for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
+    ]
     runs: Dict[str, List[Dict[str, Any]]] = {name: [] for name in logs}
     began = time.monotonic()
     print(HEADER, flush=True)
@@ -143,8 +168,9 @@ def main() -> int:
             runs[figures["log"]].append(figures)
             if len(runs[figures["log"]]) == arguments.seeds:
                 print(row(figures["log"], runs[figures["log"]]), flush=True)
-    print(f"\n{arguments.seeds} seeds, {time.monotonic() - began:.0f} s with {arguments.jobs} processes",
-          file=sys.stderr)
+    print(
+        f"\n{arguments.seeds} seeds, {time.monotonic() - began:.0f} s with {arguments.jobs} processes", file=sys.stderr
+    )
     if arguments.out is not None:
         arguments.out.write_text(json.dumps({"params": params.as_mapping(settings), "runs": runs}, indent=1))
     return 0

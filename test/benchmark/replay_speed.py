@@ -34,10 +34,25 @@ def measure(name: str, minutes: float, out: Path) -> Tuple[float, float, Dict[st
     folder = DATA / "logs" / name
     one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run([sys.executable, str(REPO / "scripts" / "glass_nav"), "replay", str(folder / f"{name}.bag"),
-                    "--map", str(folder / "map.yaml"), "--out", str(out), "--duration", str(60.0 * minutes)],
-                   env={**os.environ, **one_thread}, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                   stderr=subprocess.DEVNULL, check=True)
+    subprocess.run(
+        [
+            sys.executable,
+            str(REPO / "scripts" / "glass_nav"),
+            "replay",
+            str(folder / f"{name}.bag"),
+            "--map",
+            str(folder / "map.yaml"),
+            "--out",
+            str(out),
+            "--duration",
+            str(60.0 * minutes),
+        ],
+        env={**os.environ, **one_thread},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        check=True,
+    )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     metrics = json.loads((out / "metrics.json").read_text())
     cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
@@ -50,8 +65,9 @@ def main() -> int:
     parser.add_argument("--logs", nargs="+", default=LOGS, metavar="NAME")
     parser.add_argument("--minutes", type=float, default=10.0)
     given = parser.parse_args()
-    print("| log | scans × beams | Hz | s of log | CPU s | times real time | ms per scan | updates |\n" + 8 * "|---"
-          + "|")
+    print(
+        "| log | scans × beams | Hz | s of log | CPU s | times real time | ms per scan | updates |\n" + 8 * "|---" + "|"
+    )
     slow = []
     for name in given.logs:
         with tempfile.TemporaryDirectory() as out:
@@ -59,8 +75,11 @@ def main() -> int:
             beams = np.load(Path(out) / "beam_cases.npz")["cases"].shape[1]
         times, scans = log_s / cpu_s, metrics["scans"]
         slow += [name] if times < LEAST else []
-        print(f"| {name} | {scans} × {beams} | {scans / log_s:.1f} | {log_s:.0f} | {cpu_s:.1f} | {times:.1f} | "
-              f"{1e3 * cpu_s / scans:.1f} | {metrics['updates'] / scans:.2f} |", flush=True)
+        print(
+            f"| {name} | {scans} × {beams} | {scans / log_s:.1f} | {log_s:.0f} | {cpu_s:.1f} | {times:.1f} | "
+            f"{1e3 * cpu_s / scans:.1f} | {metrics['updates'] / scans:.2f} |",
+            flush=True,
+        )
     if slow:
         print(f"below {LEAST:g} times real time: {', '.join(slow)}")
     return 1 if slow else 0

@@ -30,20 +30,21 @@ REPO = Path(__file__).resolve().parents[2]
 sys.path.append(str(REPO / "test" / "unit" / "topology"))
 
 import made_atlases
-from glass_nav.topology import wake_up
-from glass_nav.topology.atlas import Atlas
-from glass_nav.topology.atlas_localizer import AtlasLocalizer, SearchParams
-from glass_nav.topology.wake_up import Surroundings, TrialParams
+from glass_nav.topology.search import wake_up_trials
+from glass_nav.topology.atlas.atlas import Atlas
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer, SearchParams
+from glass_nav.topology.search.wake_up_trials import Surroundings, TrialParams
 
 LIMITS_MS = {10_000: 10.0, 100_000: 60.0, 1_000_000: 300.0}
 
 
-def slowest_steps_ms(localizer: AtlasLocalizer, world: Surroundings, p: TrialParams, trials: int,
-                     seed: int) -> Tuple[np.ndarray, float, float]:
+def slowest_steps_ms(
+    localizer: AtlasLocalizer, world: Surroundings, p: TrialParams, trials: int, seed: int
+) -> Tuple[np.ndarray, float, float]:
     """(trials,) the slowest step of each; mean number of edges; share of trials in which errors were considered."""
     slowest, edges, errors = [], [], []
     for number in range(trials):
-        done = wake_up.run(localizer, world, p, np.random.default_rng([seed, number]))
+        done = wake_up_trials.run(localizer, world, p, np.random.default_rng([seed, number]))
         slowest.append(max(done.step_ms))
         edges.append(done.edges)
         errors.append(localizer.forest.errors > 0)
@@ -71,19 +72,25 @@ def main() -> int:
         localizer, world = AtlasLocalizer(atlas, SearchParams()), Surroundings.of(atlas)
         ready_s = time.process_time() - started
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-        print(f"{len(atlas.nodes)} nodes, {len(atlas.edges)} edges: arrays {size_mb(atlas):.0f} MB, process "
-              f"{memory:.0f} MB at most, ready in {ready_s:.2f} s")
+        print(
+            f"{len(atlas.nodes)} nodes, {len(atlas.edges)} edges: arrays {size_mb(atlas):.0f} MB, process "
+            f"{memory:.0f} MB at most, ready in {ready_s:.2f} s"
+        )
         limit = LIMITS_MS.get(nodes)
-        for what, p in (("no errors", TrialParams()),
-                        ("10 % missed, 5 % spurious", TrialParams(missed=0.1, spurious=0.05))):
+        for what, p in (
+            ("no errors", TrialParams()),
+            ("10 % missed, 5 % spurious", TrialParams(missed=0.1, spurious=0.05)),
+        ):
             slowest, edges, considered = slowest_steps_ms(localizer, world, p, arguments.trials, arguments.seed)
             verdict = ""
             if limit is not None and what == "no errors":
                 met = bool(slowest.max() <= limit)
                 kept &= met
                 verdict = f"   limit {limit:g} ms: {'kept' if met else 'missed'}"
-            print(f"  {what:26s} worst step {slowest.max():7.1f} ms, median of trials {np.median(slowest):7.1f} ms, "
-                  f"{edges:.1f} edges, errors considered in {100 * considered:.0f} %{verdict}")
+            print(
+                f"  {what:26s} worst step {slowest.max():7.1f} ms, median of trials {np.median(slowest):7.1f} ms, "
+                f"{edges:.1f} edges, errors considered in {100 * considered:.0f} %{verdict}"
+            )
     print(f"process {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3:.0f} MB at most")
     return 0 if kept else 1
 

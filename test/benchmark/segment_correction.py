@@ -39,12 +39,13 @@ import drives
 import replay_logs
 import tracks
 from glass_nav.geometry import angles, se2
-from glass_nav.localization import beam_weights, scan_alignment
-from glass_nav.localization.glass_mcl import GlassMcl
-from glass_nav.localization.glass_mcl_params import GlassMclParams
-from glass_nav.localization.segment_correction import SegmentCorrectionParams, SegmentCorrector
-from glass_nav.localization.segment_locator import SegmentLocator
-from glass_nav.localization.segment_polish import Polish
+from glass_nav.localization.particle_filter import importance_weights
+from glass_nav.hypotheses import scan_alignment
+from glass_nav.localization.localizer import GlassMcl
+from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.segments.segment_correction import SegmentCorrectionParams, SegmentCorrector
+from glass_nav.localization.segments.segment_locator import SegmentLocator
+from glass_nav.localization.segments.segment_polish import Polish
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.world import wall_segments
@@ -87,17 +88,19 @@ class Icp:
 
 class View(NamedTuple):
     """What a lidar saw somewhere."""
+
     frame: drives.Frame
     points: np.ndarray  # (B, 2) in the robot's frame, NaN: no answer
-    known: np.ndarray   # (B,) bool: its true case is 1, 3 or 4
+    known: np.ndarray  # (B,) bool: its true case is 1, 3 or 4
 
 
 def views(name: str, lidar_name: str, seed: int, count: int) -> Tuple[GridMap, List[View]]:
     """So many scans spread over the drive through a building."""
     grid_map, frames = drives.drive(name, lidar_name, seed)
     chosen = [frames[index] for index in np.linspace(0, len(frames) - 1, count).astype(int)]
-    return grid_map, [View(frame, frame.scan.points_in_base(), beam_weights.known_ends(frame.truth.case))
-                      for frame in chosen]
+    return grid_map, [
+        View(frame, frame.scan.points_in_base(), importance_weights.known_ends(frame.truth.case)) for frame in chosen
+    ]
 
 
 def walls(grid_map: GridMap) -> np.ndarray:
@@ -109,8 +112,8 @@ def walls(grid_map: GridMap) -> np.ndarray:
 
 def with_people(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """The same with a third of the beams cut short, in groups of about 15 beams."""
-    groups = np.repeat(rng.random(len(points) // 15 + 1) < PEOPLE_SHARE, 15)[:len(points)]
-    share = np.repeat(rng.uniform(0.2, 0.9, len(points) // 15 + 1), 15)[:len(points)]
+    groups = np.repeat(rng.random(len(points) // 15 + 1) < PEOPLE_SHARE, 15)[: len(points)]
+    share = np.repeat(rng.uniform(0.2, 0.9, len(points) // 15 + 1), 15)[: len(points)]
     return np.where(groups[:, None], share[:, None] * points, points)
 
 
@@ -121,8 +124,9 @@ def measures(corrector: SegmentCorrector, points: np.ndarray, pose: np.ndarray) 
 
 def around(corrector: SegmentCorrector, points: np.ndarray, true: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """(Y, X, 3) over offsets in the robot's frame, (T, 3) over turns, of Emse, Ecf and combined."""
-    plane = np.array([[measures(corrector, points, se2.compose(true, np.array([x, y, 0.0]))) for x in GRID_M]
-                      for y in GRID_M])
+    plane = np.array(
+        [[measures(corrector, points, se2.compose(true, np.array([x, y, 0.0]))) for x in GRID_M] for y in GRID_M]
+    )
     return plane, np.array([measures(corrector, points, true + [0.0, 0.0, turn]) for turn in GRID_RAD])
 
 
@@ -161,8 +165,12 @@ def quality(arguments: argparse.Namespace) -> bool:
             worst = np.array(off)  # (places, 3 measures, 3)
             distance = np.hypot(worst[..., 0], worst[..., 1]).max(axis=0)
             turn = np.abs(worst[..., 2]).max(axis=0)
-            print(f"| {name} | {'a third at people' if people else 'as seen'} | {len(off)} | " + " | ".join(
-                f"{metres:.2f} ({np.degrees(angle):.1f})" for metres, angle in zip(distance, turn)) + " |", flush=True)
+            print(
+                f"| {name} | {'a third at people' if people else 'as seen'} | {len(off)} | "
+                + " | ".join(f"{metres:.2f} ({np.degrees(angle):.1f})" for metres, angle in zip(distance, turn))
+                + " |",
+                flush=True,
+            )
             counted = slice(1, 3) if people else slice(0, 3)  # Emse is what people spoil
             fine &= bool(np.all(distance[counted] <= near_m + 1e-9) and np.all(turn[counted] <= near_rad + 1e-9))
             if arguments.out is not None and shown is not None:
@@ -180,8 +188,9 @@ def draw(path: Path, plane: np.ndarray, turns: np.ndarray) -> None:
 
     figure, axes = pyplot.subplots(2, 3, figsize=(11, 6.5), constrained_layout=True)
     for measure, name in enumerate(("Emse [m$^2$]", "Ecf", "combined")):
-        shown = axes[0, measure].imshow(plane[..., measure], origin="lower", cmap="viridis",
-                                        extent=[GRID_M[0], GRID_M[-1], GRID_M[0], GRID_M[-1]])
+        shown = axes[0, measure].imshow(
+            plane[..., measure], origin="lower", cmap="viridis", extent=[GRID_M[0], GRID_M[-1], GRID_M[0], GRID_M[-1]]
+        )
         figure.colorbar(shown, ax=axes[0, measure])
         axes[0, measure].plot(0.0, 0.0, "r+", markersize=12)
         axes[0, measure].set_title(name)
@@ -221,8 +230,10 @@ def basin(arguments: argparse.Namespace) -> bool:
     for name in arguments.buildings:
         grid_map, seen = views(name, arguments.lidar, arguments.seed, arguments.places)
         segments_m = walls(grid_map)
-        squares, literal = (SegmentCorrector(segments_m, params) for params in (
-            SegmentCorrectionParams(), SegmentCorrectionParams(method="document", iterations=40)))
+        squares, literal = (
+            SegmentCorrector(segments_m, params)
+            for params in (SegmentCorrectionParams(), SegmentCorrectionParams(method="document", iterations=40))
+        )
         locator, icp = SegmentLocator(grid_map), Icp(grid_map)
         rng = np.random.default_rng([arguments.seed, len(name)])
         here: Dict[Tuple[str, bool], List[bool]] = {}
@@ -235,9 +246,13 @@ def basin(arguments: argparse.Namespace) -> bool:
                 continue
             for _ in range(arguments.starts):
                 start = start_near(true, rng)
-                ends = (squares.correct(known, start).map_from_base, squares.correct(points, start).map_from_base,
-                        locator.locate(view.frame.scan, start).correction.map_from_base,
-                        literal.correct(known, start).map_from_base, icp.correct(known, start))
+                ends = (
+                    squares.correct(known, start).map_from_base,
+                    squares.correct(points, start).map_from_base,
+                    locator.locate(view.frame.scan, start).correction.map_from_base,
+                    literal.correct(known, start).map_from_base,
+                    icp.correct(known, start),
+                )
                 for way, end in zip(ways, ends):
                     for found in (here, all_of):
                         found.setdefault((way, bool(len(free))), []).append(is_right(end, true, free, lever_m))
@@ -249,8 +264,9 @@ def basin(arguments: argparse.Namespace) -> bool:
 def basin_row(name: str, found: Dict[Tuple[str, bool], List[bool]], ways: Tuple[str, ...]) -> str:
     cells = [f"{len(found.get((ways[0], False), []))}, {len(found.get((ways[0], True), []))}"]
     for way in ways:
-        cells.append(" / ".join(f"{np.mean(found[way, hall]):.3f}" if (way, hall) in found else "-"
-                                for hall in (False, True)))
+        cells.append(
+            " / ".join(f"{np.mean(found[way, hall]):.3f}" if (way, hall) in found else "-" for hall in (False, True))
+        )
     return f"| {name} | " + " | ".join(cells) + " |"
 
 
@@ -276,7 +292,8 @@ def speed(arguments: argparse.Namespace) -> bool:
         points = points[np.isfinite(points).all(axis=1)]
         points = points[np.resize(np.arange(len(points)), POINTS)]
         ways: Dict[str, Callable[[np.ndarray], object]] = {
-            "ICP": lambda start, points=points: icp.correct(points, start)}
+            "ICP": lambda start, points=points: icp.correct(points, start)
+        }
         for method in ("least_squares", "document"):
             corrector = SegmentCorrector(segments_m[nearest], SegmentCorrectionParams(method=method))
             ways[method] = lambda start, corrector=corrector, points=points: corrector.correct(points, start)
@@ -310,8 +327,9 @@ def filter_errors(arguments: argparse.Namespace, name: str, polished: bool) -> n
         grid_map, frames = drives.drive(name, arguments.lidar, seed, max_scans=200)
         mcl = GlassMcl(settings, grid_map, np.random.default_rng(seed))
         mcl.set_pose(frames[0].map_from_base, np.diag([0.1, 0.1, 0.05]) ** 2)
-        off = np.array([mcl.update(frame.scan, frame.odom_from_base).map_from_base - frame.map_from_base
-                        for frame in frames])
+        off = np.array(
+            [mcl.update(frame.scan, frame.odom_from_base).map_from_base - frame.map_from_base for frame in frames]
+        )
         found.append([np.hypot(off[:, 0], off[:, 1]).mean(), np.degrees(np.abs(angles.wrap(off[:, 2]))).mean()])
     return np.mean(found, axis=0)
 
@@ -360,14 +378,23 @@ def judge(arguments: argparse.Namespace) -> bool:
 
 def _values(field: DistanceField, corrector: SegmentCorrector, points: np.ndarray, pose: np.ndarray) -> List[float]:
     quality = corrector.quality(points, pose)
-    return [float(scan_alignment.fit(field, points, pose[None])[0]), quality.classification_factor, quality.combined,
-            -quality.mse_m2]
+    return [
+        float(scan_alignment.fit(field, points, pose[None])[0]),
+        quality.classification_factor,
+        quality.combined,
+        -quality.mse_m2,
+    ]
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--tasks", nargs="+", choices=TASKS, default=list(TASKS[:3]),
-                        help="default: quality basin speed; the others take long")
+    parser.add_argument(
+        "--tasks",
+        nargs="+",
+        choices=TASKS,
+        default=list(TASKS[:3]),
+        help="default: quality basin speed; the others take long",
+    )
     parser.add_argument("--logs", nargs="*", choices=sorted(replay_logs.PEERS), default=list(replay_logs.PEERS))
     parser.add_argument("--filter-seed", type=int, default=10, help="first of two of the filter (default 10)")
     parser.add_argument("--buildings", nargs="+", default=drives.buildings())

@@ -4,7 +4,7 @@
     python test/benchmark/soak.py                 # 30 simulated minutes, some 7 minutes by the clock
     python test/benchmark/soak.py --minutes 3     # what CI runs, about one minute
 
-Starts a ROS master on a free port and one localization_node (source .build/env.bash first). The robot drives to and fro
+InitialPoses a ROS master on a free port and one localization_node (source .build/env.bash first). The robot drives to and fro
 through a building of glass. Each simulated minute has: other parameters by dynamic_reconfigure, bad ones too; seconds
 without scans; seconds without odometry; another map with set_map; scans with nonsense in them, with stamps and frames
 that are none; a clock that jumps back; a global search that somebody ends with initialpose; and, at the speed of the
@@ -42,8 +42,8 @@ SCAN_RATE_HZ = 10.0
 STEP_S = 0.02
 TOLERANCE_NS = 100_000_000  # ~transform_tolerance
 POSE_BAR_M = 0.3
-LOOK_BACK = 50              # scans
-TRANSPORT_S = 0.1           # of a scan to the node, on a busy machine
+LOOK_BACK = 50  # scans
+TRANSPORT_S = 0.1  # of a scan to the node, on a busy machine
 
 
 def master() -> "Tuple[subprocess.Popen[bytes], str]":
@@ -51,20 +51,25 @@ def master() -> "Tuple[subprocess.Popen[bytes], str]":
     with socket.socket() as probe:
         probe.bind(("localhost", 0))
         port = probe.getsockname()[1]
-    process = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], stdout=subprocess.DEVNULL,
-                               stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        ["rosmaster", "--core", "-p", str(port)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        stdin=subprocess.DEVNULL,
+    )
     return process, f"http://localhost:{port}"
 
 
 @dataclass
 class Watch:
     """What was seen of the node."""
+
     memory_kb: List[Tuple[float, int]] = field(default_factory=list)  # simulated time [s], resident
-    threads: List[int] = field(default_factory=list)                  # at the end of each minute
+    threads: List[int] = field(default_factory=list)  # at the end of each minute
     passed_over: List[int] = field(default_factory=list)  # newer scans that lay before the node when it took one
-    age_s: List[float] = field(default_factory=list)      # of the stamp of tf when a scan comes, at the clock's speed
+    age_s: List[float] = field(default_factory=list)  # of the stamp of tf when a scan comes, at the clock's speed
     pose_off_m: List[float] = field(default_factory=list)  # at the end of each minute
-    update_s: List[float] = field(default_factory=list)   # the longest of each second
+    update_s: List[float] = field(default_factory=list)  # the longest of each second
     used: int = 0
     received: int = 0
 
@@ -109,12 +114,16 @@ class Soak:
 
     def _hear_tf(self, msg: Any) -> None:
         from glass_nav.ros import conversions
+
         now_s = time.monotonic()
         for transform in msg.transforms:
             if transform.header.frame_id == "map":
                 valid_ns = conversions.ns_from_stamp(transform.header.stamp)
-                newer = sum(1 for stamp_ns, sent_s in self._sent[-LOOK_BACK:]
-                            if stamp_ns > valid_ns - TOLERANCE_NS + 1000 and sent_s < self._done_s - TRANSPORT_S)
+                newer = sum(
+                    1
+                    for stamp_ns, sent_s in self._sent[-LOOK_BACK:]
+                    if stamp_ns > valid_ns - TOLERANCE_NS + 1000 and sent_s < self._done_s - TRANSPORT_S
+                )
                 self.watch.passed_over.append(newer)
                 self._last_tf, self._done_s = (valid_ns, transform.transform), now_s
 
@@ -131,20 +140,27 @@ class Soak:
     def _run_errands(self) -> None:
         import rospy
         from dynamic_reconfigure import DynamicReconfigureCallbackException
+
         while True:
             errand = self._errands.get()
             try:
                 errand()
-            except (ValueError, rospy.ROSException, rospy.ServiceException,
-                    DynamicReconfigureCallbackException) as err:  # what counts is that the node goes on
+            except (
+                ValueError,
+                rospy.ROSException,
+                rospy.ServiceException,
+                DynamicReconfigureCallbackException,
+            ) as err:  # what counts is that the node goes on
                 self.notes.append(f"{type(err).__name__}: {' '.join(str(err).split())[:150]}")
 
     def _reconfigure(self, minute: int) -> None:
         from dynamic_reconfigure import DynamicReconfigureCallbackException
         from dynamic_reconfigure.client import Client
+
         client = Client("/glass_localization", timeout=20.0)
-        client.update_configuration({"laser_z_hit": 0.9 + 0.05 * (minute % 2),
-                                     "max_particles": 3000 + 500 * (minute % 4)})
+        client.update_configuration(
+            {"laser_z_hit": 0.9 + 0.05 * (minute % 2), "max_particles": 3000 + 500 * (minute % 4)}
+        )
         try:
             client.update_configuration({"laser_z_hit": -1.0})
         except DynamicReconfigureCallbackException:  # refused, as it must be
@@ -158,12 +174,15 @@ class Soak:
         from nav_msgs.srv import SetMap, SetMapRequest
 
         from glass_nav.ros import conversions
+
         msg = conversions.msg_from_map(self._maps[number % 2], rospy.Time(1), "map")
         if not rospy.ServiceProxy("set_map", SetMap)(SetMapRequest(msg, self._start_msg())).success:
             self.notes.append("set_map was refused")
 
     def _start_msg(self) -> Any:
-        from glass_nav.ros import conversions, frame_messages
+        from glass_nav.ros import conversions
+        from glass_nav.ros.simulator import frame_messages
+
         frame = replace(self._frame, map_from_base=self._simulation.map_from_base)
         msg = frame_messages.initial_pose_msg(frame, frame_messages.FrameNames())
         msg.header.stamp = conversions.stamp_from_ns(self._simulation.stamp_ns + self._offset_ns)
@@ -172,14 +191,22 @@ class Soak:
     def _search(self) -> None:
         import rospy
         from std_srvs.srv import Empty
+
         rospy.ServiceProxy("global_localization", Empty)()
 
     def _spoilt(self, msg: Any, number: int) -> Any:
         """One way to spoil a scan after the other."""
         import rospy
+
         ways: List[Dict[str, Any]] = [
-            {"ranges": [math.nan] * len(msg.ranges)}, {"ranges": []}, {"range_max": 0.0}, {"angle_increment": math.nan},
-            {"ranges": [0.3] * len(msg.ranges)}, {"time_increment": -1.0}, {"ranges": [math.inf] * len(msg.ranges)}]
+            {"ranges": [math.nan] * len(msg.ranges)},
+            {"ranges": []},
+            {"range_max": 0.0},
+            {"angle_increment": math.nan},
+            {"ranges": [0.3] * len(msg.ranges)},
+            {"time_increment": -1.0},
+            {"ranges": [math.inf] * len(msg.ranges)},
+        ]
         way = number % (len(ways) + 3)
         if way < len(ways):
             for name, value in ways[way].items():
@@ -200,7 +227,9 @@ class Soak:
         from rosgraph_msgs.msg import Clock
         from tf2_msgs.msg import TFMessage
 
-        from glass_nav.ros import conversions, frame_messages
+        from glass_nav.ros import conversions
+        from glass_nav.ros.simulator import frame_messages
+
         simulation = self._simulation
         self._frame = simulation.look()
         began_ns = simulation.stamp_ns
@@ -217,8 +246,9 @@ class Soak:
             self._clock.publish(Clock(conversions.stamp_from_ns(stamp_ns)))
             transforms = [conversions.transform_stamped(stamp_ns, "base_link", "laser", simulation.base_from_laser)]
             if not 18.0 <= second < 21.0:
-                transforms.append(conversions.transform_stamped(stamp_ns, "odom", "base_link",
-                                                                simulation.reading.odom_from_base))
+                transforms.append(
+                    conversions.transform_stamped(stamp_ns, "odom", "base_link", simulation.reading.odom_from_base)
+                )
             self._tf.publish(TFMessage(transforms))
             if run_s >= next_scan_s:
                 next_scan_s += 1.0 / SCAN_RATE_HZ
@@ -235,7 +265,7 @@ class Soak:
                     self._scans.publish(msg)
                     if not 17.0 <= second < 22.0:
                         self._sent.append((self._frame.stamp_ns + self._offset_ns, time.monotonic()))
-                        del self._sent[:-2 * LOOK_BACK]
+                        del self._sent[: -2 * LOOK_BACK]
             if self._follower.done:
                 self._follower = self._follower.back()
             simulation.move(STEP_S, self._follower.command(simulation.map_from_base))
@@ -268,6 +298,7 @@ class Soak:
     def _pose_off_m(self) -> float:
         from glass_nav.geometry import se2
         from glass_nav.ros import conversions
+
         if self._last_tf is None:
             return math.inf
         told = se2.compose(conversions.planar_from_transform(self._last_tf[1]), self._simulation.reading.odom_from_base)
@@ -286,8 +317,10 @@ def thirds(watch: Watch) -> "List[float]":
     """Resident memory [MB] at the end of each third: the median of the last quarter of it."""
     times_s, memory_kb = np.array(watch.memory_kb, float).T
     ends_s = times_s[-1] * np.arange(1, 4) / 3.0
-    return [float(np.median(memory_kb[(times_s > end_s - times_s[-1] / 12.0) & (times_s <= end_s)])) / 1024.0
-            for end_s in ends_s]
+    return [
+        float(np.median(memory_kb[(times_s > end_s - times_s[-1] / 12.0) & (times_s <= end_s)])) / 1024.0
+        for end_s in ends_s
+    ]
 
 
 def faults(soak: Soak, alive: bool, memory_bar: float, any_age: bool) -> List[str]:
@@ -304,8 +337,9 @@ def faults(soak: Soak, alive: bool, memory_bar: float, any_age: bool) -> List[st
     if max(watch.passed_over, default=0) > 0:
         missed.append(f"a scan was used while {max(watch.passed_over)} newer ones lay before the node")
     if not any_age and max(watch.age_s, default=math.inf) > 1.0 / SCAN_RATE_HZ + 1e-6:
-        missed.append(f"tf was {max(watch.age_s, default=math.inf):.3f} s old, a scan came every "
-                      f"{1.0 / SCAN_RATE_HZ} s")
+        missed.append(
+            f"tf was {max(watch.age_s, default=math.inf):.3f} s old, a scan came every {1.0 / SCAN_RATE_HZ} s"
+        )
     if max(watch.pose_off_m, default=math.inf) > POSE_BAR_M:
         missed.append(f"the pose was {max(watch.pose_off_m, default=math.inf):.2f} m off at the end of a minute")
     if "a bad parameter was not refused" in soak.notes:
@@ -317,16 +351,22 @@ def report(soak: Soak, wall_s: float) -> None:
     """The figures."""
     watch = soak.watch
     age_s, passed = np.array(watch.age_s or [np.nan]), np.array(watch.passed_over or [0])
-    print(f"{soak._end_s / 60.0:g} simulated minutes in {wall_s:.0f} s; {watch.used} of {watch.received} scans used, "
-          f"longest updates {1e3 * float(np.median(watch.update_s or [np.nan])):.0f} ms (median of seconds)")
+    print(
+        f"{soak._end_s / 60.0:g} simulated minutes in {wall_s:.0f} s; {watch.used} of {watch.received} scans used, "
+        f"longest updates {1e3 * float(np.median(watch.update_s or [np.nan])):.0f} ms (median of seconds)"
+    )
     print("resident memory after each third: " + ", ".join(f"{each:.1f} MB" for each in thirds(watch)))
     print(f"threads at the end of each minute: {watch.threads}")
-    print(f"newer scans that lay before the node when it took one: at most {passed.max()}, of {len(passed)} in "
-          f"{np.count_nonzero(passed)} any")
-    print(f"age of the stamp of tf when the next scan comes, at the speed of the clock: median "
-          f"{np.median(age_s):.3f} s, p99 {np.quantile(age_s, 0.99):.3f} s, most {age_s.max():.3f} s "
-          f"({len(age_s)} scans; load of the machine "
-          f"{os.getloadavg()[1]:.1f} on {os.cpu_count()} processors)")
+    print(
+        f"newer scans that lay before the node when it took one: at most {passed.max()}, of {len(passed)} in "
+        f"{np.count_nonzero(passed)} any"
+    )
+    print(
+        f"age of the stamp of tf when the next scan comes, at the speed of the clock: median "
+        f"{np.median(age_s):.3f} s, p99 {np.quantile(age_s, 0.99):.3f} s, most {age_s.max():.3f} s "
+        f"({len(age_s)} scans; load of the machine "
+        f"{os.getloadavg()[1]:.1f} on {os.cpu_count()} processors)"
+    )
     print("position off at the end of each minute: " + ", ".join(f"{each:.3f}" for each in watch.pose_off_m) + " m")
     for note in sorted(set(soak.notes)):
         print(f"note, {soak.notes.count(note)} times: {note}")
@@ -336,8 +376,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--minutes", type=float, default=30.0, help="simulated (default 30)")
     parser.add_argument("--speed", type=float, default=6.0, help="simulated seconds in a second (default 6)")
-    parser.add_argument("--memory-bar", type=float, default=1.05, metavar="RATIO",
-                        help="of the last third to the second (default 1.05); the first minutes fill caches")
+    parser.add_argument(
+        "--memory-bar",
+        type=float,
+        default=1.05,
+        metavar="RATIO",
+        help="of the last third to the second (default 1.05); the first minutes fill caches",
+    )
     parser.add_argument("--any-age", action="store_true", help="do not judge the age of tf: the machine is busy")
     parser.add_argument("--log", type=Path, help="what the node prints; default: a temporary file")
     arguments = parser.parse_args()
@@ -348,13 +393,18 @@ def main() -> int:
     try:
         import rosgraph
         import rospy
+
         while not rosgraph.is_master_online(address):
             time.sleep(0.05)
         rospy.init_node("soak", disable_rostime=True, disable_signals=True)
         rospy.set_param("/use_sim_time", True)
         with open(log_path, "wb") as log:
-            node = subprocess.Popen([str(REPO / "scripts" / "localization_node"), "__name:=glass_localization"],
-                                    stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT)
+            node = subprocess.Popen(
+                [str(REPO / "scripts" / "localization_node"), "__name:=glass_localization"],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+            )
         soak = Soak(node.pid, arguments.minutes, arguments.speed)
         serve(soak)
         began_s = time.monotonic()
@@ -383,6 +433,7 @@ def serve(soak: Soak) -> None:
     from nav_msgs.srv import GetMap, GetMapResponse
 
     from glass_nav.ros import conversions
+
     msg = conversions.msg_from_map(soak._maps[0], rospy.Time(1), "map")
     rospy.Service("static_map", GetMap, lambda _: GetMapResponse(msg))
     rospy.wait_for_service("set_map", timeout=30.0)

@@ -25,22 +25,23 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from glass_nav.cli import replay_topology
+from glass_nav.replay import replay_topology
 from glass_nav.driving.local_map import LocalMapParams
 from glass_nav.driving.passing import PassingObserver, PassingParams
 from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings
 from glass_nav.simulation.simulation import Simulation
-from glass_nav.topology import atlas_file, shipped_atlases
-from glass_nav.topology.atlas import MEETPOINT, Atlas, twin
+from glass_nav.topology.atlas import atlas_file, shipped_atlases
+from glass_nav.topology.atlas.atlas import MEETPOINT, Atlas, twin
 
 OPAQUE = "opaque"  # beside the presets: film on all glass, the lidar "sensitive"
 SCAN_RATE_HZ = 5.0  # a scan every 0.12 m
-ROOM_M = 0.4        # on each side of an edge that it drives along
+ROOM_M = 0.4  # on each side of an edge that it drives along
 SUMMED = ("passed", "seen", "missed", "invented", "degree_right")
 
 
 class Job(NamedTuple):
     """One drive, looked at once or more."""
+
     building: str
     lidar: str
     seed: int
@@ -51,8 +52,9 @@ class Job(NamedTuple):
 def tour(atlas: Atlas, length_m: float, rng: np.random.Generator) -> np.ndarray:
     """(n, 2) waypoints along edges from meetpoint to meetpoint, never straight back; the longest of some tries."""
     wide = np.repeat(atlas.edges.clearance_m >= ROOM_M, 2)
-    wide &= (atlas.nodes.kind[atlas.darts.node] == MEETPOINT) & (atlas.nodes.kind[atlas.darts.node[twin(
-        np.arange(len(atlas.darts)))]] == MEETPOINT)
+    wide &= (atlas.nodes.kind[atlas.darts.node] == MEETPOINT) & (
+        atlas.nodes.kind[atlas.darts.node[twin(np.arange(len(atlas.darts)))]] == MEETPOINT
+    )
     tries = [_walk(atlas, wide, length_m, rng) for _ in range(20)]
     return max(tries, key=lambda line: float(np.hypot(*np.diff(line, axis=0).T).sum()))
 
@@ -77,10 +79,15 @@ def run(job: Job) -> List[Dict[str, Any]]:
     grid_map = building_map.draw(building)
     atlas = atlas_file.load(shipped_atlases.find(job.building))
     name = "sensitive" if job.lidar == OPAQUE else job.lidar
-    simulation = Simulation(building.opaque() if job.lidar == OPAQUE else building, lidar.preset(name), seed=job.seed,
-                            scan_rate_hz=SCAN_RATE_HZ)
-    observers = [PassingObserver(PassingParams(local_map=LocalMapParams(extend_glass_m=extend_m)))
-                 for extend_m in job.extend_m]
+    simulation = Simulation(
+        building.opaque() if job.lidar == OPAQUE else building,
+        lidar.preset(name),
+        seed=job.seed,
+        scan_rate_hz=SCAN_RATE_HZ,
+    )
+    observers = [
+        PassingObserver(PassingParams(local_map=LocalMapParams(extend_glass_m=extend_m))) for extend_m in job.extend_m
+    ]
     stamps_ns, poses = [], []
     for frame in simulation.drive(tour(atlas, job.length_m, np.random.default_rng([job.seed, 1]))):
         stamps_ns.append(frame.stamp_ns)
@@ -90,8 +97,9 @@ def run(job: Job) -> List[Dict[str, Any]]:
     rows = []
     for observer, extend_m in zip(observers, job.extend_m):
         score = replay_topology.score(atlas, grid_map, observer, np.array(stamps_ns), np.array(poses))
-        rows.append({"building": job.building, "lidar": job.lidar, "seed": job.seed, "extend_m": extend_m,
-                     **score.metrics()})
+        rows.append(
+            {"building": job.building, "lidar": job.lidar, "seed": job.seed, "extend_m": extend_m, **score.metrics()}
+        )
     return rows
 
 
@@ -100,12 +108,15 @@ def line(name: str, lidar_name: str, extend_m: float, rows: List[Dict[str, Any]]
     total = {key: sum(row[key] for row in rows) for key in SUMMED}
     why = {key: sum(row["missed_why"][key] for row in rows) for key in rows[0]["missed_why"]}
     off = [row["position_off_m"]["median_abs"] for row in rows if row["position_off_m"]["median_abs"] is not None]
-    length = [row["edge_length_off_m"]["median_abs"] for row in rows
-              if row["edge_length_off_m"]["median_abs"] is not None]
-    return (f"| {name} | {lidar_name} | {extend_m:g} | {total['passed']} | {total['seen']} | {total['missed']} | "
-            f"{why['doubtful']} / {why['unsteady']} / {why['nothing']} | {total['invented']} | "
-            f"{total['degree_right']} | {np.mean(off) if off else np.nan:.2f} | "
-            f"{np.mean(length) if length else np.nan:.2f} |")
+    length = [
+        row["edge_length_off_m"]["median_abs"] for row in rows if row["edge_length_off_m"]["median_abs"] is not None
+    ]
+    return (
+        f"| {name} | {lidar_name} | {extend_m:g} | {total['passed']} | {total['seen']} | {total['missed']} | "
+        f"{why['doubtful']} / {why['unsteady']} / {why['nothing']} | {total['invented']} | "
+        f"{total['degree_right']} | {np.mean(off) if off else np.nan:.2f} | "
+        f"{np.mean(length) if length else np.nan:.2f} |"
+    )
 
 
 def main() -> None:
@@ -120,9 +131,12 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=Path, help="file for all figures, json")
     arguments = parser.parse_args()
-    jobs = [Job(building, name, seed, arguments.extend, arguments.length) for building in arguments.buildings
-            for name in arguments.lidars
-            for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)]
+    jobs = [
+        Job(building, name, seed, arguments.extend, arguments.length)
+        for building in arguments.buildings
+        for name in arguments.lidars
+        for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
+    ]
     rows: List[Dict[str, Any]] = []
     with ProcessPoolExecutor(arguments.jobs) as pool:
         for job, found in zip(jobs, pool.map(run, jobs)):
@@ -130,15 +144,27 @@ def main() -> None:
             print(f"{job.building} {job.lidar} seed {job.seed}", file=sys.stderr, flush=True)
             if arguments.out:
                 arguments.out.write_text(json.dumps(rows, indent=1))
-    print("| building | lidar | panes extended, m | passed | seen | missed | doubtful / unsteady / nothing | "
-          "invented | degree right | nodes off, m | edge length off, m |\n"
-          "|---|---|---|---|---|---|---|---|---|---|---|")
+    print(
+        "| building | lidar | panes extended, m | passed | seen | missed | doubtful / unsteady / nothing | "
+        "invented | degree right | nodes off, m | edge length off, m |\n"
+        "|---|---|---|---|---|---|---|---|---|---|---|"
+    )
     for building in [*arguments.buildings, "all"]:
         for name in arguments.lidars:
             for extend_m in arguments.extend:
-                print(line(building, name, extend_m,
-                           [row for row in rows if building in ("all", row["building"])
-                            and (row["lidar"], row["extend_m"]) == (name, extend_m)]))
+                print(
+                    line(
+                        building,
+                        name,
+                        extend_m,
+                        [
+                            row
+                            for row in rows
+                            if building in ("all", row["building"])
+                            and (row["lidar"], row["extend_m"]) == (name, extend_m)
+                        ],
+                    )
+                )
 
 
 if __name__ == "__main__":

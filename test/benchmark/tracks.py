@@ -25,13 +25,15 @@ RIGHT_M, RIGHT_RAD = 0.7, np.radians(20.0)  # the references of the Wean logs ar
 
 class Moment(NamedTuple):
     """One scan and where the robot was."""
+
     scan: Scan
     odom_from_base: np.ndarray  # (3,)
-    map_from_base: np.ndarray   # (3,) the truth
+    map_from_base: np.ndarray  # (3,) the truth
 
 
 class Track(NamedTuple):
     """A robot on its way."""
+
     name: str
     grid_map: GridMap
     moments: List[Moment]
@@ -48,13 +50,21 @@ def load(name: str, seed: int) -> Track:
     if name not in LOGS:
         presets = drives.lidars()
         grid_map, frames = drives.drive(name, presets[seed % len(presets)], seed)
-        return Track(name, grid_map, [Moment(frame.scan, frame.odom_from_base, frame.map_from_base)
-                                      for frame in frames])
+        return Track(
+            name, grid_map, [Moment(frame.scan, frame.odom_from_base, frame.map_from_base) for frame in frames]
+        )
     recording, grid_map = replay_logs.load(name, False)
     truth = recording.ground_truth
     assert truth is not None
-    return Track(name, grid_map, [Moment(entry.scan, entry.odom_from_base, truth.at(np.int64(entry.scan.stamp_ns)))
-                                  for entry in recording if not isinstance(entry, Refusal)])
+    return Track(
+        name,
+        grid_map,
+        [
+            Moment(entry.scan, entry.odom_from_base, truth.at(np.int64(entry.scan.stamp_ns)))
+            for entry in recording
+            if not isinstance(entry, Refusal)
+        ],
+    )
 
 
 def start_of(track: Track, rng: np.random.Generator, share: float = 1.0 / 3.0) -> int:
@@ -62,8 +72,9 @@ def start_of(track: Track, rng: np.random.Generator, share: float = 1.0 / 3.0) -
     return int(rng.integers(max(1, int(share * len(track.moments)))))
 
 
-def carried_away(track: Track, rng: np.random.Generator, before_m: float,
-                 least_m: float = 2.0) -> Tuple[List[Moment], int]:
+def carried_away(
+    track: Track, rng: np.random.Generator, before_m: float, least_m: float = 2.0
+) -> Tuple[List[Moment], int]:
     """A drive in which the robot is carried to another place and notices nothing, and the moment it is set down.
 
     The odometry goes on as if nothing had happened; so do the stamps.
@@ -76,19 +87,27 @@ def carried_away(track: Track, rng: np.random.Generator, before_m: float,
     """
     way = ways(track.moments)
     half = [index for index in range(len(way)) if way[index] >= before_m]
-    lifted = int(rng.choice(half[:max(1, len(half) // 2)]))
+    lifted = int(rng.choice(half[: max(1, len(half) // 2)]))
     begin = int(np.searchsorted(way, way[lifted] - before_m))
     here = track.moments[lifted].map_from_base
-    there = [index for index, moment in enumerate(track.moments[:int(0.8 * len(way))])
-             if not _near(moment.map_from_base, here, least_m, np.radians(45.0))]
+    there = [
+        index
+        for index, moment in enumerate(track.moments[: int(0.8 * len(way))])
+        if not _near(moment.map_from_base, here, least_m, np.radians(45.0))
+    ]
     down = int(rng.choice(there))
     ahead = track.moments[lifted]
     shift_ns = ahead.scan.stamp_ns - track.moments[down].scan.stamp_ns + 1
     odom_from_odom = se2.compose(ahead.odom_from_base, se2.inverse(track.moments[down].odom_from_base))
-    after = [Moment(replace(moment.scan, stamp_ns=moment.scan.stamp_ns + shift_ns),
-                    se2.compose(odom_from_odom, moment.odom_from_base), moment.map_from_base)
-             for moment in track.moments[down:]]
-    return track.moments[begin:lifted + 1] + after, lifted + 1 - begin
+    after = [
+        Moment(
+            replace(moment.scan, stamp_ns=moment.scan.stamp_ns + shift_ns),
+            se2.compose(odom_from_odom, moment.odom_from_base),
+            moment.map_from_base,
+        )
+        for moment in track.moments[down:]
+    ]
+    return track.moments[begin : lifted + 1] + after, lifted + 1 - begin
 
 
 def ways(moments: List[Moment]) -> np.ndarray:

@@ -24,19 +24,26 @@ import glass_buildings  # first: it limits the threads of numpy
 import drives
 import numpy as np
 from baselines import Settings
-from glass_nav.localization.glass_mcl_params import GlassMclParams
+from glass_nav.localization.localizer_params import GlassMclParams
 
 SIGMAS_M = (0.05, 0.1, 0.2)
 HITS = {"field": ((0.95, 0.05, 0.0), (0.5, 0.5, 0.0)), "beam": ((0.7, 0.2, 0.1), (0.5, 0.5, 0.0))}  # hit, random, short
-BEAMS = {"amcl_field60": ((60, None), (60, 20.0)), "amcl_beam60": ((60, None), (60, 20.0)),  # at most, independent
-         "amcl_field_all": ((None, None), (None, 120.0), (None, 40.0)), "amcl_beam_all": ((None, 120.0), (None, 40.0)),
-         "ours_field": ((60, 40.0), (None, 120.0)), "ours_beam": ((60, 40.0), (None, 120.0))}
+BEAMS = {
+    "amcl_field60": ((60, None), (60, 20.0)),
+    "amcl_beam60": ((60, None), (60, 20.0)),  # at most, independent
+    "amcl_field_all": ((None, None), (None, 120.0), (None, 40.0)),
+    "amcl_beam_all": ((None, 120.0), (None, 40.0)),
+    "ours_field": ((60, 40.0), (None, 120.0)),
+    "ours_beam": ((60, 40.0), (None, 120.0)),
+}
 
 
 def candidates(name: str) -> List[Settings]:
     hits = HITS["field" if "field" in name else "beam"]
-    return [Settings(sigma, hit, rand, beams, independent, short) for sigma, (hit, rand, short), (beams, independent)
-            in itertools.product(SIGMAS_M, hits, BEAMS[name])]
+    return [
+        Settings(sigma, hit, rand, beams, independent, short)
+        for sigma, (hit, rand, short), (beams, independent) in itertools.product(SIGMAS_M, hits, BEAMS[name])
+    ]
 
 
 def run(job: glass_buildings.Job) -> List[Tuple[str, Settings, float, float]]:
@@ -60,22 +67,31 @@ def main() -> int:
     parser.add_argument("--max-scans", type=int, metavar="N")
     parser.add_argument("--jobs", type=int, default=1)
     arguments = parser.parse_args()
-    jobs = [glass_buildings.Job(building, lidar, seed, 0.0, arguments.max_scans, tuple(arguments.localizers),
-                                GlassMclParams()) for building in arguments.buildings for lidar in arguments.lidars
-            for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)]
+    jobs = [
+        glass_buildings.Job(
+            building, lidar, seed, 0.0, arguments.max_scans, tuple(arguments.localizers), GlassMclParams()
+        )
+        for building in arguments.buildings
+        for lidar in arguments.lidars
+        for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
+    ]
     figures: Dict[Tuple[str, Settings], List[Tuple[float, float]]] = {}
     with multiprocessing.Pool(arguments.jobs) as pool:
         for found in pool.imap_unordered(run, jobs):
             for name, settings, position_m, yaw_deg in found:
                 figures.setdefault((name, settings), []).append((position_m, yaw_deg))
     for name in arguments.localizers:
-        print(f"\n{name}\n| sigma m | z hit | z rand | z short | beams | count as | rmse m | yaw mean deg | "
-              "worst rmse m |\n|" + "---|" * 9)
+        print(
+            f"\n{name}\n| sigma m | z hit | z rand | z short | beams | count as | rmse m | yaw mean deg | "
+            "worst rmse m |\n|" + "---|" * 9
+        )
         rows = {settings: np.array(figures[name, settings]) for settings in candidates(name)}
         for settings, values in sorted(rows.items(), key=lambda row: np.log(row[1].mean(axis=0)).sum()):
-            print(f"| {settings.sigma_hit_m:g} | {settings.z_hit:g} | {settings.z_rand:g} | {settings.z_short:g} | "
-                  f"{settings.max_beams or 'all'} | {settings.independent_beams or 'as many'} | "
-                  f"{values[:, 0].mean():.4f} | {values[:, 1].mean():.3f} | {values[:, 0].max():.3f} |")
+            print(
+                f"| {settings.sigma_hit_m:g} | {settings.z_hit:g} | {settings.z_rand:g} | {settings.z_short:g} | "
+                f"{settings.max_beams or 'all'} | {settings.independent_beams or 'as many'} | "
+                f"{values[:, 0].mean():.4f} | {values[:, 1].mean():.3f} | {values[:, 0].max():.3f} |"
+            )
     return 0
 
 

@@ -32,10 +32,10 @@ sys.path.append(str(Path(__file__).resolve().parent))
 import baselines
 import drives
 from glass_nav import params
-from glass_nav.localization.beam_weights import BeamMixture
-from glass_nav.localization.glass_mcl import GlassMcl
-from glass_nav.localization.glass_mcl_params import GlassMclParams
-from glass_nav.localization.resampling import ParticleCount
+from glass_nav.localization.particle_filter.importance_weights import BeamMixture
+from glass_nav.localization.localizer import GlassMcl
+from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.particle_filter.resampling import ParticleCount
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
 from glass_nav.simulation import lidar
@@ -83,7 +83,8 @@ def compare(arguments: argparse.Namespace) -> Dict[str, float]:
     filters: Dict[str, baselines.Localizer] = {
         "ours": GlassMcl(settings, drive.grid_map, rng()),
         "ours, weights of the field": baselines.OtherWeights(settings, drive.grid_map, rng(), likelihood),
-        "plain, weights of the field": baselines.PlainMcl(settings, drive.grid_map, rng(), likelihood, count)}
+        "plain, weights of the field": baselines.PlainMcl(settings, drive.grid_map, rng(), likelihood, count),
+    }
     times: Dict[str, List[float]] = {name: [] for name in [*filters, CLASSIFY]}
     classifier = GlassMcl(GlassMclParams(), drive.grid_map, rng())
     covariance = np.diag([0.03, 0.03, 0.01]) ** 2
@@ -119,8 +120,15 @@ def main() -> int:
     arguments = parser.parse_args()
 
     grid_map = map_file.load(arguments.map)
-    settings = params.load(GlassMclParams, {"min_particles": arguments.particles, "max_particles": arguments.particles,
-                                            "laser_max_beams": arguments.weighted_beams}, "update_time")
+    settings = params.load(
+        GlassMclParams,
+        {
+            "min_particles": arguments.particles,
+            "max_particles": arguments.particles,
+            "laser_max_beams": arguments.weighted_beams,
+        },
+        "update_time",
+    )
     rng = np.random.default_rng(arguments.seed)
     caster = RayCaster(grid_map)
     mcl = GlassMcl(settings, grid_map, rng)
@@ -134,23 +142,33 @@ def main() -> int:
         whole.append(cpu_ms(lambda scan=scan: mcl.update(scan, np.zeros(3))))
         classified.append(cpu_ms(lambda scan=scan: mcl.update(scan, np.zeros(3))))  # it has not moved: cases only
 
-    print(f"{arguments.map}: {arguments.beams} beams classified by {settings.samples.sample_count} samples, "
-          f"{arguments.particles} particles weighted on {arguments.weighted_beams} beams; "
-          f"CPU ms, {arguments.runs} places")
+    print(
+        f"{arguments.map}: {arguments.beams} beams classified by {settings.samples.sample_count} samples, "
+        f"{arguments.particles} particles weighted on {arguments.weighted_beams} beams; "
+        f"CPU ms, {arguments.runs} places"
+    )
     for name, times in ((CLASSIFY, classified), ("whole update", whole)):
         print(f"  {name:12s}  median {np.median(times):6.1f}  min {min(times):6.1f}  max {max(times):6.1f}")
     limits = [(f"{arguments.limit_ms:g} ms for a whole update", float(np.median(whole)) <= arguments.limit_ms)]
     found = compare(arguments)
-    print(f"{arguments.building}: {arguments.compared_beams} beams, all weighted, {arguments.particles} particles; "
-          f"median CPU ms of a whole update, {arguments.runs} places")
+    print(
+        f"{arguments.building}: {arguments.compared_beams} beams, all weighted, {arguments.particles} particles; "
+        f"median CPU ms of a whole update, {arguments.runs} places"
+    )
     for name, each in found.items():
         if name != CLASSIFY:
             print(f"  {name:28s} {each:6.1f}   ours is {found['ours'] / each:.2f} times that")
     print(f"  {arguments.classified_beams} beams classified, told and cut: {found[CLASSIFY]:.1f} ms")
-    limits += [(f"{arguments.limit_ratio:g} times the same filter with the field's weights",
-                found["ours"] <= arguments.limit_ratio * found["ours, weights of the field"]),
-               (f"{arguments.limit_classify_ms:g} ms for {arguments.classified_beams} beams",
-                found[CLASSIFY] <= arguments.limit_classify_ms)]
+    limits += [
+        (
+            f"{arguments.limit_ratio:g} times the same filter with the field's weights",
+            found["ours"] <= arguments.limit_ratio * found["ours, weights of the field"],
+        ),
+        (
+            f"{arguments.limit_classify_ms:g} ms for {arguments.classified_beams} beams",
+            found[CLASSIFY] <= arguments.limit_classify_ms,
+        ),
+    ]
     for limit, kept in limits:
         print(f"  limit {limit}: {'kept' if kept else 'missed'}")
     return 0 if all(kept for _, kept in limits) else 1

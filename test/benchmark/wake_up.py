@@ -38,24 +38,25 @@ from glass_nav.driving.route import RoutePlanner
 from glass_nav.driving.route_follower import FollowerParams
 from glass_nav.driving.tasks import EdgeTask, GoTask, Moment, Task
 from glass_nav.geometry import angles, se2
-from glass_nav.localization.glass_mcl import GlassMcl
-from glass_nav.localization.glass_mcl_params import GlassMclParams
-from glass_nav.localization.scan_explanation import ScanExplanation
+from glass_nav.localization.localizer import GlassMcl
+from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.hypotheses.scan_explanation import ScanExplanation
 from glass_nav.simulation import lidar, shipped_buildings, start_place
 from glass_nav.simulation.simulation import Frame, Simulation
-from glass_nav.topology.atlas_localizer import AMBIGUOUS, CONFIRMED, AtlasLocalizer, Estimate, SearchParams
+from glass_nav.topology.search.atlas_localizer import AMBIGUOUS, CONFIRMED, AtlasLocalizer, Estimate, SearchParams
 
 CONTROL_S = 0.05
-SEARCH_S, LEG_S = 900.0, 120.0   # simulated, at most
-MOST_EDGES = 60
+SEARCH_S, LEG_S = 900.0, 120.0  # simulated, at most
+MAX_EDGES = 60
 LEGS = 3
 RIGHT_M, RIGHT_RAD = 0.5, math.radians(20.0)
-START_COVARIANCE = np.diag([0.25 ** 2, 0.25 ** 2, 0.17 ** 2])  # as topology_node hands it over
-LEAST_LEG_M, MOST_LEG_M, LEG_ROOM_M = 4.0, 15.0, 0.45
+START_COVARIANCE = np.diag([0.25**2, 0.25**2, 0.17**2])  # as topology_node hands it over
+MIN_LEG_M, MAX_LEG_M, LEG_ROOM_M = 4.0, 15.0, 0.45
 
 
 class Job(NamedTuple):
     """One robot."""
+
     building: str
     lidar: str
     opaque: bool
@@ -82,8 +83,12 @@ class Trial:
         self.limits = BaseLimits()
         self.driver = EdgeDriver(EdgeDriverParams(limits=self.limits))
         explanation = ScanExplanation(self.grid_map) if job.judge else None
-        self.localizer = AtlasLocalizer(self.atlas, SearchParams(follow_places=4 if job.follow else 0),
-                                        explanation.shares if explanation else None, explanation)
+        self.localizer = AtlasLocalizer(
+            self.atlas,
+            SearchParams(follow_places=4 if job.follow else 0),
+            explanation.shares if explanation else None,
+            explanation,
+        )
         self.rng = np.random.default_rng([job.seed, 2])
         self.collisions = 0
         self.map_from_odom: Optional[np.ndarray] = None
@@ -133,16 +138,24 @@ class Trial:
                 continue
             estimate = self._told(task.arrival, rank)
             if self.verbose:
-                print(f"{self.now_s:7.1f} s depth {estimate.depth} {estimate.state}: {estimate.reason}; rank "
-                      f"{estimate.choice.rank if estimate.choice else '-'}; {self._truth(task.arrival)}"
-                      f"{self._scans_say()}", flush=True)
-            if estimate.done or estimate.depth >= MOST_EDGES or estimate.choice is None:
+                print(
+                    f"{self.now_s:7.1f} s depth {estimate.depth} {estimate.state}: {estimate.reason}; rank "
+                    f"{estimate.choice.rank if estimate.choice else '-'}; {self._truth(task.arrival)}"
+                    f"{self._scans_say()}",
+                    flush=True,
+                )
+            if estimate.done or estimate.depth >= MAX_EDGES or estimate.choice is None:
                 break
             rank = estimate.choice.rank
-        return {"state": "NO_MEETPOINT" if estimate is None else estimate.state, "failures": failures,
-                "edges": -1 if estimate is None else estimate.depth, "search_s": self.now_s,
-                "candidates": -1 if estimate is None else len(estimate.dart),
-                "reason": "" if estimate is None else estimate.reason, **self._errors(estimate)}
+        return {
+            "state": "NO_MEETPOINT" if estimate is None else estimate.state,
+            "failures": failures,
+            "edges": -1 if estimate is None else estimate.depth,
+            "search_s": self.now_s,
+            "candidates": -1 if estimate is None else len(estimate.dart),
+            "reason": "" if estimate is None else estimate.reason,
+            **self._errors(estimate),
+        }
 
     def _told(self, arrival: Arrival, rank: Optional[int]) -> Estimate:
         last = self.localizer.estimate
@@ -156,8 +169,10 @@ class Trial:
         at = se2.transform_points(self.simulation.map_from_base, arrival.meetpoint.centre_m)
         away = np.hypot(*(self.atlas.nodes.position_m - at).T)
         node = int(away.argmin())
-        return (f"node {node} {away[node]:.2f} m off, degree {arrival.meetpoint.degree} of {self.atlas.degree[node]}, "
-                f"r {arrival.meetpoint.r_m:.2f} of {self.atlas.nodes.r_m[node]:.2f} m{self._edge_truth(arrival, node)}")
+        return (
+            f"node {node} {away[node]:.2f} m off, degree {arrival.meetpoint.degree} of {self.atlas.degree[node]}, "
+            f"r {arrival.meetpoint.r_m:.2f} of {self.atlas.nodes.r_m[node]:.2f} m{self._edge_truth(arrival, node)}"
+        )
 
     def _scans_say(self) -> str:
         """How the followed pose that explains most compares, and how far it is off the truth."""
@@ -165,8 +180,10 @@ class Trial:
         if standing is None:
             return ""
         off_m = float(np.hypot(*(standing.map_from_base - self.simulation.map_from_base)[:2]))
-        return (f"; scans: {standing.places} places, {standing.share:.2f}, lead {standing.lead:.2f}, now "
-                f"{standing.share_now:.2f}, lead {standing.lead_now:.2f}, {off_m:.2f} m off")
+        return (
+            f"; scans: {standing.places} places, {standing.share:.2f}, lead {standing.lead:.2f}, now "
+            f"{standing.share_now:.2f}, lead {standing.lead_now:.2f}, {off_m:.2f} m off"
+        )
 
     def _edge_truth(self, arrival: Arrival, node: int) -> str:
         """The edges between the last node and this one that are most like what was driven."""
@@ -177,8 +194,10 @@ class Trial:
         ends = self.atlas.darts.node.reshape(-1, 2)
         edges = np.flatnonzero((np.sort(ends, axis=1) == sorted((before, node))).all(axis=1)).tolist()
         lengths = [f"{self.atlas.edges.length_m[edge]:.2f}/{self.atlas.edges.chord_m[edge]:.2f}" for edge in edges]
-        return (f"; rank {driven.rank} from node {before}, {driven.length_m:.2f}/{driven.chord_m:.2f} m of "
-                f"{' or '.join(lengths) or 'no edge'}")
+        return (
+            f"; rank {driven.rank} from node {before}, {driven.length_m:.2f}/{driven.chord_m:.2f} m of "
+            f"{' or '.join(lengths) or 'no edge'}"
+        )
 
     def _errors(self, estimate: Optional[Estimate]) -> Dict[str, Any]:
         truth = self.simulation.map_from_base
@@ -209,8 +228,11 @@ class Trial:
                 self.map_from_odom = se2.compose(estimate.map_from_base, se2.inverse(frame.odom_from_base))
                 off_m.append(float(np.hypot(*(estimate.map_from_base[:2] - frame.map_from_base[:2]))))
             outcomes.append("TIME" if task.outcome is None else task.outcome.code)
-        return {"legs": outcomes, "tracking_m": float(np.mean(off_m)) if off_m else math.nan,
-                "tracking_max_m": float(np.max(off_m)) if off_m else math.nan}
+        return {
+            "legs": outcomes,
+            "tracking_m": float(np.mean(off_m)) if off_m else math.nan,
+            "tracking_max_m": float(np.max(off_m)) if off_m else math.nan,
+        }
 
     def _goals(self, planner: RoutePlanner) -> Iterator[int]:
         for _ in range(LEGS):
@@ -223,7 +245,7 @@ class Trial:
                     route = planner.to_node(here, node)
                 except ValueError:
                     continue
-                if LEAST_LEG_M <= route.length_m <= MOST_LEG_M:
+                if MIN_LEG_M <= route.length_m <= MAX_LEG_M:
                     yield node
                     break
 
@@ -235,17 +257,24 @@ def run(job: Job) -> Dict[str, Any]:
     found = trial.search()
     if found["right"] and job.tour:
         found.update(trial.tour())
-    return {**job._asdict(), **found, "collisions": trial.collisions, "cpu_s": time.process_time() - began,
-            "all_s": trial.now_s}
+    return {
+        **job._asdict(),
+        **found,
+        "collisions": trial.collisions,
+        "cpu_s": time.process_time() - began,
+        "all_s": trial.now_s,
+    }
 
 
 def told(found: Dict[str, Any]) -> str:
     """One run in one line."""
     verdict = ", right" if found["right"] else ", WRONG" if found["wrong"] else ""
-    return (f"{found['building']} {found['lidar']} seed {found['seed']}: {found['state']}{verdict} after "
-            f"{found['edges']} edges, {found['search_s']:.0f} s ({found['reason']}); {found['collisions']} collisions; "
-            f"legs {found.get('legs', '-')}, tracking {found.get('tracking_m', math.nan):.3f} m; failures "
-            f"{found['failures']}; {found['cpu_s']:.0f} s CPU")
+    return (
+        f"{found['building']} {found['lidar']} seed {found['seed']}: {found['state']}{verdict} after "
+        f"{found['edges']} edges, {found['search_s']:.0f} s ({found['reason']}); {found['collisions']} collisions; "
+        f"legs {found.get('legs', '-')}, tracking {found.get('tracking_m', math.nan):.3f} m; failures "
+        f"{found['failures']}; {found['cpu_s']:.0f} s CPU"
+    )
 
 
 def line(name: str, runs: List[Dict[str, Any]]) -> str:
@@ -253,21 +282,24 @@ def line(name: str, runs: List[Dict[str, Any]]) -> str:
     right = [each for each in runs if each["right"]]
     states = [each["state"] for each in runs if not each["right"]]
     legs = [leg for each in right for leg in each.get("legs", [])]
+
     def mean(key: str) -> str:
         known = [each[key] for each in right if not math.isnan(each.get(key, math.nan))]  # small parts have no goals
         return f"{np.mean(known):.3f}" if known else "-"
-    return (f"| {name} | {len(runs)} | {len(right)} | {sum(each['wrong'] for each in runs)} | "
-            f"{', '.join(f'{states.count(state)} {state}' for state in sorted(set(states))) or '-'} | "
-            f"{np.mean([each['edges'] for each in runs]):.1f} | {np.mean([each['search_s'] for each in runs]):.0f} | "
-            f"{sum(each['collisions'] > 0 for each in runs)} | {mean('error_m')} | {mean('tracking_m')} | "
-            f"{sum(leg == tasks.SUCCEEDED for leg in legs)}/{len(legs)} |")
+
+    return (
+        f"| {name} | {len(runs)} | {len(right)} | {sum(each['wrong'] for each in runs)} | "
+        f"{', '.join(f'{states.count(state)} {state}' for state in sorted(set(states))) or '-'} | "
+        f"{np.mean([each['edges'] for each in runs]):.1f} | {np.mean([each['search_s'] for each in runs]):.0f} | "
+        f"{sum(each['collisions'] > 0 for each in runs)} | {mean('error_m')} | {mean('tracking_m')} | "
+        f"{sum(leg == tasks.SUCCEEDED for leg in legs)}/{len(legs)} |"
+    )
 
 
 def main() -> None:
     """Run all, print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--buildings", nargs="+", default=list(shipped_buildings.shipped()),
-                        help=floors.HELP)
+    parser.add_argument("--buildings", nargs="+", default=list(shipped_buildings.shipped()), help=floors.HELP)
     parser.add_argument("--lidars", nargs="+", default=["sensitive"], choices=list(lidar.PRESETS))
     parser.add_argument("--opaque", action="store_true", help="film on all glass")
     parser.add_argument("--seeds", type=int, default=2, help="robots in each building with each lidar")
@@ -275,18 +307,38 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--no-scans", action="store_true", help="candidates are not judged by scans")
     parser.add_argument("--graph-only", action="store_true", help="no poses are followed by the scans")
-    parser.add_argument("--believed", choices=list(shipped_buildings.shipped()), metavar="BUILDING",
-                        help="give all robots the map and atlas of this one: whoever is elsewhere is to be LOST")
-    parser.add_argument("--anywhere", action="store_true",
-                        help="robots begin in any part of a floor, not only in the one that its own start is in")
+    parser.add_argument(
+        "--believed",
+        choices=list(shipped_buildings.shipped()),
+        metavar="BUILDING",
+        help="give all robots the map and atlas of this one: whoever is elsewhere is to be LOST",
+    )
+    parser.add_argument(
+        "--anywhere",
+        action="store_true",
+        help="robots begin in any part of a floor, not only in the one that its own start is in",
+    )
     parser.add_argument("--no-tour", action="store_true", help="a robot that is found drives no tour")
     parser.add_argument("--verbose", action="store_true", help="tell each step")
     parser.add_argument("--out", type=Path, help="file for all figures, json")
     arguments = parser.parse_args()
-    jobs = [Job(building, name, arguments.opaque, seed, not arguments.no_scans, not arguments.graph_only,
-                not arguments.no_tour, arguments.believed or building, arguments.anywhere, arguments.verbose)
-            for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
-            for building in arguments.buildings for name in arguments.lidars]
+    jobs = [
+        Job(
+            building,
+            name,
+            arguments.opaque,
+            seed,
+            not arguments.no_scans,
+            not arguments.graph_only,
+            not arguments.no_tour,
+            arguments.believed or building,
+            arguments.anywhere,
+            arguments.verbose,
+        )
+        for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
+        for building in arguments.buildings
+        for name in arguments.lidars
+    ]
     runs: List[Dict[str, Any]] = []
     with ProcessPoolExecutor(arguments.jobs) as pool:
         for found in pool.map(run, jobs):
@@ -294,8 +346,10 @@ def main() -> None:
             print(told(found), file=sys.stderr, flush=True)
             if arguments.out:
                 arguments.out.write_text(json.dumps(runs, indent=1))
-    print("| building | robots | right | wrong | others | edges | search, s | with a collision | error, m | "
-          "tracking, m | legs |\n|---|---|---|---|---|---|---|---|---|---|---|")
+    print(
+        "| building | robots | right | wrong | others | edges | search, s | with a collision | error, m | "
+        "tracking, m | legs |\n|---|---|---|---|---|---|---|---|---|---|---|"
+    )
     for name in arguments.buildings:
         print(line(name, [each for each in runs if each["building"] == name]))
     print(line("all", runs))

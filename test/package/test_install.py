@@ -15,16 +15,23 @@ WORKSPACE = REPO / ".build" / "ws"
 SHELL = {"setup", "demo", "test"}  # programs of the checkout
 PROGRAMS = sorted(path.name for path in (REPO / "scripts").iterdir() if path.is_file() and path.name not in SHELL)
 
-pytestmark = [pytest.mark.xdist_group("one_at_a_time"),  # not while a rostest's nodes start from this workspace
-              pytest.mark.skipif(not (WORKSPACE / "build").exists(), reason="no catkin workspace: run by scripts/test")]
+pytestmark = [
+    pytest.mark.xdist_group("one_at_a_time"),  # not while a rostest's nodes start from this workspace
+    pytest.mark.skipif(not (WORKSPACE / "build").exists(), reason="no catkin workspace: run by scripts/test"),
+]
 
 
 @pytest.fixture(scope="module")
 def install() -> Path:
     """The install space, made anew; `make install` is what catkin_make install calls."""
     shutil.rmtree(WORKSPACE / "install", ignore_errors=True)
-    done = subprocess.run(["make", "-C", str(WORKSPACE / "build"), "install"], stdin=subprocess.DEVNULL,
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    done = subprocess.run(
+        ["make", "-C", str(WORKSPACE / "build"), "install"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
     assert done.returncode == 0, done.stdout
     return WORKSPACE / "install"
 
@@ -33,9 +40,15 @@ def in_install_space(install: Path, command: str, cwd: Path) -> "subprocess.Comp
     """A command of a shell that knows the install space only."""
     noetic = "/opt/ros/noetic/setup.bash"
     before = f"source {noetic}; " if os.path.exists(noetic) else ""
-    return subprocess.run(["/bin/bash", "-c", f"{before}source '{install}/setup.bash'; {command}"], cwd=cwd,
-                          env={"PATH": "/usr/bin:/bin", "HOME": str(cwd), "ROS_HOME": str(cwd / "ros")}, text=True,
-                          stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    return subprocess.run(
+        ["/bin/bash", "-c", f"{before}source '{install}/setup.bash'; {command}"],
+        cwd=cwd,
+        env={"PATH": "/usr/bin:/bin", "HOME": str(cwd), "ROS_HOME": str(cwd / "ros")},
+        text=True,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )
 
 
 def python_folder(install: Path) -> Path:
@@ -44,8 +57,11 @@ def python_folder(install: Path) -> Path:
 
 
 def files(folder: Path, pattern: str = "*") -> Set[str]:
-    return {str(path.relative_to(folder)) for path in folder.rglob(pattern)
-            if path.is_file() and "__pycache__" not in path.parts}
+    return {
+        str(path.relative_to(folder))
+        for path in folder.rglob(pattern)
+        if path.is_file() and "__pycache__" not in path.parts
+    }
 
 
 def test_rospack_finds_the_package(install: Path, tmp_path: Path) -> None:
@@ -66,8 +82,9 @@ def test_nothing_of_the_tests_or_the_build_is_installed(install: Path) -> None:
     assert not [path for path in files(install) if path.startswith("test") or ".build" in path or "_rostest" in path]
 
 
-@pytest.mark.parametrize("module", [
-    "glass_nav._beam_vote", "glass_nav._mrpt_grid", "glass_nav._mrpt_io", "glass_nav.msg"])
+@pytest.mark.parametrize(
+    "module", ["glass_nav._beam_vote", "glass_nav._mrpt_grid", "glass_nav._mrpt_io", "glass_nav.msg"]
+)
 def test_compiled_modules_and_messages_come_from_the_install_space(install: Path, tmp_path: Path, module: str) -> None:
     done = in_install_space(install, f"/usr/bin/python3 -c 'import {module} as m; print(m.__file__)'", tmp_path)
     assert done.stdout.startswith(str(python_folder(install))), done.stdout
@@ -87,6 +104,6 @@ def test_rosrun_starts_the_command_line_tool(install: Path, tmp_path: Path) -> N
 
 
 def test_the_installed_buildings_are_found_by_name(install: Path, tmp_path: Path) -> None:
-    code = "from glass_nav.simulation import shipped_buildings as s; print(s.shipped()[\"glass_office\"])"
+    code = 'from glass_nav.simulation import shipped_buildings as s; print(s.shipped()["glass_office"])'
     done = in_install_space(install, f"/usr/bin/python3 -c '{code}'", tmp_path)
     assert done.stdout.strip() == str(install / "share" / "glass_nav" / "maps" / "glass_office" / "building.yaml")

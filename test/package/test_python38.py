@@ -19,13 +19,33 @@ PYTHON = OLD / "venv" / "bin" / "python"
 def test_unit_tests_pass_on_python_38(tmp_path: Path) -> None:
     # Long runs tell of figures and not of the interpreter; nor do the faults of checkup, and the tests of the command
     # run the same code.
-    command = [str(PYTHON), "-m", "pytest", "test/unit", "--ignore=test/unit/ros", "--ignore=test/unit/checkup", "-q",
-               "-m", "not long_run", "-p", "no:cacheprovider", f"--basetemp={tmp_path / 'py38'}"]
-    environment = {name: value for name, value in os.environ.items()
-                   if name != "PYTHONPATH" and not name.startswith("COV_CORE")}
+    command = [
+        str(PYTHON),
+        "-m",
+        "pytest",
+        "test/unit",
+        "--ignore=test/unit/ros",
+        "--ignore=test/unit/checkup",
+        "-q",
+        "-m",
+        "not long_run",
+        "-p",
+        "no:cacheprovider",
+        f"--basetemp={tmp_path / 'py38'}",
+    ]
+    environment = {
+        name: value for name, value in os.environ.items() if name != "PYTHONPATH" and not name.startswith("COV_CORE")
+    }
     environment["PYTHONPATH"] = str(OLD / "site")
-    done = subprocess.run(command, cwd=REPO, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT, text=True)
+    done = subprocess.run(
+        command,
+        cwd=REPO,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
     print(done.stdout[-20000:])
     closing_line = done.stdout.strip().splitlines()[-1]
     if done.returncode or "passed" not in closing_line:

@@ -13,8 +13,9 @@ SCRIPTS = Path(__file__).parents[2] / "scripts"
 
 
 def run(script: Path, *arguments: str) -> Tuple[int, str]:
-    done = subprocess.run([str(script), *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT, text=True)
+    done = subprocess.run(
+        [str(script), *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
     return done.returncode, done.stdout.strip()
 
 
@@ -27,14 +28,19 @@ def test_setup_refuses_a_path_that_catkin_cannot_build_in(tmp_path: Path) -> Non
     (checkout / "scripts").mkdir(parents=True)
     shutil.copy(SCRIPTS / "setup", checkout / "scripts")
     assert run(checkout / "scripts" / "setup") == (
-        1, f"setup: catkin cannot work below a path with spaces or ;$\", got '{checkout}': move the checkout")
+        1,
+        f"setup: catkin cannot work below a path with spaces or ;$\", got '{checkout}': move the checkout",
+    )
     assert not (checkout / ".build").exists()
 
 
-@pytest.mark.parametrize("arguments, message", [
-    (["--seed", "3"], "demo: unknown argument '--seed', allowed: --seeds N, --out DIR"),
-    (["--seeds", "0"], "demo: --seeds must be a whole number >= 1, got '0'"),
-    (["--seeds"], "demo: --seeds must be a whole number >= 1, got ''"),
-])
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (["--seed", "3"], "demo: unknown argument '--seed', allowed: --seeds N, --out DIR"),
+        (["--seeds", "0"], "demo: --seeds must be a whole number >= 1, got '0'"),
+        (["--seeds"], "demo: --seeds must be a whole number >= 1, got ''"),
+    ],
+)
 def test_demo_names_a_wrong_argument(arguments: "list[str]", message: str) -> None:
     assert run(SCRIPTS / "demo", *arguments) == (2, message)

@@ -10,8 +10,19 @@ from glass_nav.checkup import doctor
 from glass_nav.recording import bag_observer
 from glass_nav.world import map_file
 
-LOGS = ["acapulco", "aces", "intel", "mit_csail", "mit_racecar2", "olin_mac", "seattle", "uob_trace0", "wean1", "wean2",
-        "wean4"]
+LOGS = [
+    "acapulco",
+    "aces",
+    "intel",
+    "mit_csail",
+    "mit_racecar2",
+    "olin_mac",
+    "seattle",
+    "uob_trace0",
+    "wean1",
+    "wean2",
+    "wean4",
+]
 
 
 @pytest.mark.parametrize("name", LOGS)

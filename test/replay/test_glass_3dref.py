@@ -19,10 +19,10 @@ from glass_nav.simulation.building import Building, Pane, Wall
 
 PANE_M = 5.05
 BINS_DEG = np.arange(0.0, 45.0, 5.0)  # edges; from 40 degrees on the pane ends
-ORDINARY, GLASS = 1, 2                # labels
+ORDINARY, GLASS = 1, 2  # labels
 SPACING_DEG, FRAMES, RINGS = 0.6, 30, 9
-AT_PANE_M = 0.2                       # along the pane's normal: its frame, and what is no nearer
-TOLERANCE = 0.12                      # the two sides of the pane differ by up to 0.3 beyond 15 degrees
+AT_PANE_M = 0.2  # along the pane's normal: its frame, and what is no nearer
+TOLERANCE = 0.12  # the two sides of the pane differ by up to 0.3 beyond 15 degrees
 
 
 @pytest.fixture
@@ -39,8 +39,9 @@ def real_shares(returns: Dict[str, np.ndarray]) -> np.ndarray:
     incidence_deg = np.abs(np.rad2deg(returns["bearing"]))
     ahead_m = returns["range_xy"] * np.cos(returns["bearing"])
     glass = returns["label"] == GLASS
-    stopped = ~glass & ((ahead_m < PANE_M - AT_PANE_M)
-                        | (np.abs(ahead_m - PANE_M) <= AT_PANE_M) & (returns["label"] == ORDINARY))
+    stopped = ~glass & (
+        (ahead_m < PANE_M - AT_PANE_M) | (np.abs(ahead_m - PANE_M) <= AT_PANE_M) & (returns["label"] == ORDINARY)
+    )
     sent = 2.0 * np.diff(BINS_DEG) / SPACING_DEG * FRAMES * RINGS
     count = [np.histogram(incidence_deg[which], BINS_DEG)[0] for which in (glass, stopped)]
     return count[0] / (sent - count[1])
@@ -49,14 +50,16 @@ def real_shares(returns: Dict[str, np.ndarray]) -> np.ndarray:
 def simulated_shares() -> np.ndarray:
     """(bins,) the same of the preset: a wide pane, a wall 6 m behind it, thirty frames."""
     box_m = np.array([[-1.0, -12.0], [11.0, -12.0], [11.0, 12.0], [-1.0, 12.0], [-1.0, -12.0]])
-    building = Building((Wall(box_m),), (Pane(np.array([[PANE_M, -12.0], [PANE_M, 12.0]])),),
-                        seen_m=np.array([[8.0, 0.0]]))
+    building = Building(
+        (Wall(box_m),), (Pane(np.array([[PANE_M, -12.0], [PANE_M, 12.0]])),), seen_m=np.array([[8.0, 0.0]])
+    )
     model = replace(lidar.preset("sensitive"), beams=1801, field_of_view_rad=np.deg2rad(90.0))
     rng = np.random.default_rng(0)
     case = np.stack([lidar.scan(model, building, np.zeros(3), 0.0, rng).case for _ in range(FRAMES)])
     incidence_deg = np.broadcast_to(np.abs(np.rad2deg(model.angles_rad)), case.shape)
-    returned, sent = (np.histogram(values, BINS_DEG)[0] for values in (incidence_deg[case == lidar.DIFFUSE],
-                                                                       incidence_deg))
+    returned, sent = (
+        np.histogram(values, BINS_DEG)[0] for values in (incidence_deg[case == lidar.DIFFUSE], incidence_deg)
+    )
     return returned / sent
 
 

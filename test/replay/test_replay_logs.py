@@ -20,7 +20,8 @@ MRPT_DATASETS = Path("/usr/share/mrpt/datasets")  # apt: mrpt-common
 
 class Limits(NamedTuple):
     """Not more than this."""
-    scans: int           # of the log: every one is used
+
+    scans: int  # of the log: every one is used
     median_m: float
     rmse_m: float
     p95_m: float
@@ -45,6 +46,7 @@ UWB = Limits(343, 0.120, 0.150, 0.250, 1.5, 0.0)
 @pytest.fixture
 def replay(tmp_path: Path) -> Callable[..., Dict[str, Any]]:
     """replay(log, map): metrics.json of a run with seed 0."""
+
     def run(log: Path, grid: Path) -> Dict[str, Any]:
         assert main(["replay", str(log), "--map", str(grid), "--out", str(tmp_path)]) == 0
         figures: Dict[str, Any] = json.loads((tmp_path / "metrics.json").read_text())
@@ -54,8 +56,19 @@ def replay(tmp_path: Path) -> Callable[..., Dict[str, Any]]:
 
 
 def check(figures: Dict[str, Any], limits: Limits, out: Path) -> None:
-    print({name: figures[name] for name in ("position_median_m", "position_rmse_m", "position_p95_m", "yaw_mean_deg",
-                                            "lost_1m_share", "cpu_ms_per_scan")})
+    print(
+        {
+            name: figures[name]
+            for name in (
+                "position_median_m",
+                "position_rmse_m",
+                "position_p95_m",
+                "yaw_mean_deg",
+                "lost_1m_share",
+                "cpu_ms_per_scan",
+            )
+        }
+    )
     assert (figures["scans"], figures["scans_refused"]) == (limits.scans, 0)
     assert figures["lost_1m_share"] <= limits.lost_1m_share
     assert figures["position_rmse_m"] <= limits.rmse_m

@@ -9,11 +9,24 @@ from pathlib import Path
 from glass_nav.cli.main import main
 
 
-def test_a_robot_in_a_glass_lobby_sees_the_meetpoints_that_it_passes(data_dir: Path, tmp_path: Path,
-                                                                     capsys) -> None:  # type: ignore[no-untyped-def]
+def test_a_robot_in_a_glass_lobby_sees_the_meetpoints_that_it_passes(data_dir: Path, tmp_path: Path, capsys) -> None:  # type: ignore[no-untyped-def]
     folder = data_dir / "logs" / "uob_trace0"
-    assert main(["replay", str(folder / "uob_trace0.bag"), "--map", str(folder / "map.yaml"), "--out", str(tmp_path),
-                 "--every", "2", "--topology"]) == 0
+    assert (
+        main(
+            [
+                "replay",
+                str(folder / "uob_trace0.bag"),
+                "--map",
+                str(folder / "map.yaml"),
+                "--out",
+                str(tmp_path),
+                "--every",
+                "2",
+                "--topology",
+            ]
+        )
+        == 0
+    )
     figures = json.loads((tmp_path / "metrics.json").read_text())["topology"]
     assert figures["passed"] >= 3
     assert figures["seen_share"] >= 0.6

@@ -28,7 +28,7 @@ from glass_nav.geometry import angles
 from glass_nav.msg import LocalizationStatus, TrueBeams
 from glass_nav.ros import conversions
 
-START_S = 60.0     # until everything runs, on a busy machine
+START_S = 60.0  # until everything runs, on a busy machine
 WAY_M = 5.0
 COMMAND_PERIOD_S = 0.05
 
@@ -64,7 +64,6 @@ class Driver:
 
 
 class Demo(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls) -> None:
         cls.lines = LogLines()
@@ -108,18 +107,31 @@ class Demo(unittest.TestCase):
 
     def test_1_the_robot_is_localized_along_its_path(self) -> None:
         # A scan may come before the initial pose does: what counts is what follows it.
-        self.assertTrue(wait_until(lambda: self.lines.having("starting at x") and self.scans.last is not None, START_S),
-                        f"no initial pose taken within {START_S:g} s")
+        self.assertTrue(
+            wait_until(lambda: self.lines.having("starting at x") and self.scans.last is not None, START_S),
+            f"no initial pose taken within {START_S:g} s",
+        )
         started_ns = stamp_ns(self.scans.last)
-        self.assertTrue(wait_until(lambda: self.status.last is not None and stamp_ns(self.status.last) > started_ns
-                                   and self.status.last.state_name == "LOCALIZED",
-                                   START_S), f"not LOCALIZED within {START_S:g} s: {self.lines.having('')[-10:]}")
-        self.assertTrue(wait_until(lambda: self.way_m() > WAY_M, START_S),
-                        f"{self.way_m():.1f} m driven; {self.lines.having('')[-10:]}")
+        self.assertTrue(
+            wait_until(
+                lambda: self.status.last is not None
+                and stamp_ns(self.status.last) > started_ns
+                and self.status.last.state_name == "LOCALIZED",
+                START_S,
+            ),
+            f"not LOCALIZED within {START_S:g} s: {self.lines.having('')[-10:]}",
+        )
+        self.assertTrue(
+            wait_until(lambda: self.way_m() > WAY_M, START_S),
+            f"{self.way_m():.1f} m driven; {self.lines.having('')[-10:]}",
+        )
         self.assertEqual(self.status.last.state_name, "LOCALIZED")
         truth = self.true_poses()
-        compared = [(conversions.planar_from_pose(msg.pose.pose), truth[stamp_ns(msg)])
-                    for msg in self.poses.all if stamp_ns(msg) > started_ns and stamp_ns(msg) in truth]
+        compared = [
+            (conversions.planar_from_pose(msg.pose.pose), truth[stamp_ns(msg)])
+            for msg in self.poses.all
+            if stamp_ns(msg) > started_ns and stamp_ns(msg) in truth
+        ]
         self.assertGreater(len(compared), 5)
         for said, true in compared:
             self.assertLess(np.hypot(*(said - true)[:2]), 0.3, f"said {said}, true {true}")
@@ -142,8 +154,14 @@ class Demo(unittest.TestCase):
         self.assertTrue(wait_until(lambda: len(maps) and len(metadata), 30.0), "map and map_metadata are not latched")
         self.assertEqual(rospy.ServiceProxy("static_map", GetMap)().map, maps.last)
         self.assertEqual(set(maps.last.data), {-1, 0, 100})
-        self.assertIn(("base_link", "laser"), [(each.header.frame_id, each.child_frame_id)
-                                               for msg in self.static_transforms.all for each in msg.transforms])
+        self.assertIn(
+            ("base_link", "laser"),
+            [
+                (each.header.frame_id, each.child_frame_id)
+                for msg in self.static_transforms.all
+                for each in msg.transforms
+            ],
+        )
         times = [conversions.ns_from_stamp(msg.clock) for msg in self.clock.all]
         self.assertEqual(times, sorted(times))
         self.assertLessEqual(np.median(np.diff(times)), 20_000_000)  # a subscriber under load may miss one
@@ -162,16 +180,23 @@ class Demo(unittest.TestCase):
     def test_4_cmd_vel_moves_the_robot_up_to_a_wall(self) -> None:
         yaw = self.position()[2]
         self.driver.start(0.0, 1.0)  # before the path, which waits
-        self.assertTrue(wait_until(lambda: abs(float(angles.wrap(self.position()[2] - yaw))) > 1.2, 30.0),
-                        "cmd_vel does not turn the robot")
+        self.assertTrue(
+            wait_until(lambda: abs(float(angles.wrap(self.position()[2] - yaw))) > 1.2, 30.0),
+            "cmd_vel does not turn the robot",
+        )
         start = self.position()
         self.driver.start(0.5, 0.0)
-        self.assertTrue(wait_until(lambda: np.hypot(*(self.position() - start)[:2]) > 0.2, 30.0),
-                        "cmd_vel does not move the robot")
-        self.assertTrue(wait_until(lambda: self.blocked.last is not None and self.blocked.last.data, 60.0),
-                        f"no obstacle stops the robot, which is at {self.position()}")
-        self.assertTrue(wait_until(lambda: self.lines.having("an obstacle stops the robot at x"), 30.0),
-                        "no line about the obstacle")
+        self.assertTrue(
+            wait_until(lambda: np.hypot(*(self.position() - start)[:2]) > 0.2, 30.0), "cmd_vel does not move the robot"
+        )
+        self.assertTrue(
+            wait_until(lambda: self.blocked.last is not None and self.blocked.last.data, 60.0),
+            f"no obstacle stops the robot, which is at {self.position()}",
+        )
+        self.assertTrue(
+            wait_until(lambda: self.lines.having("an obstacle stops the robot at x"), 30.0),
+            "no line about the obstacle",
+        )
         self.hear_scans(2)  # the truth comes with the scans, the flag at once
         there = self.position()
         self.hear_scans(10)
@@ -199,25 +224,38 @@ class Demo(unittest.TestCase):
         for how in (signal.SIGINT, signal.SIGTERM):
             with self.subTest(how):
                 scans = Heard("/second/scan", LaserScan)
-                second = Process("simulator_node", "__ns:=second", "/clock:=/second/clock", "/tf:=/second/tf",
-                                 "/tf_static:=/second/tf_static", "_speed_factor:=0.0", "_building:=opaque_office",
-                                 "_path:=first", "_beams:=61", "_robot:=omni")
+                second = Process(
+                    "simulator_node",
+                    "__ns:=second",
+                    "/clock:=/second/clock",
+                    "/tf:=/second/tf",
+                    "/tf_static:=/second/tf_static",
+                    "_speed_factor:=0.0",
+                    "_building:=opaque_office",
+                    "_path:=first",
+                    "_beams:=61",
+                    "_robot:=omni",
+                )
                 try:
-                    self.assertTrue(wait_until(lambda heard=scans: len(heard) > 100, 30.0),
-                                    f"{len(scans)} scans within 30 s")
+                    self.assertTrue(
+                        wait_until(lambda heard=scans: len(heard) > 100, 30.0), f"{len(scans)} scans within 30 s"
+                    )
                 finally:
                     code, printed = second.end(how)
                 self.assertEqual(code, 0, printed)
                 self.assertNotIn("Traceback", printed)
 
     def test_8_bad_parameters_are_a_line_and_exit_code_2(self) -> None:
-        for number, (argument, words) in enumerate((
+        for number, (argument, words) in enumerate(
+            (
                 ("_building:=palace", "palace: no such file, nor a building of the package, which are "),
                 ("_lidar:=strong", "unknown lidar preset 'strong', known are sensitive, weak, coated"),
                 ("_path:=nowhere", "glass_office: no path 'nowhere', it has "),
                 ("_robot:=car", "robot must be diff or omni, got 'car'"),
                 ("_speed_factor:=-1.0", "~speed_factor must be >= 0, got -1.0"),
-                ("_echoo:=last", "unknown parameter ~echoo; did you mean ~echo?"))):
+                ("_echoo:=last", "unknown parameter ~echoo; did you mean ~echo?"),
+            )
+        ):
             with self.subTest(argument):
                 code, printed = Process("simulator_node", f"__name:=bad_simulator_{number}", argument).wait(30.0)
                 self.assertEqual(code, 2, printed)

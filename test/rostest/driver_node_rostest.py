@@ -31,11 +31,21 @@ from sensor_msgs.msg import LaserScan
 from visualization_msgs.msg import MarkerArray
 
 from glass_nav.geometry import se2
-from glass_nav.msg import (DriverStatus, EdgeTraversal, GotoNodeAction, GotoNodeGoal, GotoNodeResult,
-                           LocalizationStatus, Meetpoint, TraverseEdgeAction, TraverseEdgeGoal, TraverseEdgeResult,
-                           TurnChoice)
+from glass_nav.msg import (
+    DriverStatus,
+    EdgeTraversal,
+    GotoNodeAction,
+    GotoNodeGoal,
+    GotoNodeResult,
+    LocalizationStatus,
+    Meetpoint,
+    TraverseEdgeAction,
+    TraverseEdgeGoal,
+    TraverseEdgeResult,
+    TurnChoice,
+)
 from glass_nav.ros import conversions
-from glass_nav.topology import atlas_file, shipped_atlases
+from glass_nav.topology.atlas import atlas_file, shipped_atlases
 
 NODE = "/glass_driver"
 STOPPED_S = 0.2  # a preempted action stands within it
@@ -67,7 +77,6 @@ class MoveBasePlayer:
 
 
 class Driver(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls) -> None:
         cls.lines = LogLines()
@@ -82,8 +91,9 @@ class Driver(unittest.TestCase):
         cls.traversals = Heard("edge_traversal", EdgeTraversal)
         cls.odometry = Heard("odom", Odometry)
         cls.markers = Heard(f"{NODE}/markers", MarkerArray)
-        cls.diagnostics = Heard("/diagnostics", DiagnosticArray,
-                                lambda msg: msg.status[0].name == "glass_driver: driver")
+        cls.diagnostics = Heard(
+            "/diagnostics", DiagnosticArray, lambda msg: msg.status[0].name == "glass_driver: driver"
+        )
         rospy.Subscriber("scan", LaserScan, cls.hand_on, queue_size=5, tcp_nodelay=True)
         cls.edges = actionlib.SimpleActionClient("traverse_edge", TraverseEdgeAction)
         cls.places = actionlib.SimpleActionClient("goto_node", GotoNodeAction)
@@ -100,16 +110,19 @@ class Driver(unittest.TestCase):
             cls.scans.publish(msg)
         if cls.says and cls.truth.last is not None and len(cls.odometry):
             stamp_ns = conversions.ns_from_stamp(cls.truth.last.header.stamp)
-            odometry = min(cls.odometry.all[-20:], key=lambda each: abs(
-                conversions.ns_from_stamp(each.header.stamp) - stamp_ns))
-            map_from_odom = se2.compose(conversions.planar_from_pose(cls.truth.last.pose), se2.inverse(
-                conversions.planar_from_pose(odometry.pose.pose)))
+            odometry = min(
+                cls.odometry.all[-20:], key=lambda each: abs(conversions.ns_from_stamp(each.header.stamp) - stamp_ns)
+            )
+            map_from_odom = se2.compose(
+                conversions.planar_from_pose(cls.truth.last.pose),
+                se2.inverse(conversions.planar_from_pose(odometry.pose.pose)),
+            )
             if stamp_ns > cls.sent_ns:  # tf complains of what it knows
                 cls.sent_ns = stamp_ns
-                cls.transforms.sendTransform(conversions.transform_stamped(stamp_ns, "map", "odom",
-                                                                           map_from_odom))
-            cls.localization.publish(LocalizationStatus(header=msg.header, state_name=cls.says,
-                                                        state=getattr(LocalizationStatus, cls.says)))
+                cls.transforms.sendTransform(conversions.transform_stamped(stamp_ns, "map", "odom", map_from_odom))
+            cls.localization.publish(
+                LocalizationStatus(header=msg.header, state_name=cls.says, state=getattr(LocalizationStatus, cls.says))
+            )
 
     def setUp(self) -> None:
         self.let_localization_say("LOCALIZED")
@@ -129,8 +142,14 @@ class Driver(unittest.TestCase):
     def let_localization_say(self, state: str) -> None:
         """Returns once the driver knows."""
         self.let(says=state)
-        self.assertTrue(wait_until(lambda: len(self.diagnostics) and KeyValue("localization", state)
-                                   in self.diagnostics.last.status[0].values, 10.0), "the driver does not listen")
+        self.assertTrue(
+            wait_until(
+                lambda: len(self.diagnostics)
+                and KeyValue("localization", state) in self.diagnostics.last.status[0].values,
+                10.0,
+            ),
+            "the driver does not listen",
+        )
 
     # -- what is measured
 
@@ -142,12 +161,16 @@ class Driver(unittest.TestCase):
         self.assertTrue(wait_until(lambda: self.speed() == 0.0, timeout_s), "the robot does not stand")
 
     def await_moving(self, forward_m_s: float) -> None:
-        self.assertTrue(wait_until(lambda: self.odometry.last.twist.twist.linear.x > forward_m_s, 60.0),
-                        f"the robot does not drive: {self.status.last}")
+        self.assertTrue(
+            wait_until(lambda: self.odometry.last.twist.twist.linear.x > forward_m_s, 60.0),
+            f"the robot does not drive: {self.status.last}",
+        )
 
     def await_state(self, name: str, timeout_s: float = 30.0) -> DriverStatus:
-        self.assertTrue(wait_until(lambda: self.status.last is not None and self.status.last.state_name == name,
-                                   timeout_s), f"no {name}, but {self.status.last}")
+        self.assertTrue(
+            wait_until(lambda: self.status.last is not None and self.status.last.state_name == name, timeout_s),
+            f"no {name}, but {self.status.last}",
+        )
         return self.status.last
 
     def assertStopsAfter(self, ask: Callable[[], None]) -> None:
@@ -159,8 +182,11 @@ class Driver(unittest.TestCase):
         heard = len(self.odometry)
         self.assertTrue(wait_until(lambda: len(self.odometry) > heard + 25, 30.0))
         after = [msg for msg in self.odometry.all if conversions.ns_from_stamp(msg.header.stamp) > asked_ns]
-        moving = [conversions.ns_from_stamp(msg.header.stamp) for msg in after
-                  if msg.twist.twist.linear.x or msg.twist.twist.angular.z]
+        moving = [
+            conversions.ns_from_stamp(msg.header.stamp)
+            for msg in after
+            if msg.twist.twist.linear.x or msg.twist.twist.angular.z
+        ]
         stood_s = (max(moving) - asked_ns) * 1e-9 if moving else 0.0
         rospy.loginfo(f"stood after {stood_s:.3f} s")
         self.assertLess(stood_s, STOPPED_S)
@@ -197,8 +223,10 @@ class Driver(unittest.TestCase):
         self.assertIn("SEEKING", {each.status.state_name for each in feedback})
         self.assertTrue(wait_until(lambda: len(self.meetpoints), 30.0))
         self.assertEqual(self.meetpoints.last.header.stamp, result.meetpoint.header.stamp)
-        self.assertEqual((self.meetpoints.last.degree, self.meetpoints.last.r, tuple(self.meetpoints.last.bearings)),
-                         (result.meetpoint.degree, result.meetpoint.r, tuple(result.meetpoint.bearings)))
+        self.assertEqual(
+            (self.meetpoints.last.degree, self.meetpoints.last.r, tuple(self.meetpoints.last.bearings)),
+            (result.meetpoint.degree, result.meetpoint.r, tuple(result.meetpoint.bearings)),
+        )
         self.await_state("ARRIVED")
         self.edges.send_goal(TraverseEdgeGoal(edge="RANK_9"))
         refused = self.await_end(self.edges)
@@ -208,23 +236,30 @@ class Driver(unittest.TestCase):
         other = TurnChoice(rank=0, degree=result.meetpoint.degree, name="U_TURN")
         other.header.stamp = rospy.Time(1)
         self.turns.publish(other)
-        self.assertTrue(wait_until(lambda: self.lines.having("turn_choice U_TURN not used: it answers the meetpoint"),
-                                   10.0))
+        self.assertTrue(
+            wait_until(lambda: self.lines.having("turn_choice U_TURN not used: it answers the meetpoint"), 10.0)
+        )
         choice = TurnChoice(header=result.meetpoint.header, rank=0, degree=result.meetpoint.degree, name="U_TURN")
         self.turns.publish(choice)
         self.await_moving(0.2)
         self.assertEqual(self.status.last.task, "turn_choice U_TURN")
         self.turns.publish(choice)
-        self.assertTrue(wait_until(lambda: self.lines.having("turn_choice U_TURN not used: turn_choice U_TURN is on"),
-                                   10.0))
+        self.assertTrue(
+            wait_until(lambda: self.lines.having("turn_choice U_TURN not used: turn_choice U_TURN is on"), 10.0)
+        )
         self.assertTrue(wait_until(lambda: len(self.traversals), 90.0), f"no traversal: {self.status.last}")
         traversal = self.traversals.last
         self.assertTrue(wait_until(lambda: self.meetpoints.last.header.stamp == traversal.header.stamp, 30.0))
         self.assertEqual(traversal.rank, 0)
         self.assertGreater(traversal.length, 0.3)
         self.assertLessEqual(traversal.chord, traversal.length + 1e-3)
-        self.assertTrue(wait_until(lambda: {marker.ns for marker in self.markers.last.markers if marker.action == 0}
-                                   >= {"local_edges", "local_nodes", "meetpoint", "state"}, 10.0))
+        self.assertTrue(
+            wait_until(
+                lambda: {marker.ns for marker in self.markers.last.markers if marker.action == 0}
+                >= {"local_edges", "local_nodes", "meetpoint", "state"},
+                10.0,
+            )
+        )
 
     # -- places
 
@@ -278,15 +313,18 @@ class Driver(unittest.TestCase):
         self.assertTrue(wait_until(lambda: self.speed() > 0.3, 30.0), "it does not go on")
 
     def test_8_goals_that_cannot_be_are_refused_in_a_sentence(self) -> None:
-        for goal, words in ((GotoNodeGoal(node=999), "node 999: the atlas opaque_office has nodes 0 to "),
-                            (GotoNodeGoal(node=-1), "the pose must be given in frame 'map', got ''")):
+        for goal, words in (
+            (GotoNodeGoal(node=999), "node 999: the atlas opaque_office has nodes 0 to "),
+            (GotoNodeGoal(node=-1), "the pose must be given in frame 'map', got ''"),
+        ):
             self.places.send_goal(goal)
             result = self.await_end(self.places)
             self.assertEqual(result.code, GotoNodeResult.REFUSED)
             self.assertIn(words, result.reason)
         self.edges.send_goal(TraverseEdgeGoal(edge="AHEAD"))
-        self.assertIn(self.await_end(self.edges).code, (TraverseEdgeResult.REFUSED,
-                                                        TraverseEdgeResult.NOT_AT_MEETPOINT))
+        self.assertIn(
+            self.await_end(self.edges).code, (TraverseEdgeResult.REFUSED, TraverseEdgeResult.NOT_AT_MEETPOINT)
+        )
 
     # -- move_base
 
@@ -294,11 +332,14 @@ class Driver(unittest.TestCase):
         self.second.send_goal(GotoNodeGoal(node=10))
         result = self.await_end(self.second)
         self.assertEqual(result.code, GotoNodeResult.NO_MOVE_BASE)
-        self.assertEqual(result.reason, "no action server /second/move_base within 1 s: start move_base, or set "
-                                        "~backend to internal")
+        self.assertEqual(
+            result.reason, "no action server /second/move_base within 1 s: start move_base, or set ~backend to internal"
+        )
         player = MoveBasePlayer()
-        for outcome, code, words in (("there", GotoNodeResult.SUCCEEDED, "Goal reached."),
-                                     ("none", GotoNodeResult.NO_WAY, "Failed to find a valid plan.")):
+        for outcome, code, words in (
+            ("there", GotoNodeResult.SUCCEEDED, "Goal reached."),
+            ("none", GotoNodeResult.NO_WAY, "Failed to find a valid plan."),
+        ):
             count = len(player.goals)
             self.second.send_goal(GotoNodeGoal(node=10))
             self.assertTrue(wait_until(lambda count=count: len(player.goals) > count, 30.0), "move_base has no goal")
@@ -336,8 +377,14 @@ class Driver(unittest.TestCase):
 
     def test_terminated_it_ends_at_once(self) -> None:
         status = Heard("/driver_ending/status", DriverStatus)
-        node = Process("driver_node", "__name:=driver_ending", "_seek_at_start:=false", "traverse_edge:=other_edge",
-                       "goto_node:=other_node", "cmd_vel:=other_cmd_vel")
+        node = Process(
+            "driver_node",
+            "__name:=driver_ending",
+            "_seek_at_start:=false",
+            "traverse_edge:=other_edge",
+            "goto_node:=other_node",
+            "cmd_vel:=other_cmd_vel",
+        )
         started = wait_until(lambda: status.last, 30.0)
         code, printed = node.end(signal.SIGTERM)
         self.assertTrue(started, printed)

@@ -21,7 +21,8 @@ from visualization_msgs.msg import MarkerArray
 
 from glass_nav.geometry import angles, se2
 from glass_nav.msg import LandmarkBearings, LocalizationStatus
-from glass_nav.ros import bearing_messages, conversions
+from glass_nav.ros import conversions
+from glass_nav.ros.landmarks import bearing_messages
 from glass_nav.sensing.bearings import LandmarkBearing
 from glass_nav.world import landmark_file
 
@@ -36,7 +37,6 @@ def stamp_ns(msg: Any) -> int:
 
 
 class Landmarks(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls) -> None:
         cls.lines = LogLines()
@@ -101,8 +101,10 @@ class Landmarks(unittest.TestCase):
         self.assertEqual(shown, list(LANDMARKS.ids))
 
     def test_2_a_robot_that_wakes_up_is_localized_without_driving(self) -> None:
-        self.assertTrue(wait_until(lambda: len(self.starts), TURN_S),
-                        f"no initialpose within {TURN_S:g} s; status {self.status.last}; {self.lines.having('')[-8:]}")
+        self.assertTrue(
+            wait_until(lambda: len(self.starts), TURN_S),
+            f"no initialpose within {TURN_S:g} s; status {self.status.last}; {self.lines.having('')[-8:]}",
+        )
         self.assertGreaterEqual(len(self.bearings.last.ids), 3)
         given = self.starts.last
         self.assertNear(given, self.true_pose(stamp_ns(given)))
@@ -116,8 +118,10 @@ class Landmarks(unittest.TestCase):
         count, exact = len(self.starts), self.see_now()
         self.assertTrue(wait_until(lambda: stamp_ns(self.fixes.last) == stamp_ns(exact), 30.0), "no fix")
         self.assertNear(self.fixes.last, self.true_pose(stamp_ns(self.fixes.last)), 0.05)
-        self.assertTrue(wait_until(lambda: stamp_ns(self.poses.last) >= stamp_ns(self.fixes.last), 30.0),
-                        "the localization, which has the landmarks too, does not weigh its particles by them")
+        self.assertTrue(
+            wait_until(lambda: stamp_ns(self.poses.last) >= stamp_ns(self.fixes.last), 30.0),
+            "the localization, which has the landmarks too, does not weigh its particles by them",
+        )
         self.assertNear(self.poses.last, self.true_pose(stamp_ns(self.poses.last)), 0.15)
         self.assertEqual(len(self.starts), count)
         answer = self.send()
@@ -133,8 +137,9 @@ class Landmarks(unittest.TestCase):
         publisher = rospy.Publisher("initialpose", PoseWithCovarianceStamped, queue_size=1)
         self.assertTrue(wait_until(lambda: publisher.get_num_connections() >= 2, 30.0))
         publisher.publish(wrong)
-        self.assertTrue(wait_until(lambda: self.status.last.state_name in ("LOST", "UNCERTAIN"), 30.0),
-                        f"{self.status.last}")
+        self.assertTrue(
+            wait_until(lambda: self.status.last.state_name in ("LOST", "UNCERTAIN"), 30.0), f"{self.status.last}"
+        )
         if self.status.last.state_name != "LOST":  # not sure of being lost: whoever watches the robot asks
             self.see_now()
             self.assertTrue(wait_until(lambda: self.send().success, 30.0))
@@ -143,8 +148,9 @@ class Landmarks(unittest.TestCase):
     def test_5_what_gives_no_position_is_said(self) -> None:
         self.see_now()
         self.publisher.publish(self.see(A3=0.3, A4=-0.25))
-        self.assertTrue(wait_until(lambda: self.lines.having("no position from bearings", "contradict each other"),
-                                   10.0))
+        self.assertTrue(
+            wait_until(lambda: self.lines.having("no position from bearings", "contradict each other"), 10.0)
+        )
         strange = self.see()
         strange.ids = ["A2", "A3", "A4", "Z9"]
         self.publisher.publish(strange)
@@ -176,8 +182,10 @@ class Landmarks(unittest.TestCase):
             turns, start = len(self.bearings), conversions.planar_from_pose(self.truth.last.pose)
             self.assertTrue(wait_until(lambda: len(self.bearings) >= turns + 2, 2.0 * TURN_S), "no turn of the scanner")
             end_ns = max(conversions.ns_from_stamp(stamp) for stamp in self.bearings.last.stamps)
-            self.assertTrue(wait_until(lambda: stamp_ns(self.fixes.last) == end_ns, 30.0),
-                            f"{self.bearings.last}; {self.lines.having('from bearings')[-3:]}")
+            self.assertTrue(
+                wait_until(lambda: stamp_ns(self.fixes.last) == end_ns, 30.0),
+                f"{self.bearings.last}; {self.lines.having('from bearings')[-3:]}",
+            )
         finally:
             ending.set()
             thread.join()
@@ -193,9 +201,10 @@ class Landmarks(unittest.TestCase):
 
     def test_7_files_and_parameters_that_cannot_be_used_end_the_node(self) -> None:
         for arguments, text in (
-                (["_landmark_file:=/none.yaml"], "/none.yaml: cannot be read: No such file or directory"),
-                ([], "~landmark_file must name a file of landmarks, got ''"),
-                (["_landmark_fil:=x"], "unknown parameter ~landmark_fil; did you mean ~landmark_file?")):
+            (["_landmark_file:=/none.yaml"], "/none.yaml: cannot be read: No such file or directory"),
+            ([], "~landmark_file must name a file of landmarks, got ''"),
+            (["_landmark_fil:=x"], "unknown parameter ~landmark_fil; did you mean ~landmark_file?"),
+        ):
             code, printed = Process("landmarks_node", "__name:=other", *arguments).wait(30.0)
             rospy.set_param("/other", {})
             self.assertEqual(code, 2, printed)

@@ -26,6 +26,7 @@ from std_srvs.srv import Empty
 from glass_nav.msg import LocalizationStatus
 from glass_nav.ros import conversions
 
+
 def with_covariance(msg: PoseWithCovarianceStamped, row: int, column: int, value: float) -> PoseWithCovarianceStamped:
     spatial = np.array(msg.pose.covariance).reshape(6, 6)
     spatial[row, column] = value
@@ -34,7 +35,6 @@ def with_covariance(msg: PoseWithCovarianceStamped, row: int, column: int, value
 
 
 class LocalizationInterface(RoomTest):
-
     @classmethod
     def setUpClass(cls) -> None:
         super().setUpClass()
@@ -57,8 +57,10 @@ class LocalizationInterface(RoomTest):
         self.particles.clear()
         rospy.ServiceProxy("global_localization", Empty)()
         self.expect_line("anywhere in the map")
-        self.assertTrue(wait_until(lambda: len(self.poses) and len(self.particles), 30.0),
-                        "no amcl_pose and particlecloud after the request")
+        self.assertTrue(
+            wait_until(lambda: len(self.poses) and len(self.particles), 30.0),
+            "no amcl_pose and particlecloud after the request",
+        )
 
     def test_set_map_takes_map_and_pose(self) -> None:
         self.poses.clear()
@@ -70,19 +72,24 @@ class LocalizationInterface(RoomTest):
     def test_set_map_refuses_what_is_no_map(self) -> None:
         def fresh() -> Any:
             return conversions.msg_from_map(self.grid_map, rospy.Time.now(), "map")
+
         here = self.robot.map_from_base()
         outside = np.array([500.0, 0.0, 0.0])
         for msg, pose, words in (
-                (changed(fresh(), data=[0] * 10), pose_message(here), "needs 47500 values, got 10"),
-                (changed(fresh(), info__width=0, data=[]), pose_message(here), "at least one cell"),
-                (changed(fresh(), data=[101] * 47500), pose_message(here), "must be 0 to 100 or -1"),
-                (changed(fresh(), info__resolution=0.0), pose_message(here), "resolution > 0"),
-                (changed(fresh(), info__resolution=math.nan), pose_message(here), "resolution > 0"),
-                (changed(fresh(), info__origin__position__x=math.nan), pose_message(here), "origin"),
-                (changed(fresh(), info__origin__orientation__w=0.0, info__origin__orientation__z=0.0),
-                 pose_message(here), "origin"),
-                (fresh(), changed(pose_message(here), header__frame_id="odom"), "frame 'map'"),
-                (fresh(), pose_message(outside), "outside the map")):
+            (changed(fresh(), data=[0] * 10), pose_message(here), "needs 47500 values, got 10"),
+            (changed(fresh(), info__width=0, data=[]), pose_message(here), "at least one cell"),
+            (changed(fresh(), data=[101] * 47500), pose_message(here), "must be 0 to 100 or -1"),
+            (changed(fresh(), info__resolution=0.0), pose_message(here), "resolution > 0"),
+            (changed(fresh(), info__resolution=math.nan), pose_message(here), "resolution > 0"),
+            (changed(fresh(), info__origin__position__x=math.nan), pose_message(here), "origin"),
+            (
+                changed(fresh(), info__origin__orientation__w=0.0, info__origin__orientation__z=0.0),
+                pose_message(here),
+                "origin",
+            ),
+            (fresh(), changed(pose_message(here), header__frame_id="odom"), "frame 'map'"),
+            (fresh(), pose_message(outside), "outside the map"),
+        ):
             with part(words):
                 self.lines.clear()
                 self.assertFalse(self.set_map(SetMapRequest(msg, pose)).success)
@@ -103,8 +110,9 @@ class LocalizationInterface(RoomTest):
                     with self.assertRaisesRegex(rospy.ServiceException, "no free cell"):
                         locate()
                 self.assertTrue(wait_until(lambda: len(self.transforms) > 6, 30.0), "no map -> odom any more")
-                self.assertTrue(self.set_map(SetMapRequest(self.map_msg,
-                                                           pose_message(self.robot.map_from_base()))).success)
+                self.assertTrue(
+                    self.set_map(SetMapRequest(self.map_msg, pose_message(self.robot.map_from_base()))).success
+                )
                 self.expect_right_pose()
 
     def test_the_map_may_come_by_topic_and_a_bad_one_is_skipped(self) -> None:
@@ -112,8 +120,14 @@ class LocalizationInterface(RoomTest):
         poses = Heard("/by_topic/pose", PoseWithCovarianceStamped)
         self.robot.moving = False  # until the node is there: its start pose is where the robot stands now
         x, y, yaw = self.robot.map_from_base()
-        node = self.start("by_topic", "_use_map_topic:=true", "map:=/other_map", f"_initial_pose_x:={x}",
-                          f"_initial_pose_y:={y}", f"_initial_pose_a:={yaw}")
+        node = self.start(
+            "by_topic",
+            "_use_map_topic:=true",
+            "map:=/other_map",
+            f"_initial_pose_x:={x}",
+            f"_initial_pose_y:={y}",
+            f"_initial_pose_a:={yaw}",
+        )
         connected = wait_until(maps.get_num_connections, 30.0)
         bad = changed(conversions.msg_from_map(self.grid_map, rospy.Time.now(), "map"), data=[0])
 
@@ -128,8 +142,9 @@ class LocalizationInterface(RoomTest):
         same = wait_until(lambda: self.lines.having("is the one that is in use"), 30.0)
         kept = self.stays_right_on(maps, poses, self.graded_map())
         code, printed = node.end()
-        self.assertTrue(connected and refused and heard and same and kept,
-                        (connected, refused, heard, same, kept, printed))
+        self.assertTrue(
+            connected and refused and heard and same and kept, (connected, refused, heard, same, kept, printed)
+        )
         self.assertEqual(code, 0, printed)
 
     def test_the_first_map_may_be_the_only_one(self) -> None:
@@ -169,6 +184,7 @@ class LocalizationInterface(RoomTest):
         def is_right() -> bool:
             said = conversions.planar_from_pose(poses.all[0].pose.pose) if len(poses) else np.full(3, np.inf)
             return bool(np.hypot(*(said - self.robot.map_from_base())[:2]) < 0.4)
+
         return taken and wait_until(lambda: len(poses), 30.0) and is_right()
 
     # -- initialpose
@@ -176,16 +192,17 @@ class LocalizationInterface(RoomTest):
     def test_garbage_on_initialpose_is_refused(self) -> None:
         here = self.robot.map_from_base()
         for words, msg in (
-                ("finite", changed(pose_message(here), pose__pose__position__x=math.nan)),
-                ("finite", changed(pose_message(here), pose__pose__position__y=math.inf)),
-                ("quaternion", changed(pose_message(here), pose__pose__orientation=Quaternion())),
-                ("quaternion", changed(pose_message(here), pose__pose__orientation=Quaternion(w=math.nan))),
-                ("covariance must be finite", with_covariance(pose_message(here), 0, 0, math.nan)),
-                ("must not be negative", with_covariance(pose_message(here), 5, 5, -0.1)),
-                ("must be symmetric", with_covariance(pose_message(here), 0, 1, 0.005)),
-                ("frame 'map', got 'odom'", changed(pose_message(here), header__frame_id="odom")),
-                ("frame 'map', got ''", changed(pose_message(here), header__frame_id="")),
-                ("outside the map", pose_message(np.array([1e4, 0.0, 0.0])))):
+            ("finite", changed(pose_message(here), pose__pose__position__x=math.nan)),
+            ("finite", changed(pose_message(here), pose__pose__position__y=math.inf)),
+            ("quaternion", changed(pose_message(here), pose__pose__orientation=Quaternion())),
+            ("quaternion", changed(pose_message(here), pose__pose__orientation=Quaternion(w=math.nan))),
+            ("covariance must be finite", with_covariance(pose_message(here), 0, 0, math.nan)),
+            ("must not be negative", with_covariance(pose_message(here), 5, 5, -0.1)),
+            ("must be symmetric", with_covariance(pose_message(here), 0, 1, 0.005)),
+            ("frame 'map', got 'odom'", changed(pose_message(here), header__frame_id="odom")),
+            ("frame 'map', got ''", changed(pose_message(here), header__frame_id="")),
+            ("outside the map", pose_message(np.array([1e4, 0.0, 0.0]))),
+        ):
             with part(words):
                 self.lines.clear()
                 self.initialpose.publish(msg)
@@ -222,20 +239,21 @@ class LocalizationInterface(RoomTest):
     def test_bad_scans_are_refused_and_the_odometry_is_not_lost(self) -> None:
         n = len(BEAMS)
         for words, fields in (
-                ("no ranges", {"ranges": []}),
-                ("angle_increment", {"angle_increment": 0.0}),
-                ("angle_increment", {"angle_increment": math.nan}),
-                ("angle_min", {"angle_min": math.inf}),
-                ("range_max", {"range_max": 0.0}),
-                ("range_max", {"range_max": math.nan}),
-                ("range_min", {"range_min": -1.0}),
-                ("no frame_id", {"header__frame_id": ""}),
-                ("no stamp", {"header__stamp": rospy.Time(0)}),
-                (None, {"ranges": [math.nan] * n}),
-                (None, {"ranges": [math.inf] * n}),
-                (None, {"ranges": [-math.inf] * n}),
-                (None, {"ranges": [0.0] * n}),
-                (None, {"ranges": [1.0]})):
+            ("no ranges", {"ranges": []}),
+            ("angle_increment", {"angle_increment": 0.0}),
+            ("angle_increment", {"angle_increment": math.nan}),
+            ("angle_min", {"angle_min": math.inf}),
+            ("range_max", {"range_max": 0.0}),
+            ("range_max", {"range_max": math.nan}),
+            ("range_min", {"range_min": -1.0}),
+            ("no frame_id", {"header__frame_id": ""}),
+            ("no stamp", {"header__stamp": rospy.Time(0)}),
+            (None, {"ranges": [math.nan] * n}),
+            (None, {"ranges": [math.inf] * n}),
+            (None, {"ranges": [-math.inf] * n}),
+            (None, {"ranges": [0.0] * n}),
+            (None, {"ranges": [1.0]}),
+        ):
             with part(f"{words}: " + ", ".join(f"{name} {str(value)[:20]}" for name, value in fields.items())):
                 self.lines.clear()
                 self.robot.spoil = lambda msg, fields=fields: changed(msg, **fields)
@@ -250,7 +268,8 @@ class LocalizationInterface(RoomTest):
         for nothing in (math.nan, math.inf, -math.inf, 0.0):
             with part(f"every second range {nothing}"):
                 self.robot.spoil = lambda msg, nothing=nothing: changed(
-                    msg, ranges=[nothing if index % 2 else value for index, value in enumerate(msg.ranges)])
+                    msg, ranges=[nothing if index % 2 else value for index, value in enumerate(msg.ranges)]
+                )
                 self.robot.make_steps(10)
                 self.expect_right_pose()
                 self.expect_understood()
@@ -270,8 +289,9 @@ class LocalizationInterface(RoomTest):
         self.robot.moving = False  # tf carries on between its last transform and the next one
         self.robot.odometry_is_told = False
         self.expect_line("scan dropped after 0.5 s: no transform odom <- base_link")
-        self.assertTrue(wait_until(lambda: "no transform odom <- base_link" in self.status.last.reason, 30.0),
-                        str(self.status.last))
+        self.assertTrue(
+            wait_until(lambda: "no transform odom <- base_link" in self.status.last.reason, 30.0), str(self.status.last)
+        )
         self.robot.odometry_is_told = True
         self.expect_right_pose()
 
@@ -283,8 +303,9 @@ class LocalizationInterface(RoomTest):
 
     def test_silence_of_the_scan_is_told_in_the_status(self) -> None:
         self.robot.lidar.silent = True
-        self.assertTrue(wait_until(lambda: self.status.last.reason.startswith("no scan on /scan for"), 30.0),
-                        str(self.status.last))
+        self.assertTrue(
+            wait_until(lambda: self.status.last.reason.startswith("no scan on /scan for"), 30.0), str(self.status.last)
+        )
         self.assertEqual(self.status.last.state, LocalizationStatus.UNCERTAIN)
         self.robot.lidar.silent = False
         self.expect_right_pose()
@@ -293,7 +314,8 @@ class LocalizationInterface(RoomTest):
         for shift_s in (-30.0, 30.0):
             with part(f"{shift_s} s"):
                 self.robot.spoil = lambda msg, shift_s=shift_s: changed(
-                    msg, header__stamp=msg.header.stamp + rospy.Duration(shift_s))
+                    msg, header__stamp=msg.header.stamp + rospy.Duration(shift_s)
+                )
                 self.robot.make_steps(5)
                 self.robot.spoil = lambda msg: msg
                 self.expect_right_pose()  # and not only when the stamps have caught up
@@ -336,10 +358,20 @@ class LocalizationInterface(RoomTest):
         poses = Heard(f"/{name}/pose", PoseWithCovarianceStamped)
         self.robot.moving = False  # until the node is there: its start pose is where the robot stands now
         x, y, yaw = self.robot.map_from_base()
-        node = self.start(name, f"_initial_pose_x:={x}", f"_initial_pose_y:={y}", f"_initial_pose_a:={yaw}",
-                          "_initial_cov_xx:=0.01", "_initial_cov_yy:=0.01", "_initial_cov_aa:=0.01",
-                          "_save_pose_rate:=0.0", "_laser_likelihood_max_dist:=2.0", "_do_beamskip:=false",
-                          *private, script=script)
+        node = self.start(
+            name,
+            f"_initial_pose_x:={x}",
+            f"_initial_pose_y:={y}",
+            f"_initial_pose_a:={yaw}",
+            "_initial_cov_xx:=0.01",
+            "_initial_cov_yy:=0.01",
+            "_initial_cov_aa:=0.01",
+            "_save_pose_rate:=0.0",
+            "_laser_likelihood_max_dist:=2.0",
+            "_do_beamskip:=false",
+            *private,
+            script=script,
+        )
         started = wait_until(lambda: len(poses), 30.0)
         self.robot.moving = True
         heard = started and wait_until(lambda: len(poses) > 3, 30.0)
@@ -361,8 +393,10 @@ class LocalizationInterface(RoomTest):
 
     def test_terminated_it_saves_the_pose(self) -> None:
         printed = self.check_end("terminated", signal.SIGTERM, "amcl", "_receive_map_topic:=true")
-        self.assertIn("/terminated: unknown parameter ~receive_map_topic; did you mean ~use_map_topic?; not used, as "
-                      "by amcl", printed)
+        self.assertIn(
+            "/terminated: unknown parameter ~receive_map_topic; did you mean ~use_map_topic?; not used, as by amcl",
+            printed,
+        )
 
 
 if __name__ == "__main__":

@@ -26,7 +26,6 @@ TOWER = Lidar("front/scan", "tower_laser", (0.0, 0.0, -0.5), beams=(-1.5, 0.5), 
 
 
 class LocalizationLidars(RoomTest):
-
     lidars = (FRONT, REAR, TOWER)
 
     @classmethod
@@ -52,15 +51,18 @@ class LocalizationLidars(RoomTest):
             with part(lidar.frame):
                 for other in self.lidars:
                     other.silent = other is not lidar
-                self.assertTrue(wait_until(lambda frame=lidar.frame: self.frames_used(5) == {frame}, 30.0),
-                                f"not {lidar.frame} alone is used")
+                self.assertTrue(
+                    wait_until(lambda frame=lidar.frame: self.frames_used(5) == {frame}, 30.0),
+                    f"not {lidar.frame} alone is used",
+                )
                 self.expect_right_pose()
                 self.expect_understood()
 
     def test_a_lidar_whose_stamps_lag_is_used_all_the_same(self) -> None:
         lag = rospy.Duration(0.25)
-        self.robot.spoil = lambda msg: (changed(msg, header__stamp=msg.header.stamp - lag)
-                                        if msg.header.frame_id == "/rear_laser" else msg)
+        self.robot.spoil = lambda msg: (
+            changed(msg, header__stamp=msg.header.stamp - lag) if msg.header.frame_id == "/rear_laser" else msg
+        )
         REAR.silent = True
         self.robot.make_steps(2)
         self.robot.moving = False  # else its world would be a quarter of a second ahead of its stamps

@@ -31,7 +31,6 @@ TOLERANCE_NS = 100_000_000  # ~transform_tolerance
 
 
 class LocalizationOnARealRobot(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls) -> None:
         data = data_dir()
@@ -41,14 +40,17 @@ class LocalizationOnARealRobot(unittest.TestCase):
         folder = data / "logs" / LOG
         cls.lines = LogLines()
         cls.map_node = Process("map_node", str(folder / "map.yaml"))
-        cls.player = BagPlayer(folder / f"{LOG}.bag", {"/scan": LaserScan, "/tf": TFMessage},
-                               DURATION_S, SPEED)
+        cls.player = BagPlayer(folder / f"{LOG}.bag", {"/scan": LaserScan, "/tf": TFMessage}, DURATION_S, SPEED)
         reference = BagPlayer(folder / f"{LOG}.bag", {"/ground_truth": PoseStamped}, DURATION_S, SPEED)
         cls.reference = Trajectory(
             np.array([conversions.ns_from_stamp(msg.header.stamp) for _, _, msg in reference.messages]),
-            np.array([conversions.planar_from_pose(msg.pose) for _, _, msg in reference.messages]))
-        cls.scans = {conversions.ns_from_stamp(msg.header.stamp): msg
-                     for _, topic, msg in cls.player.messages if topic == "/scan"}
+            np.array([conversions.planar_from_pose(msg.pose) for _, _, msg in reference.messages]),
+        )
+        cls.scans = {
+            conversions.ns_from_stamp(msg.header.stamp): msg
+            for _, topic, msg in cls.player.messages
+            if topic == "/scan"
+        }
         cls.poses = Heard("amcl_pose", PoseWithCovarianceStamped)
         cls.particles = Heard("particlecloud", PoseArray)
         cls.status = Heard("/glass_localization/status", LocalizationStatus)
@@ -62,14 +64,17 @@ class LocalizationOnARealRobot(unittest.TestCase):
         cls.map_node.end()
 
     def setUp(self) -> None:
-        self.assertTrue(wait_until(lambda: self.player.connected() and self.initialpose.get_num_connections(), 30.0),
-                        "the node does not listen to scan, tf, initialpose within 20 s")
+        self.assertTrue(
+            wait_until(lambda: self.player.connected() and self.initialpose.get_num_connections(), 30.0),
+            "the node does not listen to scan, tf, initialpose within 20 s",
+        )
         heard_map = Heard("map", OccupancyGrid)
         self.assertTrue(wait_until(lambda: len(heard_map), 30.0), "no map from map_node within 30 s")
 
         def ready() -> bool:
             self.player.set_clock()
             return bool(self.lines.having("map of", "/static_map"))
+
         self.assertTrue(wait_until(ready, 30.0), "the node has no map within 30 s")
 
     def play(self) -> None:
@@ -84,9 +89,14 @@ class LocalizationOnARealRobot(unittest.TestCase):
         self.initialpose.publish(start)
         self.player.play().join()
         last_ns = sorted(self.scans)[-2]  # the transforms after the very last scan are not played
-        self.assertTrue(wait_until(lambda: self.status.last is not None
-                                   and conversions.ns_from_stamp(self.status.last.header.stamp) >= last_ns, 30.0),
-                        f"the node is not through with the scans within 30 s; last status: {self.status.last}")
+        self.assertTrue(
+            wait_until(
+                lambda: self.status.last is not None
+                and conversions.ns_from_stamp(self.status.last.header.stamp) >= last_ns,
+                30.0,
+            ),
+            f"the node is not through with the scans within 30 s; last status: {self.status.last}",
+        )
 
     def check(self) -> None:
         """Everything that the node said about the log."""
@@ -119,8 +129,10 @@ class LocalizationOnARealRobot(unittest.TestCase):
         self.assertLessEqual(seen, {0, 1, 2, 3, 4})
         self.assertIn(1, seen)
         self.assertGreater(len(self.clouds), 0)
-        self.assertEqual([f.name for f in self.clouds.last.fields],
-                         ["x", "y", "z", "rgb", "case", "range", "expected", "residual", "weight"])
+        self.assertEqual(
+            [f.name for f in self.clouds.last.fields],
+            ["x", "y", "z", "rgb", "case", "range", "expected", "residual", "weight"],
+        )
 
     def check_poses(self) -> None:
         self.assertGreater(len(self.poses), 3)
@@ -148,8 +160,10 @@ class LocalizationOnARealRobot(unittest.TestCase):
     def test_2_after_the_bag_starts_over(self) -> None:
         self.lines.clear()
         self.player.set_clock()
-        self.assertTrue(wait_until(lambda: self.lines.having("time jumped back", "starts over"), 30.0),
-                        "nothing said about the jump within 10 s")
+        self.assertTrue(
+            wait_until(lambda: self.lines.having("time jumped back", "starts over"), 30.0),
+            "nothing said about the jump within 10 s",
+        )
         self.play()
         self.check()
         self.assertEqual(len(self.lines.having("time jumped back")), 1)

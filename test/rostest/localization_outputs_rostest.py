@@ -28,15 +28,16 @@ from visualization_msgs.msg import MarkerArray
 
 from glass_nav.geometry import angles, se2
 from glass_nav.msg import LocalizationStatus
-from glass_nav.ros import beam_displays, conversions, wall_display
+from glass_nav.ros import conversions
+from glass_nav.ros.localization import beam_displays, wall_display
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.world.grid_map import GridMap
 
 PANE_COLUMN = 160
 NODE = "/glass_localization"
-HEAD_ON_RAD = 0.15                    # up to this angle to its normal the pane answers
+HEAD_ON_RAD = 0.15  # up to this angle to its normal the pane answers
 MOUNTING = np.array([0.2, 0.0, 0.3])  # of the robot's lidar
-PERIOD_S = 0.5                        # ~glass_map_period_s
+PERIOD_S = 0.5  # ~glass_map_period_s
 
 
 def room_with_a_pane() -> GridMap:
@@ -57,8 +58,9 @@ class LidarAndPane:
     def cast(self, poses: np.ndarray, bearings: np.ndarray, max_range_m: float) -> np.ndarray:
         """(P, B) ranges [m] along bearings (B,) from poses (P, 3)."""
         head_on = self.incidence(poses, bearings) < HEAD_ON_RAD
-        return np.where(head_on, self.with_pane.cast(poses, bearings, max_range_m),
-                        self.room.cast(poses, bearings, max_range_m))
+        return np.where(
+            head_on, self.with_pane.cast(poses, bearings, max_range_m), self.room.cast(poses, bearings, max_range_m)
+        )
 
     def incidence(self, poses: np.ndarray, bearings: np.ndarray) -> np.ndarray:
         """(P, B) angles to the normal of the pane [rad]."""
@@ -66,7 +68,6 @@ class LidarAndPane:
 
 
 class LocalizationOutputs(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls) -> None:
         cls.grid_map = room_with_a_pane()
@@ -92,9 +93,11 @@ class LocalizationOutputs(unittest.TestCase):
 
     def localize(self) -> None:
         """Tell the node where the robot stands, and let it look until it is sure."""
+
         def sure() -> bool:
             self.update()
             return self.status.last is not None and self.status.last.state == LocalizationStatus.LOCALIZED
+
         self.initialpose.publish(pose_message(self.robot.map_from_base()))
         self.robot.make_steps(3)
         self.status.clear()
@@ -116,8 +119,9 @@ class LocalizationOutputs(unittest.TestCase):
         return se2.compose(self.robot.map_from_base(), MOUNTING)[None]
 
     def check_cut_at_the_pane(self, out: LaserScan, scan: LaserScan, bearings: np.ndarray) -> None:
-        measured, pane = (caster.cast(self.map_from_laser(), bearings, 20.0)[0]
-                          for caster in (self.lidar, self.lidar.with_pane))
+        measured, pane = (
+            caster.cast(self.map_from_laser(), bearings, 20.0)[0] for caster in (self.lidar, self.lidar.with_pane)
+        )
         passed = measured > pane + 0.5
         ranges, cut = np.array(out.ranges), np.array(out.intensities) == 1.0
         self.assertGreater(passed.sum(), 30)
@@ -155,8 +159,10 @@ class LocalizationOutputs(unittest.TestCase):
     def test_while_the_pose_is_not_trusted_the_scan_is_raw_and_flagged(self) -> None:
         self.surfaces.clear()
         rospy.ServiceProxy("global_localization", Empty)()
-        self.assertTrue(wait_until(lambda: any(msg.intensities[0] == -1.0 for msg in self.surfaces.all), 30.0),
-                        f"no raw scan while searching; state {self.status.last.state_name}")
+        self.assertTrue(
+            wait_until(lambda: any(msg.intensities[0] == -1.0 for msg in self.surfaces.all), 30.0),
+            f"no raw scan while searching; state {self.status.last.state_name}",
+        )
         out = [msg for msg in self.surfaces.all if msg.intensities[0] == -1.0][0]
         self.assertEqual(set(out.intensities), {-1.0})
         self.assertEqual(out.ranges, self.sent(out.header.stamp)[0].ranges)
@@ -230,8 +236,10 @@ class LocalizationOutputs(unittest.TestCase):
     def test_each_case_has_its_namespace_and_the_status_too(self) -> None:
         markers = Heard(f"{NODE}/beam_markers", MarkerArray)
         self.assertTrue(wait_until(lambda: len(markers), 30.0), "no ~beam_markers within 30 s")
-        self.assertTrue(wait_until(lambda: self.sent(markers.last.markers[0].header.stamp), 30.0),
-                        "no scan has the stamp of the markers")
+        self.assertTrue(
+            wait_until(lambda: self.sent(markers.last.markers[0].header.stamp), 30.0),
+            "no scan has the stamp of the markers",
+        )
         names = {marker.ns for marker in markers.last.markers}
         self.assertEqual(names, {*beam_displays.CASE_NAMES, beam_displays.STATUS_NAMESPACE})
         (status,) = [marker for marker in markers.last.markers if marker.ns == beam_displays.STATUS_NAMESPACE]
@@ -248,8 +256,12 @@ class LocalizationOutputs(unittest.TestCase):
     def test_silence_is_told_beside_the_robot(self) -> None:
         markers = Heard(f"{NODE}/beam_markers", MarkerArray)
         self.robot.lidar.silent = True
-        self.assertTrue(wait_until(lambda: markers.last and "no scan on /scan" in " ".join(
-            markers.last.markers[-1].text.split("\n")), 10.0), "nothing said in ~beam_markers within 10 s")
+        self.assertTrue(
+            wait_until(
+                lambda: markers.last and "no scan on /scan" in " ".join(markers.last.markers[-1].text.split("\n")), 10.0
+            ),
+            "nothing said in ~beam_markers within 10 s",
+        )
 
     def test_the_legend_waits_for_whoever_comes(self) -> None:
         for _ in range(2):

@@ -37,7 +37,6 @@ def area(*corners: "tuple[float, float]", frame: str = "map") -> PolygonStamped:
 
 
 class LocalizationStart(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls) -> None:
         cls.grid_map = room()
@@ -78,8 +77,11 @@ class LocalizationStart(unittest.TestCase):
         return printed
 
     def wait_for(self, what: str, condition: Any, timeout_s: float = 30.0) -> None:
-        self.assertTrue(wait_until(condition, timeout_s), f"{what}: not within {timeout_s:g} s; last status: "
-                        f"{self.status.last}; last lines: {self.lines.having('')[-5:]}")
+        self.assertTrue(
+            wait_until(condition, timeout_s),
+            f"{what}: not within {timeout_s:g} s; last status: "
+            f"{self.status.last}; last lines: {self.lines.having('')[-5:]}",
+        )
 
     def wait_for_line(self, *words: str) -> None:
         self.wait_for(f"a line with {words}", lambda: self.lines.having(*words), 15.0)
@@ -112,8 +114,9 @@ class LocalizationStart(unittest.TestCase):
         self.wait_for("LOCALIZED", lambda: "LOCALIZED" in self.states())
         self.wait_for("a transform", lambda: len(self.transforms))
         first_ns = conversions.ns_from_stamp(self.transforms.all[0].transforms[0].header.stamp)
-        localized_ns = [conversions.ns_from_stamp(msg.header.stamp) for msg in self.status.all
-                        if msg.state_name == "LOCALIZED"][0]
+        localized_ns = [
+            conversions.ns_from_stamp(msg.header.stamp) for msg in self.status.all if msg.state_name == "LOCALIZED"
+        ][0]
         self.assertEqual(first_ns, localized_ns + 100_000_000)  # ~transform_tolerance
         self.assertTrue(all(0.0 <= msg.reliability <= 1.0 for msg in self.status.all if np.isfinite(msg.used_share)))
         self.check_area()
@@ -124,10 +127,12 @@ class LocalizationStart(unittest.TestCase):
 
     def check_area(self) -> None:
         """The node searches where it is told to, and refuses what is no place."""
-        for words, msg in (("frame 'map', got 'odom'", area((0, 0), (1, 0), (1, 1), frame="odom")),
-                           ("at least 3 corners, got 2", area((0, 0), (1, 0))),
-                           ("must be finite", area((0, 0), (1, 0), (float("nan"), 1))),
-                           ("the area has no free cell", area((100, 100), (101, 100), (101, 101)))):
+        for words, msg in (
+            ("frame 'map', got 'odom'", area((0, 0), (1, 0), (1, 1), frame="odom")),
+            ("at least 3 corners, got 2", area((0, 0), (1, 0))),
+            ("must be finite", area((0, 0), (1, 0), (float("nan"), 1))),
+            ("the area has no free cell", area((100, 100), (101, 100), (101, 101))),
+        ):
             self.lines.clear()
             self.areas.publish(msg)
             self.wait_for_line("global_localization_area refused", words)
@@ -151,8 +156,7 @@ class LocalizationStart(unittest.TestCase):
         self.wait_for_line("no pose file", "yet")
         self.wait_for("listeners", self.initialpose.get_num_connections)
         self.initialpose.publish(pose_message(self.robot.map_from_base()))
-        self.wait_for("LOCALIZED at the right place",
-                      lambda: self.state == "LOCALIZED" and self.is_right())
+        self.wait_for("LOCALIZED at the right place", lambda: self.state == "LOCALIZED" and self.is_right())
         self.wait_for("a pose of centimetres", self.is_right_after_a_stretch)
         self.end()
         return dict(yaml.safe_load(path.read_text()))
@@ -192,10 +196,12 @@ class LocalizationStart(unittest.TestCase):
             self.robot.map_from_odom = here
             self.robot.make_steps(2)
             np.testing.assert_allclose(self.start_again(path, "of the pose file", "began anew"), here, atol=0.3)
-        for change, words in (({"map": "0" * 16}, "it is of map 0000000000000000"),
-                              ({"stamp_ns": 10**9}, "~pose_file_max_age_s is 604800 s"),
-                              ({"state": "LOST"}, "the robot was LOST"),
-                              ({"map_from_base": None}, "its map_from_base must be finite numbers")):
+        for change, words in (
+            ({"map": "0" * 16}, "it is of map 0000000000000000"),
+            ({"stamp_ns": 10**9}, "~pose_file_max_age_s is 604800 s"),
+            ({"state": "LOST"}, "the robot was LOST"),
+            ({"map_from_base": None}, "its map_from_base must be finite numbers"),
+        ):
             with part(words):
                 path.write_text(yaml.safe_dump({**content, "odom_from_base": [0.0, 0.0, 0.0], **change}))
                 self.start(f"_pose_file:={path}")
@@ -216,15 +222,15 @@ class LocalizationStart(unittest.TestCase):
 
     def test_it_is_tuned_while_it_runs_and_forgets_nothing(self) -> None:
         x, y, yaw = self.robot.map_from_base()
-        self.start("_max_particles:=250", f"_initial_pose_x:={x}", f"_initial_pose_y:={y}",
-                   f"_initial_pose_a:={yaw}")
+        self.start("_max_particles:=250", f"_initial_pose_x:={x}", f"_initial_pose_y:={y}", f"_initial_pose_a:={yaw}")
         self.wait_for("a right pose", lambda: self.is_right() and self.state == "LOCALIZED")
         client = Client("/under_test", timeout=20.0)
         self.assertEqual(client.get_configuration(timeout=10.0)["min_particles"], 250)
         self.assertFalse(rospy.has_param("/under_test/min_particles"), "nobody asked for it")
         self.lines.clear()
-        now = client.update_configuration({"update_min_d": 0.05, "laser_z_hit": 1, "weight_mode": "ranges",
-                                           "transform_tolerance": 0.3})
+        now = client.update_configuration(
+            {"update_min_d": 0.05, "laser_z_hit": 1, "weight_mode": "ranges", "transform_tolerance": 0.3}
+        )
         self.assertEqual((now["update_min_d"], now["laser_z_hit"], now["weight_mode"]), (0.05, 1.0, "ranges"))
         self.assertEqual(rospy.get_param("/under_test/weight_mode"), "ranges")
         self.wait_for_line("parameters now", "update_min_d 0.05")
@@ -233,11 +239,12 @@ class LocalizationStart(unittest.TestCase):
         self.wait_for("poses", lambda: len(self.poses) > 5)
         self.assertEqual(set(self.states()), {"LOCALIZED"}, "the filter was not left alone")
         self.assertTrue(self.is_right())
-        for bad, words in (({"laser_z_hit": -1.0}, "~laser_z_hit must be > 0, got -1.0"),
-                           ({"min_particles": 251}, "~min_particles must be in [1, max_particles = 250], got 251"),
-                           ({"vote_mode": "none"}, "~vote_mode must be one of soft, paper, got 'none'"),
-                           ({"transform_tolerance": float("nan"), "laser_z_hit": 0.5},
-                            "~transform_tolerance must be finite, got nan")):
+        for bad, words in (
+            ({"laser_z_hit": -1.0}, "~laser_z_hit must be > 0, got -1.0"),
+            ({"min_particles": 251}, "~min_particles must be in [1, max_particles = 250], got 251"),
+            ({"vote_mode": "none"}, "~vote_mode must be one of soft, paper, got 'none'"),
+            ({"transform_tolerance": float("nan"), "laser_z_hit": 0.5}, "~transform_tolerance must be finite, got nan"),
+        ):
             with part(words):
                 self.lines.clear()
                 with self.assertRaises(DynamicReconfigureCallbackException):
@@ -251,9 +258,11 @@ class LocalizationStart(unittest.TestCase):
 
     def check_many_at_once(self, client: Client) -> None:
         """Callers beside each other do not undo one another's values."""
+
         def change(name: str) -> None:
             for value in (0.3, 0.4, 0.5):
                 client.update_configuration({name: value})
+
         names = ("update_min_d", "update_min_a", "std_warn_level_x")
         threads = [threading.Thread(target=change, args=(name,)) for name in names]
         for thread in threads:

@@ -44,13 +44,14 @@ def room() -> GridMap:
 @dataclass
 class Lidar:
     """One of the robot's lidars."""
+
     topic: str = "scan"
     frame: str = "laser"
     mounting: Tuple[float, float, float] = (0.2, 0.0, 0.3)  # x, y, yaw on the robot
     upside_down: bool = False
     swings: bool = False  # the mounting turns to and fro
     beams: Tuple[float, float] = (BEAMS[0], BEAMS[-1])
-    turn_s: float = 0.0   # from its first beam to its last one
+    turn_s: float = 0.0  # from its first beam to its last one
     silent: bool = False
 
     def base_from_laser(self, time_s: float) -> np.ndarray:
@@ -87,8 +88,9 @@ class Robot:
         self.odometry_is_told = True
         self.map_from_odom = MAP_FROM_ODOM
         self.spoil: Callable[[LaserScan], Optional[LaserScan]] = lambda msg: msg
-        self._scans = {topic: rospy.Publisher(topic, LaserScan, queue_size=10)
-                       for topic in {lidar.topic for lidar in self.lidars}}
+        self._scans = {
+            topic: rospy.Publisher(topic, LaserScan, queue_size=10) for topic in {lidar.topic for lidar in self.lidars}
+        }
         self._broadcaster = tf2_ros.TransformBroadcaster()
         threading.Thread(target=self._run, daemon=True).start()
 
@@ -110,8 +112,9 @@ class Robot:
         return self._on_the_circle(self._turned_rad)
 
     def _on_the_circle(self, turned: float) -> np.ndarray:
-        return se2.compose(self._centre, np.array([1.2 * math.cos(turned), 1.2 * math.sin(turned),
-                                                   turned + math.pi / 2]))
+        return se2.compose(
+            self._centre, np.array([1.2 * math.cos(turned), 1.2 * math.sin(turned), turned + math.pi / 2])
+        )
 
     def odom_from_base(self) -> np.ndarray:
         """What odometry says, which has no error."""
@@ -149,15 +152,24 @@ class Robot:
         step_s = lidar.turn_s / (len(bearings) - 1)
         if lidar.turn_s:
             turned = self._turned_rad + self.moving * TURN_RAD_S * step_s * np.arange(len(bearings))
-            beams = [se2.compose(se2.compose(self._on_the_circle(each), base_from_laser), np.array([0.0, 0.0, bearing]))
-                     for each, bearing in zip(turned, seen)]
+            beams = [
+                se2.compose(se2.compose(self._on_the_circle(each), base_from_laser), np.array([0.0, 0.0, bearing]))
+                for each, bearing in zip(turned, seen)
+            ]
             ranges = self._caster.cast(np.array(beams), np.zeros(1), RANGE_MAX_M)[:, 0]
         else:
             map_from_laser = se2.compose(self.map_from_base(), base_from_laser)
             ranges = self._caster.cast(map_from_laser[None], seen, RANGE_MAX_M)[0]
-        return LaserScan(header=conversions.header(stamp_ns, "/" + lidar.frame), angle_min=bearings[0],
-                         angle_max=bearings[-1], angle_increment=BEAMS[1] - BEAMS[0], time_increment=step_s,
-                         range_min=0.05, range_max=RANGE_MAX_M, ranges=ranges.tolist())
+        return LaserScan(
+            header=conversions.header(stamp_ns, "/" + lidar.frame),
+            angle_min=bearings[0],
+            angle_max=bearings[-1],
+            angle_increment=BEAMS[1] - BEAMS[0],
+            time_increment=step_s,
+            range_min=0.05,
+            range_max=RANGE_MAX_M,
+            ranges=ranges.tolist(),
+        )
 
 
 def pose_message(planar: np.ndarray, variance: float = 0.01) -> PoseWithCovarianceStamped:

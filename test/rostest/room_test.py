@@ -65,23 +65,36 @@ class RoomTest(unittest.TestCase):
     def expect_right_pose(self, timeout_s: float = 30.0) -> None:
         """A transform of a scan from now on puts the robot where it is."""
         self.transforms.clear()
-        self.assertTrue(wait_until(lambda: len(self.transforms) and self.error_m() < 0.25, timeout_s),
-                        f"no right pose within {timeout_s:g} s; heard {len(self.transforms)} transforms, "
-                        f"error {self.error_m() if len(self.transforms) else math.nan:.2f} m; "
-                        f"{self.lines.having('')[-5:]}")
+        self.assertTrue(
+            wait_until(lambda: len(self.transforms) and self.error_m() < 0.25, timeout_s),
+            f"no right pose within {timeout_s:g} s; heard {len(self.transforms)} transforms, "
+            f"error {self.error_m() if len(self.transforms) else math.nan:.2f} m; "
+            f"{self.lines.having('')[-5:]}",
+        )
 
     def expect_understood(self) -> None:
         """A scan from now on is explained by the map."""
         self.status.clear()
-        self.assertTrue(wait_until(lambda: len(self.status) and self.status.last.used_share > 0.8, 30.0),
-                        f"no scan is understood: {self.status.last}")
+        self.assertTrue(
+            wait_until(lambda: len(self.status) and self.status.last.used_share > 0.8, 30.0),
+            f"no scan is understood: {self.status.last}",
+        )
 
     def expect_line(self, *words: str) -> None:
-        self.assertTrue(wait_until(lambda: self.lines.having(*words), 30.0),
-                        f"no log line with {words}; there are {self.lines.having('')[-10:]}")
+        self.assertTrue(
+            wait_until(lambda: self.lines.having(*words), 30.0),
+            f"no log line with {words}; there are {self.lines.having('')[-10:]}",
+        )
 
     def start(self, name: str, *private: str, script: str = "localization_node") -> Process:
-        return Process(script, f"__name:={name}", "_tf_broadcast:=false", f"amcl_pose:=/{name}/pose",
-                       f"particlecloud:=/{name}/particlecloud", f"set_map:=/{name}/set_map",
-                       f"global_localization:=/{name}/global_localization",
-                       f"request_nomotion_update:=/{name}/request_nomotion_update", *private)
+        return Process(
+            script,
+            f"__name:={name}",
+            "_tf_broadcast:=false",
+            f"amcl_pose:=/{name}/pose",
+            f"particlecloud:=/{name}/particlecloud",
+            f"set_map:=/{name}/set_map",
+            f"global_localization:=/{name}/global_localization",
+            f"request_nomotion_update:=/{name}/request_nomotion_update",
+            *private,
+        )

@@ -85,8 +85,13 @@ class Process:
     """A program of the package, ended by its own id."""
 
     def __init__(self, script: str, *arguments: str) -> None:
-        self._process = subprocess.Popen([str(REPO / "scripts" / script), *arguments], stdin=subprocess.DEVNULL,
-                                         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self._process = subprocess.Popen(
+            [str(REPO / "scripts" / script), *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
 
     def end(self, how: int = signal.SIGINT, timeout_s: float = 15.0) -> "tuple[int, str]":
         """Exit code and everything it printed."""
@@ -111,12 +116,15 @@ class BagPlayer:
     def __init__(self, path: Path, kinds: Dict[str, type], duration_s: float, speed: float) -> None:
         with rosbag.Bag(str(path)) as bag:
             start = rospy.Time(bag.get_start_time())
-            self.messages = [(t, topic, self._as(kinds[topic], msg)) for topic, msg, t in bag.read_messages(
-                topics=list(kinds), end_time=start + rospy.Duration(duration_s))]
+            self.messages = [
+                (t, topic, self._as(kinds[topic], msg))
+                for topic, msg, t in bag.read_messages(topics=list(kinds), end_time=start + rospy.Duration(duration_s))
+            ]
         self._speed = speed
         self._clock = rospy.Publisher("/clock", Clock, queue_size=100, tcp_nodelay=True)
-        self._publishers = {topic: rospy.Publisher(topic, kind, queue_size=100, tcp_nodelay=True)
-                            for topic, kind in kinds.items()}
+        self._publishers = {
+            topic: rospy.Publisher(topic, kind, queue_size=100, tcp_nodelay=True) for topic, kind in kinds.items()
+        }
 
     @staticmethod
     def _as(kind: type, msg: Any) -> Any:
@@ -124,6 +132,7 @@ class BagPlayer:
         if isinstance(msg, kind):
             return msg
         from io import BytesIO
+
         raw = BytesIO()
         msg.serialize(raw)
         return kind().deserialize(raw.getvalue())

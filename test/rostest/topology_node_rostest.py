@@ -28,13 +28,21 @@ from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 from glass_nav.geometry import angles
-from glass_nav.msg import (EdgeTraversal, LocalizeGloballyAction, LocalizeGloballyGoal, Meetpoint, TopologyCandidates,
-                           TopologyStatus, TurnChoice)
+from glass_nav.msg import (
+    EdgeTraversal,
+    LocalizeGloballyAction,
+    LocalizeGloballyGoal,
+    Meetpoint,
+    TopologyCandidates,
+    TopologyStatus,
+    TurnChoice,
+)
 from glass_nav.ros import conversions
-from glass_nav.topology import atlas_file, observations, shipped_atlases
-from glass_nav.topology.atlas import Atlas, Darts, Edges, MapReference, Nodes, Ragged, Visits, rings_clockwise
-from glass_nav.topology.atlas_localizer import poses_at
-from glass_nav.topology.wake_up import AtlasRobot, Surroundings, TrialParams
+from glass_nav.topology import observations
+from glass_nav.topology.atlas import atlas_file, shipped_atlases
+from glass_nav.topology.atlas.atlas import Atlas, Darts, Edges, MapReference, Nodes, Ragged, Visits, rings_clockwise
+from glass_nav.topology.search.atlas_localizer import poses_at
+from glass_nav.topology.search.wake_up_trials import AtlasRobot, Surroundings, TrialParams
 from glass_nav.world import map_file
 
 NODE = "/glass_topology"
@@ -42,14 +50,24 @@ STAMP_NS = 1_700_000_000_000_000_000
 
 
 def meetpoint_msg(seen: observations.Meetpoint, stamp_ns: int) -> Meetpoint:
-    return Meetpoint(header=conversions.header(stamp_ns, "base_link"), degree=seen.degree, r=seen.r_m,
-                     bearings=seen.bearings_rad.tolist())
+    return Meetpoint(
+        header=conversions.header(stamp_ns, "base_link"),
+        degree=seen.degree,
+        r=seen.r_m,
+        bearings=seen.bearings_rad.tolist(),
+    )
 
 
 def traversal_msg(seen: observations.Traversal, stamp_ns: int) -> EdgeTraversal:
-    return EdgeTraversal(header=conversions.header(stamp_ns, "base_link"), rank=seen.rank, length=seen.length_m,
-                         chord=seen.chord_m, has_directions=True, chord_bearing=seen.chord_bearing_rad,
-                         turn=seen.turn_rad)
+    return EdgeTraversal(
+        header=conversions.header(stamp_ns, "base_link"),
+        rank=seen.rank,
+        length=seen.length_m,
+        chord=seen.chord_m,
+        has_directions=True,
+        chord_bearing=seen.chord_bearing_rad,
+        turn=seen.turn_rad,
+    )
 
 
 def twofold() -> Atlas:
@@ -61,14 +79,18 @@ def twofold() -> Atlas:
     out = np.arctan2(step[:, 1], step[:, 0])
     bearing, node = np.stack([out, out + np.pi], axis=1).ravel(), ends.ravel()
     kind = np.array([0, 0, 1, 1, 1, 1], np.int8)
-    return Atlas("twofold", MapReference("none", ""),
-                 Nodes(position, np.array([1.3, 1.3, 0.8, 0.8, 0.6, 0.6]), np.full(6, 0.02), kind),
-                 Edges(length, length, np.full(5, 0.02), np.full(5, 0.5), Ragged.empty(5, 2)),
-                 Darts(node, bearing, Ragged.empty(10, 4)), rings_clockwise(node, bearing, 6), Visits.none(6, 5))
+    return Atlas(
+        "twofold",
+        MapReference("none", ""),
+        Nodes(position, np.array([1.3, 1.3, 0.8, 0.8, 0.6, 0.6]), np.full(6, 0.02), kind),
+        Edges(length, length, np.full(5, 0.02), np.full(5, 0.5), Ragged.empty(5, 2)),
+        Darts(node, bearing, Ragged.empty(10, 4)),
+        rings_clockwise(node, bearing, 6),
+        Visits.none(6, 5),
+    )
 
 
 class TopologyNode(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls) -> None:
         cls.folder = Path(tempfile.mkdtemp())
@@ -84,8 +106,13 @@ class TopologyNode(unittest.TestCase):
         cls.client = actionlib.SimpleActionClient("localize_globally", LocalizeGloballyAction)
         assert cls.client.wait_for_server(rospy.Duration(30))
         assert wait_until(lambda: all(p.get_num_connections() for p in (cls.meetpoints, cls.traversals, cls.maps)), 20)
-        assert wait_until(lambda: all(heard._subscriber.get_num_connections() for heard in (
-            cls.turns, cls.poses, cls.status, cls.candidates, cls.markers)), 20)
+        assert wait_until(
+            lambda: all(
+                heard._subscriber.get_num_connections()
+                for heard in (cls.turns, cls.poses, cls.status, cls.candidates, cls.markers)
+            ),
+            20,
+        )
         assert wait_until(lambda: cls.lines.having("4 nodes, 4 edges") or cls.status.last, 20)
 
     def setUp(self) -> None:
@@ -117,8 +144,11 @@ class TopologyNode(unittest.TestCase):
         self.meetpoints.publish(meetpoint_msg(meetpoint, self.stamp_ns))  # the meetpoint first: either order will do
         if traversal is not None:
             self.traversals.publish(traversal_msg(traversal, self.stamp_ns))
-        answered = wait_until(lambda: self.status.last is not before
-                              and conversions.ns_from_stamp(self.status.last.header.stamp) == self.stamp_ns, 10.0)
+        answered = wait_until(
+            lambda: self.status.last is not before
+            and conversions.ns_from_stamp(self.status.last.header.stamp) == self.stamp_ns,
+            10.0,
+        )
         self.assertTrue(answered, f"no status for the meetpoint, the last is {self.status.last}")
         if not self.status.last.turn:
             return False
@@ -164,7 +194,7 @@ class TopologyNode(unittest.TestCase):
             pose = conversions.planar_from_pose(msg.pose.pose)
             self.assertLess(np.hypot(*(pose - truth)[:2]), 1e-6)
             self.assertLess(abs(angles.wrap(pose[2] - truth[2])), 1e-6)
-            self.assertAlmostEqual(msg.pose.covariance[0], 0.25 ** 2)
+            self.assertAlmostEqual(msg.pose.covariance[0], 0.25**2)
         self.assertEqual(result.status.state_name, "CONFIRMED")
         self.assertEqual((result.candidates.total, list(result.candidates.nodes)), (1, [atlas.darts.node[robot.dart]]))
         self.assertGreaterEqual(len(feedback), 2)
@@ -175,8 +205,15 @@ class TopologyNode(unittest.TestCase):
 
     def test_it_can_be_used_by_hand(self) -> None:
         def by_hand(topic: str, kind: str, values: str) -> None:
-            subprocess.run(["rostopic", "pub", "-1", topic, f"glass_nav/{kind}", values], check=True, timeout=60,
-                           stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            subprocess.run(
+                ["rostopic", "pub", "-1", topic, f"glass_nav/{kind}", values],
+                check=True,
+                timeout=60,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
+
         by_hand("/meetpoint", "Meetpoint", "{degree: 3, r: 1.5}")
         self.assertEqual(self.await_state("SEARCHING").candidates, 6)
         by_hand("/edge_traversal", "EdgeTraversal", "{rank: -1, length: 8.05, chord: 8.0}")
@@ -275,11 +312,12 @@ class TopologyNode(unittest.TestCase):
     def test_reports_that_cannot_be_true_are_refused_in_one_line(self) -> None:
         self.report(observations.Meetpoint(3, 1.5))
         for msg, line in [
-                (Meetpoint(degree=0, r=1.0), "meetpoint refused: meetpoint: degree must be >= 1, got 0"),
-                (Meetpoint(degree=3, r=float("nan")), "meetpoint refused: meetpoint: r must be finite and > 0 m"),
-                (Meetpoint(degree=3, r=1.0, bearings=[0.0, 1.0]), "3 edges need 3 bearings or none, got 2"),
-                (EdgeTraversal(rank=1, length=-1.0), "length must be finite and > 0 m, got -1.0"),
-                (EdgeTraversal(rank=1, length=1.0, segments=[1.0, 2.0]), "segments need 4 numbers each, got 2")]:
+            (Meetpoint(degree=0, r=1.0), "meetpoint refused: meetpoint: degree must be >= 1, got 0"),
+            (Meetpoint(degree=3, r=float("nan")), "meetpoint refused: meetpoint: r must be finite and > 0 m"),
+            (Meetpoint(degree=3, r=1.0, bearings=[0.0, 1.0]), "3 edges need 3 bearings or none, got 2"),
+            (EdgeTraversal(rank=1, length=-1.0), "length must be finite and > 0 m, got -1.0"),
+            (EdgeTraversal(rank=1, length=1.0, segments=[1.0, 2.0]), "segments need 4 numbers each, got 2"),
+        ]:
             (self.meetpoints if isinstance(msg, Meetpoint) else self.traversals).publish(msg)
             self.assertTrue(wait_until(lambda line=line: self.lines.having(line), 30.0), line)
         self.assertEqual(self.status.last.depth, 0)
@@ -324,13 +362,18 @@ class TopologyNode(unittest.TestCase):
         self.check_end(3, "did you mean document_example?", "_atlas:=document_exampel")
 
     def test_an_unknown_parameter_ends_it(self) -> None:
-        self.check_end(2, "unknown parameter ~confirm_edge; did you mean ~confirm_edges?",
-                       "_atlas:=document_example", "_confirm_edge:=1")
+        self.check_end(
+            2,
+            "unknown parameter ~confirm_edge; did you mean ~confirm_edges?",
+            "_atlas:=document_example",
+            "_confirm_edge:=1",
+        )
 
     def test_terminated_it_ends_at_once(self) -> None:
         status = Heard("/topology_ending/status", TopologyStatus)
-        node = Process("topology_node", "__name:=topology_ending", "_atlas:=document_example",
-                       "_search_at_start:=false")
+        node = Process(
+            "topology_node", "__name:=topology_ending", "_atlas:=document_example", "_search_at_start:=false"
+        )
         started = wait_until(lambda: status.last, 30.0)
         code, printed = node.end(signal.SIGTERM)
         self.assertTrue(started, printed)

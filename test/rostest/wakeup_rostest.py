@@ -37,9 +37,14 @@ def topology() -> Process:
 
 
 def driver() -> Process:
-    return Process("driver_node", "__name:=glass_driver", f"_atlas:={BUILDING}",
-                   "topology_status:=glass_topology/status", "restart_search:=glass_topology/restart",
-                   "localization_status:=glass_localization/status")
+    return Process(
+        "driver_node",
+        "__name:=glass_driver",
+        f"_atlas:={BUILDING}",
+        "topology_status:=glass_topology/status",
+        "restart_search:=glass_topology/restart",
+        "localization_status:=glass_localization/status",
+    )
 
 
 def localization() -> Process:
@@ -47,7 +52,6 @@ def localization() -> Process:
 
 
 class WakeUp(unittest.TestCase):
-
     def setUp(self) -> None:
         self.lines = LogLines()
         self.truth = Heard("ground_truth", PoseStamped)
@@ -72,13 +76,17 @@ class WakeUp(unittest.TestCase):
 
     def await_(self, condition: object, timeout_s: float, what: str) -> None:
         said = [heard.last.reason if heard.last else None for heard in (self.topology, self.driver)]
-        self.assertTrue(wait_until(condition, timeout_s), f"no {what} within {timeout_s:g} s; topology and driver say "
-                        f"{said}; {self.lines.having('')[-10:]}")
+        self.assertTrue(
+            wait_until(condition, timeout_s),
+            f"no {what} within {timeout_s:g} s; topology and driver say {said}; {self.lines.having('')[-10:]}",
+        )
 
     def is_at(self, depth: int, after: int) -> bool:
         """A search that has come so far, by what the topology said after so many words."""
-        return any(msg.depth >= depth and msg.state_name in ("SEARCHING", "TENTATIVE", "CONFIRMED")
-                   for msg in self.topology.all[after:])
+        return any(
+            msg.depth >= depth and msg.state_name in ("SEARCHING", "TENTATIVE", "CONFIRMED")
+            for msg in self.topology.all[after:]
+        )
 
     def true_pose(self, stamp: rospy.Time) -> np.ndarray:
         self.await_(lambda: any(msg.header.stamp == stamp for msg in self.truth.all), 10.0, "truth at the stamp")
@@ -86,11 +94,19 @@ class WakeUp(unittest.TestCase):
 
     def test_a_robot_finds_out_where_it_is_though_nodes_die_on_the_way(self) -> None:
         picture = Path(tempfile.mkdtemp()) / "wakeup.png"
-        demo = self.start(Process("wakeup_demo", f"_atlas:={BUILDING}", "_tour:=1", "_searches:=4",
-                                  f"_picture:={picture}",
-                                  "topology_status:=glass_topology/status", "restart_search:=glass_topology/restart",
-                                  "topology_candidates:=glass_topology/candidates",
-                                  "localization_status:=glass_localization/status"))
+        demo = self.start(
+            Process(
+                "wakeup_demo",
+                f"_atlas:={BUILDING}",
+                "_tour:=1",
+                "_searches:=4",
+                f"_picture:={picture}",
+                "topology_status:=glass_topology/status",
+                "restart_search:=glass_topology/restart",
+                "topology_candidates:=glass_topology/candidates",
+                "localization_status:=glass_localization/status",
+            )
+        )
         first_localization = self.start(localization())
         first_topology, first_driver = self.start(topology()), self.start(driver())
         self.await_(lambda: self.is_at(1, 0), STEP_S, "edge driven")
@@ -113,8 +129,11 @@ class WakeUp(unittest.TestCase):
         self.await_(lambda: self.odometry.last.twist.twist.linear.x == 0.0, 20.0, "standstill without a driver")
         heard = len(self.topology)
         self.start(driver())
-        self.await_(lambda: any(msg.state_name == "WAITING" for msg in self.topology.all[heard:]), STEP_S,
-                    "search that begins anew")
+        self.await_(
+            lambda: any(msg.state_name == "WAITING" for msg in self.topology.all[heard:]),
+            STEP_S,
+            "search that begins anew",
+        )
         self.assertTrue(self.lines.having("the search cannot follow the robot to this meetpoint"))
 
         # whom it says to be LOST, the demo asks to begin anew
@@ -145,9 +164,11 @@ class WakeUp(unittest.TestCase):
         self.assertFalse(len(self.blocked), "the robot touched something")
 
     def test_the_demo_says_what_it_cannot_do(self) -> None:
-        for arguments, line in (((), "~atlas must be a file, a folder or the name of a shipped atlas, got ''"),
-                                (("_atlas:=opaque_offise",), "did you mean opaque_office?"),
-                                (("_atlas:=opaque_office", "_searches:=0"), "~searches must be >= 1, got 0")):
+        for arguments, line in (
+            ((), "~atlas must be a file, a folder or the name of a shipped atlas, got ''"),
+            (("_atlas:=opaque_offise",), "did you mean opaque_office?"),
+            (("_atlas:=opaque_office", "_searches:=0"), "~searches must be >= 1, got 0"),
+        ):
             code, printed = Process("wakeup_demo", "__name:=demo_refused", *arguments).wait(30.0)
             self.assertEqual(code, 2, printed)
             self.assertIn(line, printed)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from glass_nav import amcl_parameters, params
-from glass_nav.localization.glass_mcl_params import GlassMclParams
+from glass_nav.localization.localizer_params import GlassMclParams
 from glass_nav.params import ParamError
 
 
@@ -13,8 +13,15 @@ def loaded(**given):
     return params.load(GlassMclParams, amcl_parameters.adapted(given, GlassMclParams), "/amcl")
 
 
-@pytest.mark.parametrize("given, least", [({"max_particles": 100}, 100), ({"max_particles": 2000}, 300), ({}, 300),
-                                          ({"max_particles": 100, "min_particles": 50}, 50)])
+@pytest.mark.parametrize(
+    "given, least",
+    [
+        ({"max_particles": 100}, 100),
+        ({"max_particles": 2000}, 300),
+        ({}, 300),
+        ({"max_particles": 100, "min_particles": 50}, 50),
+    ],
+)
 def test_few_particles_may_be_asked_for_by_their_maximum_alone(given, least):
     assert loaded(**given).count.min_particles == least
 
@@ -24,13 +31,21 @@ def test_a_wide_scatter_of_ranges_widens_its_limit(sigma, most):
     assert loaded(laser_sigma_hit=sigma).mixture.laser_sigma_hit_max == most
 
 
-@pytest.mark.parametrize("given, text", [
-    ({"max_particles": 100, "min_particles": 300},
-     "/amcl: ~min_particles must be in [1, max_particles = 100], got 300"),
-    ({"max_particles": 0}, "/amcl: ~min_particles must be in [1, max_particles = 0], got 0"),
-    ({"max_particles": "many"}, "/amcl: ~max_particles must be int, got 'many'"),
-    ({"laser_sigma_hit": 0.5, "laser_sigma_hit_max": 0.2},
-     "/amcl: ~laser_sigma_hit_max must be >= ~laser_sigma_hit = 0.5, got 0.2")])
+@pytest.mark.parametrize(
+    "given, text",
+    [
+        (
+            {"max_particles": 100, "min_particles": 300},
+            "/amcl: ~min_particles must be in [1, max_particles = 100], got 300",
+        ),
+        ({"max_particles": 0}, "/amcl: ~min_particles must be in [1, max_particles = 0], got 0"),
+        ({"max_particles": "many"}, "/amcl: ~max_particles must be int, got 'many'"),
+        (
+            {"laser_sigma_hit": 0.5, "laser_sigma_hit_max": 0.2},
+            "/amcl: ~laser_sigma_hit_max must be >= ~laser_sigma_hit = 0.5, got 0.2",
+        ),
+    ],
+)
 def test_what_is_said_and_contradicts_itself_is_refused(given, text):
     with pytest.raises(ParamError) as err:
         loaded(**given)

@@ -55,20 +55,24 @@ def test_a_whole_number_is_a_length():
     assert radius_m == 1.0 and isinstance(radius_m, float)
 
 
-@pytest.mark.parametrize("given, text", [
-    ({"wheel_raduis_m": 0.2}, "/node: unknown parameter ~wheel_raduis_m; did you mean ~wheel_radius_m?"),
-    ({"zzz": 1}, "/node: unknown parameter ~zzz"),
-    ({7: 1}, "/node: unknown parameter ~7"),
-    ({"loaded": "0"}, "/node: ~loaded must be bool, got '0'"),
-    ({"loaded": 1}, "/node: ~loaded must be bool, got 1"),
-    ({"wheel_count": True}, "/node: ~wheel_count must be int, got True"),
-    ({"wheel_count": 2.5}, "/node: ~wheel_count must be int, got 2.5"),
-    ({"wheel_radius_m": True}, "/node: ~wheel_radius_m must be float, got True"),
-    ({"wheel_radius_m": "0.1"}, "/node: ~wheel_radius_m must be float, got '0.1'"),
-    ({"wheel_radius_m": None}, "/node: ~wheel_radius_m must be float, got None"),
-    ({"name": 3}, "/node: ~name must be str, got 3"),
-    ({"wheel_radius_m": -1.0}, "/node: ~wheel_radius_m must be > 0 m, got -1.0"),
-    ({"loaded": True, "wheel_count": 1}, "a loaded cart needs 2 wheels")])
+@pytest.mark.parametrize(
+    "given, text",
+    [
+        ({"wheel_raduis_m": 0.2}, "/node: unknown parameter ~wheel_raduis_m; did you mean ~wheel_radius_m?"),
+        ({"zzz": 1}, "/node: unknown parameter ~zzz"),
+        ({7: 1}, "/node: unknown parameter ~7"),
+        ({"loaded": "0"}, "/node: ~loaded must be bool, got '0'"),
+        ({"loaded": 1}, "/node: ~loaded must be bool, got 1"),
+        ({"wheel_count": True}, "/node: ~wheel_count must be int, got True"),
+        ({"wheel_count": 2.5}, "/node: ~wheel_count must be int, got 2.5"),
+        ({"wheel_radius_m": True}, "/node: ~wheel_radius_m must be float, got True"),
+        ({"wheel_radius_m": "0.1"}, "/node: ~wheel_radius_m must be float, got '0.1'"),
+        ({"wheel_radius_m": None}, "/node: ~wheel_radius_m must be float, got None"),
+        ({"name": 3}, "/node: ~name must be str, got 3"),
+        ({"wheel_radius_m": -1.0}, "/node: ~wheel_radius_m must be > 0 m, got -1.0"),
+        ({"loaded": True, "wheel_count": 1}, "a loaded cart needs 2 wheels"),
+    ],
+)
 def test_what_cannot_be_used_is_refused_in_one_line(given, text):
     with pytest.raises(ParamError) as err:
         params.load(Cart, given, "/node")
@@ -96,9 +100,14 @@ def test_a_whole_float_is_a_count():
     assert type(params.load(Train, {"count": 3.0}, "/node").count) is int
 
 
-@pytest.mark.parametrize("given, text", [({"carts": "a"}, "/node: ~carts must be a list of str, got 'a'"),
-                                         ({"carts": ["a", 1]}, "/node: ~carts must be a list of str, got ['a', 1]"),
-                                         ({"count": 3.5}, "/node: ~count must be int, got 3.5")])
+@pytest.mark.parametrize(
+    "given, text",
+    [
+        ({"carts": "a"}, "/node: ~carts must be a list of str, got 'a'"),
+        ({"carts": ["a", 1]}, "/node: ~carts must be a list of str, got ['a', 1]"),
+        ({"count": 3.5}, "/node: ~count must be int, got 3.5"),
+    ],
+)
 def test_other_lists_and_counts_are_refused(given, text):
     with pytest.raises(ParamError) as err:
         params.load(Train, given, "/node")

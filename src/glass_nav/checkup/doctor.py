@@ -20,7 +20,7 @@ from glass_nav.sensing.scan import Scan, ScanError, scan_from_fields
 from glass_nav.world.grid_map import GridMap
 
 BASE_FRAMES = ("base_link", "base_footprint")  # tried in this order
-_MOST_SCANS = 3000  # that motion is looked for in
+_MAX_SCANS = 3000  # that motion is looked for in
 # Ranges mean nothing then.
 _SPOILS = {"scan-units", "scan-angles-no-radians", "scan-limits", "scan-blind", "scan-empty"}
 
@@ -28,6 +28,7 @@ _SPOILS = {"scan-units", "scan-angles-no-radians", "scan-limits", "scan-blind", 
 @dataclass(frozen=True)
 class FrameNames:
     """Of the robot; None: found by themselves."""
+
     odom: str = "odom"
     base: Optional[str] = None
 
@@ -35,6 +36,7 @@ class FrameNames:
 @dataclass(frozen=True)
 class Report:
     """What was seen, a line each, and what is wrong with it."""
+
     seen: List[str]
     findings: List[Finding]
 
@@ -62,10 +64,13 @@ def examine(seen: Observed, grid_map: Optional[GridMap] = None, names: FrameName
         findings.append(Finding("bag-damaged", seen.damage, "`rosbag check` and `rosbag reindex` may save the rest"))
     if not seen.scans:
         holds = ", ".join(seen.topics) or "nothing"
-        findings.append(Finding(
-            "no-scans",
-            f"no topic of sensor_msgs/LaserScan; there is {holds}",
-            "record the lidar's topic; a PointCloud2 becomes one with pointcloud_to_laserscan"))
+        findings.append(
+            Finding(
+                "no-scans",
+                f"no topic of sensor_msgs/LaserScan; there is {holds}",
+                "record the lidar's topic; a PointCloud2 becomes one with pointcloud_to_laserscan",
+            )
+        )
     findings += frame_checks.check_links(seen.transforms)
     robot = _Robot(seen, names)
     lines.append(robot.describe())
@@ -100,8 +105,11 @@ class _Robot:
         self.trajectory: Optional[Trajectory] = None
         if self.base:
             moving = self._moving_child()
-            stamps = [(each.stamp_ns, each.heard_ns) for each in seen.transforms
-                      if each.child.lstrip("/") == moving and not each.static]
+            stamps = [
+                (each.stamp_ns, each.heard_ns)
+                for each in seen.transforms
+                if each.child.lstrip("/") == moving and not each.static
+            ]
             self._follow(stamps)
         else:
             self.base = next((base for base in bases if base in self.tree.frames), bases[0])
@@ -113,8 +121,10 @@ class _Robot:
             return f"frames: {', '.join(self.tree.frames) or 'none'}"
         span_s = float(self.trajectory.stamps_ns[-1] - self.trajectory.stamps_ns[0]) * 1e-9
         way_m = float(np.hypot(*np.diff(self.trajectory.poses[:, :2], axis=0).T).sum())
-        return (f"{self.link}: {(len(self.trajectory) - 1) / span_s:.3g} Hz for {span_s:.0f} s, {way_m:.1f} m; frames: "
-                f"{', '.join(self.tree.frames)}")
+        return (
+            f"{self.link}: {(len(self.trajectory) - 1) / span_s:.3g} Hz for {span_s:.0f} s, {way_m:.1f} m; frames: "
+            f"{', '.join(self.tree.frames)}"
+        )
 
     def _moving_child(self) -> str:
         """Between odom and base, the first frame that has a parent."""
@@ -138,20 +148,24 @@ class _Robot:
                 "odometry-not-in-tf",
                 f"{said}; {', '.join(seen.odometry)} has odometry",
                 "set publish_tf in the base's driver, or name the frames with --odom-frame and "
-                "--base-frame: the node needs tf; glass_nav replay takes the topic")
+                "--base-frame: the node needs tf; glass_nav replay takes the topic",
+            )
         return Finding(
             "no-odometry",
             said,
-            "start the base's driver, record /tf, or name the frames with --odom-frame and --base-frame")
+            "start the base's driver, record /tf, or name the frames with --odom-frame and --base-frame",
+        )
 
 
-def _check_lidar(topic: str, scans: Sequence[HeardScan], robot: _Robot,
-                 grid_map: Optional[GridMap]) -> Iterator[Finding]:
+def _check_lidar(
+    topic: str, scans: Sequence[HeardScan], robot: _Robot, grid_map: Optional[GridMap]
+) -> Iterator[Finding]:
     of_scans = [*scan_checks.check(topic, scans)]
     yield from of_scans
     yield from time_checks.check_scans(topic, scans)
     yield from time_checks.check_clocks(
-        np.array([scan.heard_ns - scan.stamp_ns for scan in scans if scan.stamp_ns], float) * 1e-9, robot.delays_s)
+        np.array([scan.heard_ns - scan.stamp_ns for scan in scans if scan.stamp_ns], float) * 1e-9, robot.delays_s
+    )
     if any(not scan.frame for scan in scans):
         yield Finding("scan-without-frame", f"{topic}: scans without frame_id", "set frame_id in the driver")
     if robot.trajectory is not None:
@@ -163,25 +177,33 @@ def _check_lidar(topic: str, scans: Sequence[HeardScan], robot: _Robot,
                 "lidar-not-in-tf",
                 f"no transform {robot.base} <- {lidar}, the frame of {topic}; frames: "
                 f"{', '.join(robot.tree.frames) or 'none'}",
-                "add the lidar to the URDF, run static_transform_publisher, or correct frame_id in the "
-                "driver")
+                "add the lidar to the URDF, run static_transform_publisher, or correct frame_id in the driver",
+            )
         elif not _SPOILS.intersection(finding.name for finding in of_scans):
             yield from _check_motion_and_map(lidar, own, robot, grid_map)
 
 
-def _check_motion_and_map(lidar: str, scans: Sequence[HeardScan], robot: _Robot,
-                          grid_map: Optional[GridMap]) -> Iterator[Finding]:
+def _check_motion_and_map(
+    lidar: str, scans: Sequence[HeardScan], robot: _Robot, grid_map: Optional[GridMap]
+) -> Iterator[Finding]:
     mounted = False
     placed: List[Tuple[Scan, np.ndarray]] = []
-    for heard in scans[:: max(1, -(-len(scans) // _MOST_SCANS))]:
+    for heard in scans[:: max(1, -(-len(scans) // _MAX_SCANS))]:
         try:
             transform = robot.tree.lookup(robot.base, lidar, heard.stamp_ns)
             if not mounted:
                 mounted = True
                 yield from frame_checks.check_mounting(lidar, robot.base, transform)
-            scan = scan_from_fields(heard.stamp_ns, heard.ranges_m, heard.angle_min_rad, heard.angle_increment_rad,
-                                    heard.range_min_m, heard.range_max_m, np.array(frames.planar(transform)),
-                                    frames.upwardness(transform) < 0.0)
+            scan = scan_from_fields(
+                heard.stamp_ns,
+                heard.ranges_m,
+                heard.angle_min_rad,
+                heard.angle_increment_rad,
+                heard.range_min_m,
+                heard.range_max_m,
+                np.array(frames.planar(transform)),
+                frames.upwardness(transform) < 0.0,
+            )
         except (FrameError, ScanError):
             continue
         at = robot.trajectory
@@ -208,13 +230,14 @@ def _opposite(with_map: bool, lidar: str, link: str) -> Finding:
         return Finding(
             "odometry-turns-opposite",
             f"{link} turns the other way than the scans, which fit the map as they are",
-            "the yaw of odometry has the wrong sign: swap left and right wheel, or turn the gyro's axis "
-            "round")
+            "the yaw of odometry has the wrong sign: swap left and right wheel, or turn the gyro's axis round",
+        )
     return Finding(
         "turns-opposite",
         f"{link} turns the other way than the scans",
         f"either {lidar} is mounted upside down and tf does not say so (add roll 180 deg), or odometry's "
-        "yaw has the wrong sign; with --map the doctor tells which")
+        "yaw has the wrong sign; with --map the doctor tells which",
+    )
 
 
 def _points(scan: Scan) -> np.ndarray:

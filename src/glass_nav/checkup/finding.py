@@ -8,6 +8,7 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Finding:
     """One fault."""
-    name: str    # short and for good: for scripts, and to look it up
-    what: str    # what was seen, with figures
+
+    name: str  # short and for good: for scripts, and to look it up
+    what: str  # what was seen, with figures
     advice: str  # what to do

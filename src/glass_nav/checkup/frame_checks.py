@@ -11,13 +11,13 @@ from glass_nav.checkup.finding import Finding
 from glass_nav.recording import frames
 from glass_nav.recording.observed import HeardScan, HeardTransform
 
-_UNIT_TOLERANCE = 0.01   # tf2 refuses quaternions that are longer or shorter by more
+_UNIT_TOLERANCE = 0.01  # tf2 refuses quaternions that are longer or shorter by more
 _TILT = math.cos(math.radians(3.0))  # a plane tilted further meets floor or ceiling, or shortens what it sees
 _SAME_M, _SAME_TURN = 1e-3, 1e-3
 _GAP_S, _GAP_M, _GAP_RAD = 0.5, 0.2, 0.1  # of odometry during which the robot moved
 _IN_GAPS, _LONG_GAP_S = 0.01, 10.0  # share of the scans that may fall into such gaps, if none is that long
 _JUMP_M, _JUMP_M_S = 0.5, 8.0
-_UNCOVERED = 0.02        # share of the scans that may have no odometry: before it started, after it ended
+_UNCOVERED = 0.02  # share of the scans that may have no odometry: before it started, after it ended
 
 
 def check_links(transforms: Sequence[HeardTransform]) -> Iterator[Finding]:
@@ -27,22 +27,26 @@ def check_links(transforms: Sequence[HeardTransform]) -> Iterator[Finding]:
         yield Finding(
             "frame-slash",
             f"tf names frames with a slash in front: {', '.join(slashed)}",
-            "write them without: tf2 refuses such names in a lookup")
+            "write them without: tf2 refuses such names in a lookup",
+        )
     bad = [each for each in transforms if not _is_valid(each)]
     if bad:
         yield Finding(
             "tf-invalid",
             f"{len(bad)} transforms {bad[0].parent} -> {bad[0].child} are not finite or have a quaternion "
             f"that is none, such as {_figures(bad[0].rotation_xyzw)}",
-            "normalise the quaternion where it is made; tf2 drops such transforms")
+            "normalise the quaternion where it is made; tf2 drops such transforms",
+        )
     yield from _parents(transforms)
     yield from _contradictions(transforms)
 
 
 def _is_valid(each: HeardTransform) -> bool:
     values = (*each.translation_m, *each.rotation_xyzw)
-    return (all(map(math.isfinite, values))
-            and abs(math.sqrt(sum(value * value for value in each.rotation_xyzw)) - 1.0) < _UNIT_TOLERANCE)
+    return (
+        all(map(math.isfinite, values))
+        and abs(math.sqrt(sum(value * value for value in each.rotation_xyzw)) - 1.0) < _UNIT_TOLERANCE
+    )
 
 
 def _figures(values: Sequence[float]) -> str:
@@ -58,7 +62,8 @@ def _parents(transforms: Sequence[HeardTransform]) -> Iterator[Finding]:
             yield Finding(
                 "frame-two-parents",
                 f"frame {child} hangs on {' and on '.join(sorted(names))}",
-                "a frame has one parent: find who sends the other (rosrun tf view_frames) and stop it")
+                "a frame has one parent: find who sends the other (rosrun tf view_frames) and stop it",
+            )
 
 
 def _contradictions(transforms: Sequence[HeardTransform]) -> Iterator[Finding]:
@@ -74,7 +79,8 @@ def _contradictions(transforms: Sequence[HeardTransform]) -> Iterator[Finding]:
             "tf-contradiction",
             f"{parent} -> {child} has two values at one time, {len(found)} times",
             "two nodes send this transform (rosrun tf tf_monitor lists them): stop one, such as publish_tf "
-            "of the wheels where an EKF sends it")
+            "of the wheels where an EKF sends it",
+        )
 
 
 def _same_turn(one: HeardTransform, other: HeardTransform) -> bool:
@@ -88,13 +94,14 @@ def check_mounting(lidar: str, base: str, base_from_laser: frames.Transform) -> 
     if abs(up) < _TILT:
         yield Finding(
             "lidar-tilted",
-            f"by tf {base} -> {lidar} the lidar is tilted by "
-            f"{math.degrees(math.acos(min(abs(up), 1.0))):.0f} deg",
-            "mount it level, or correct its roll and pitch in the URDF: beyond 20 deg scans are refused")
+            f"by tf {base} -> {lidar} the lidar is tilted by {math.degrees(math.acos(min(abs(up), 1.0))):.0f} deg",
+            "mount it level, or correct its roll and pitch in the URDF: beyond 20 deg scans are refused",
+        )
 
 
-def check_coverage(scans: Sequence[HeardScan], stamps_ns: np.ndarray, odom_from_base: np.ndarray,
-                   link: str) -> Iterator[Finding]:
+def check_coverage(
+    scans: Sequence[HeardScan], stamps_ns: np.ndarray, odom_from_base: np.ndarray, link: str
+) -> Iterator[Finding]:
     """Odometry at the time of the scans.
 
     Args:
@@ -114,7 +121,8 @@ def check_coverage(scans: Sequence[HeardScan], stamps_ns: np.ndarray, odom_from_
             "odometry-missing",
             f"{outside.sum()} of {len(scan_ns)} scans have no {link} at their stamps; by their middles the "
             f"scans are {abs(off_s):.1f} s {'after' if off_s > 0 else 'before'} it",
-            "record tf as long as scans; if both are there, their clocks differ (chrony, use_sim_time)")
+            "record tf as long as scans; if both are there, their clocks differ (chrony, use_sim_time)",
+        )
     apart_s = np.diff(stamps_ns) * 1e-9
     way_m = np.hypot(*np.diff(odom_from_base[:, :2], axis=0).T)
     turn = np.abs((np.diff(odom_from_base[:, 2]) + np.pi) % (2.0 * np.pi) - np.pi)
@@ -128,12 +136,13 @@ def check_coverage(scans: Sequence[HeardScan], stamps_ns: np.ndarray, odom_from_
             f"{link} is silent for up to {apart_s[gap].max():.1f} s while the robot moves; {hit.sum()} "
             "scans fall into the gaps",
             "look at the rate of the node that sends it (rosrun tf tf_monitor) and at the load of the "
-            "computer: a live node drops these scans")
+            "computer: a live node drops these scans",
+        )
     jump = (way_m > _JUMP_M) & (way_m > _JUMP_M_S * np.maximum(apart_s, 1e-3))
     if jump.any():
         yield Finding(
             "odometry-jumps",
-            f"{link} jumps by up to {way_m[jump].max():.1f} m from one message to the next, {jump.sum()} "
-            "times",
+            f"{link} jumps by up to {way_m[jump].max():.1f} m from one message to the next, {jump.sum()} times",
             "odometry must be smooth: reset it only while nothing runs, and keep GPS or a localizer out of "
-            "the odom frame")
+            "the odom frame",
+        )

@@ -7,19 +7,19 @@ from typing import Iterator, Sequence, Tuple
 import numpy as np
 
 from glass_nav.checkup.finding import Finding
-from glass_nav.localization import scan_alignment
+from glass_nav.hypotheses import scan_alignment
+from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.sensing.distance_field import DistanceField
-from glass_nav.sensing.scan_matcher import ScanMatcher
 from glass_nav.world.grid_map import GridMap
 
-SCANS = 16              # that are looked for, spread over the log
-_LEAST_SCANS, _LEAST_POINTS = 5, 20
-_MOST_POINTS, _COARSE = 150, 60
+SCANS = 16  # that are looked for, spread over the log
+_MIN_SCANS, _MIN_POINTS = 5, 20
+_MAX_POINTS, _COARSE = 150, 60
 _FOUND, _REFINED = 300, 40
-_LEAST_FIT = 0.72       # median over the scans; own maps give 0.75 to 0.99, others 0.44 to 0.71
+_MIN_FIT = 0.72  # median over the scans; own maps give 0.75 to 0.99, others 0.44 to 0.71
 _GOOD_FIT, _FAIR_FIT = 0.9, 0.85  # mirrored and scaled ones are not tried then
-_SCALED_FIT = 0.75      # of scans that fit a map but for its scale
-_BETTER = 0.06          # another hypothesis fits so much better
+_SCALED_FIT = 0.75  # of scans that fit a map but for its scale
+_BETTER = 0.06  # another hypothesis fits so much better
 _SCALES = (0.5, *1.05 ** np.arange(-6, 7), 2.0)
 _FINE = 1.05 ** np.array([-0.5, -0.25, 0.0, 0.25, 0.5])
 _MIRROR = np.array([1.0, -1.0])
@@ -30,12 +30,12 @@ class ScansOnMap:
 
     def __init__(self, grid_map: GridMap, points_m: Sequence[np.ndarray]) -> None:
         """Args:
-            grid_map: with free and occupied cells.
-            points_m: of each scan, (B, 2) finite end points in the robot's frame.
+        grid_map: with free and occupied cells.
+        points_m: of each scan, (B, 2) finite end points in the robot's frame.
         """
-        usable = [points for points in points_m if len(points) >= _LEAST_POINTS]
+        usable = [points for points in points_m if len(points) >= _MIN_POINTS]
         chosen = np.unique(np.linspace(0, len(usable) - 1, SCANS).astype(int)) if usable else []
-        self._points = [usable[index][:: max(1, -(-len(usable[index]) // _MOST_POINTS))] for index in chosen]
+        self._points = [usable[index][:: max(1, -(-len(usable[index]) // _MAX_POINTS))] for index in chosen]
         self._field = DistanceField(grid_map)
         self._matcher = ScanMatcher(grid_map, self._field)
 
@@ -67,12 +67,14 @@ def check_map(grid_map: GridMap) -> Iterator[Finding]:
         yield Finding(
             "map-empty",
             f"the map has {100 * free:.1f} % free and {100 * occupied:.1f} % occupied cells",
-            "look at negate, occupied_thresh and free_thresh in its yaml, and at the image")
+            "look at negate, occupied_thresh and free_thresh in its yaml, and at the image",
+        )
     elif occupied > 0.5 and occupied > 3.0 * free:
         yield Finding(
             "map-inverted",
             f"the map has {100 * occupied:.0f} % occupied and {100 * free:.1f} % free cells",
-            "negate in its yaml is wrong, or the image has white walls")
+            "negate in its yaml is wrong, or the image has white walls",
+        )
 
 
 def check(scans: ScansOnMap, turns_opposite: bool) -> Iterator[Finding]:
@@ -82,7 +84,7 @@ def check(scans: ScansOnMap, turns_opposite: bool) -> Iterator[Finding]:
         scans: of one lidar.
         turns_opposite: the scans turn the other way than odometry.
     """
-    if len(scans) < _LEAST_SCANS:
+    if len(scans) < _MIN_SCANS:
         return
     own = scans.fits(np.ones(2))
     fit = float(np.median(own))
@@ -101,14 +103,15 @@ def check(scans: ScansOnMap, turns_opposite: bool) -> Iterator[Finding]:
             "map-scale",
             f"the scans fit the map by {fit:.2f} of 1 as it is, and by {scaled:.2f} were the map "
             f"{scale:.2f} times as large",
-            f"the resolution in its yaml, times about {scale:.2f}, is right; or the lidar's ranges are "
-            "scaled")
-    elif fit < _LEAST_FIT:
+            f"the resolution in its yaml, times about {scale:.2f}, is right; or the lidar's ranges are scaled",
+        )
+    elif fit < _MIN_FIT:
         yield Finding(
             "map-mismatch",
             f"the scans fit the map nowhere: by {fit:.2f} of 1 at their best places",
             "is it the map of this building and floor, and is it of this height above the floor? Look at "
-            "scans and map in rviz; map anew if much was rebuilt")
+            "scans and map in rviz; map anew if much was rebuilt",
+        )
 
 
 def _best_factor(scans: ScansOnMap) -> Tuple[float, float]:
@@ -129,8 +132,10 @@ def _mirrored(turns_opposite: bool, fit: float, mirrored: float) -> Finding:
             "lidar-mirrored",
             f"the scans fit the map {figures}, and turn the other way than odometry",
             "the lidar is mounted upside down: add roll 180 deg to its frame in the URDF or "
-            "static_transform_publisher, or set the driver's option for it (inverted, reversed)")
+            "static_transform_publisher, or set the driver's option for it (inverted, reversed)",
+        )
     return Finding(
         "map-mirrored",
         f"the scans fit the map {figures}, while their turns agree with odometry",
-        "the image of the map is mirrored: flip it, and correct the origin in its yaml")
+        "the image of the map is mirrored: flip it, and correct the origin in its yaml",
+    )

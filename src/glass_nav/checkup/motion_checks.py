@@ -8,24 +8,25 @@ from typing import Iterator, List, Sequence, Tuple
 import numpy as np
 
 from glass_nav.checkup.finding import Finding
-from glass_nav.checkup.scan_motion import LEAST_POINTS, EarlierScan
+from glass_nav.checkup.scan_motion import MIN_POINTS, EarlierScan
 from glass_nav.geometry import angles, se2
 
-PAIRS = 24               # with a turn, and as many straight ahead
-_AHEAD = 60              # scans that are looked through for the later one of a pair
-_WAY_M, _TURN_RAD = 0.3, 0.2     # of a pair
-_MOST_M, _MOST_RAD = 1.0, 0.6
+PAIRS = 24  # with a turn, and as many straight ahead
+_AHEAD = 60  # scans that are looked through for the later one of a pair
+_WAY_M, _TURN_RAD = 0.3, 0.2  # of a pair
+_MAX_M, _MAX_RAD = 1.0, 0.6
 _REACH_M, _REACH_RAD = 1.5, 0.9
 _STILL_M, _STILL_RAD = 0.02, 0.02
-_LEAST_PAIRS = 6
+_MIN_PAIRS = 6
 _SCALE, _TURN_SCALE = 0.1, 0.2  # that an odometry may be off by
-_SPREAD = 0.4            # interquartile range over the median: more, and nothing is known
+_SPREAD = 0.4  # interquartile range over the median: more, and nothing is known
 _ASKEW_RAD, _ASKEW_SPREAD = np.radians(8.0), np.radians(12.0)
 
 
 @dataclass(frozen=True)
 class Moves:
     """How the lidar moved between the scans of each pair, (N, 3) each in the earlier one's frame."""
+
     by_odometry: np.ndarray
     by_scans: np.ndarray
     idle: bool  # odometry did not move at all; the pairs are far apart in time
@@ -38,12 +39,14 @@ def measure(points_m: Sequence[np.ndarray], odom_from_laser: np.ndarray) -> Move
         points_m: of each scan, (B, 2) finite end points in the lidar's frame.
         odom_from_laser: (S, 3) at each scan.
     """
-    idle = bool(np.ptp(odom_from_laser[:, :2], axis=0).max() < _WAY_M
-                and np.abs(angles.wrap(odom_from_laser[:, 2] - odom_from_laser[0, 2])).max() < _TURN_RAD)
+    idle = bool(
+        np.ptp(odom_from_laser[:, :2], axis=0).max() < _WAY_M
+        and np.abs(angles.wrap(odom_from_laser[:, 2] - odom_from_laser[0, 2])).max() < _TURN_RAD
+    )
     pairs = _far_apart(len(points_m)) if idle else _pairs(odom_from_laser)
     rows: List[Tuple[np.ndarray, np.ndarray]] = []
     for first, later in pairs:
-        if min(len(points_m[first]), len(points_m[later])) < LEAST_POINTS:
+        if min(len(points_m[first]), len(points_m[later])) < MIN_POINTS:
             continue
         motion = EarlierScan(points_m[first]).motion_to(points_m[later], _REACH_M, _REACH_RAD)
         if motion is not None:
@@ -63,7 +66,7 @@ def _pairs(odom_from_laser: np.ndarray) -> List[Tuple[int, int]]:
     turning: List[Tuple[int, int]] = []
     straight: List[Tuple[int, int]] = []
     for first in range(0, len(odom_from_laser) - 1, max(1, len(odom_from_laser) // 1500)):
-        ahead = odom_from_laser[first + 1:first + 1 + _AHEAD]
+        ahead = odom_from_laser[first + 1 : first + 1 + _AHEAD]
         move = se2.compose(se2.inverse(odom_from_laser[first]), ahead)
         way_m, turn = np.hypot(move[:, 0], move[:, 1]), np.abs(move[:, 2])
         enough = np.nonzero((way_m >= _WAY_M) | (turn >= _TURN_RAD))[0]
@@ -72,15 +75,20 @@ def _pairs(odom_from_laser: np.ndarray) -> List[Tuple[int, int]]:
         at = int(enough[0])
         chosen = turning if turn[at] >= _TURN_RAD else straight
         overlaps = bool(chosen) and first < (chosen[-1][0] + chosen[-1][1]) // 2  # tells the same once more
-        if way_m[at] <= _MOST_M and turn[at] <= _MOST_RAD and not overlaps:
+        if way_m[at] <= _MAX_M and turn[at] <= _MAX_RAD and not overlaps:
             chosen.append((first, first + 1 + at))
-    return [pairs[index] for pairs in (turning, straight) if pairs
-            for index in np.unique(np.linspace(0, len(pairs) - 1, PAIRS).astype(int))]
+    return [
+        pairs[index]
+        for pairs in (turning, straight)
+        if pairs
+        for index in np.unique(np.linspace(0, len(pairs) - 1, PAIRS).astype(int))
+    ]
 
 
 @dataclass(frozen=True)
 class Ratio:
     """Quotients of what scans and odometry say, by their quartiles."""
+
     count: int
     low: float
     middle: float
@@ -89,7 +97,7 @@ class Ratio:
     @property
     def is_known(self) -> bool:
         """There are enough of them, and they agree."""
-        return self.count >= _LEAST_PAIRS and self.high - self.low < _SPREAD * abs(self.middle)
+        return self.count >= _MIN_PAIRS and self.high - self.low < _SPREAD * abs(self.middle)
 
 
 def way_ratio(moves: Moves) -> Ratio:
@@ -133,11 +141,12 @@ def check(moves: Moves, lidar: str, link: str, opposite: bool) -> Iterator[Findi
     """
     if moves.idle:
         moved = (np.hypot(moves.by_scans[:, 0], moves.by_scans[:, 1]) > 0.15) | (np.abs(moves.by_scans[:, 2]) > 0.1)
-        if moved.sum() >= _LEAST_PAIRS and moved.mean() > 0.3:
+        if moved.sum() >= _MIN_PAIRS and moved.mean() > 0.3:
             yield Finding(
                 "odometry-stands",
                 f"{link} does not move, but the scans do",
-                "the wheels' encoders or their node are dead: rostopic echo the odometry while driving")
+                "the wheels' encoders or their node are dead: rostopic echo the odometry while driving",
+            )
         return
     ways, turns = way_ratio(moves), turn_ratio(moves)
     if ways.is_known and not 1.0 - _SCALE < ways.middle < 1.0 / (1.0 - _SCALE):
@@ -145,21 +154,23 @@ def check(moves: Moves, lidar: str, link: str, opposite: bool) -> Iterator[Findi
             "odometry-scale",
             f"for each metre of {link} the scans move {ways.middle:.2f} m ({ways.count} pairs of scans)",
             f"multiply the wheels' radius in the base's driver by {ways.middle:.2f}, or look for a wrong "
-            "gear ratio or ticks per turn")
+            "gear ratio or ticks per turn",
+        )
     if turns.is_known and not opposite and not 1.0 - _TURN_SCALE < turns.middle < 1.0 / (1.0 - _TURN_SCALE):
         yield Finding(
             "odometry-turn-scale",
             f"for each degree that {link} turns the scans turn {turns.middle:.2f} degrees ({turns.count} "
             "pairs of scans)",
             f"divide the distance between the wheels in the base's driver by {turns.middle:.2f}; for a "
-            "gyro, look at its scale")
+            "gyro, look at its scale",
+        )
     if not opposite:
         yield from _askew(moves, lidar)
 
 
 def _askew(moves: Moves, lidar: str) -> Iterator[Finding]:
     by_odometry, by_scans = _straight(moves)
-    if len(by_odometry) < _LEAST_PAIRS:
+    if len(by_odometry) < _MIN_PAIRS:
         return
     off = angles.wrap(np.arctan2(by_odometry[:, 1], by_odometry[:, 0]) - np.arctan2(by_scans[:, 1], by_scans[:, 0]))
     middle = angles.mean(off)
@@ -171,4 +182,5 @@ def _askew(moves: Moves, lidar: str) -> Iterator[Finding]:
             f"the scans move {np.degrees(abs(centre)):.0f} deg to the {'right' if centre > 0.0 else 'left'} "
             f"of where the robot drives ({len(off)} pairs of scans)",
             f"add {np.degrees(centre):+.0f} deg to the yaw of {lidar} in the URDF or "
-            "static_transform_publisher: the lidar is mounted turned")
+            "static_transform_publisher: the lidar is mounted turned",
+        )

@@ -10,8 +10,13 @@ from glass_nav.cli import atlas_build, atlas_check, atlas_explain, atlas_show, a
 HELP = "build, check and try out an atlas"
 DESCRIPTION = "The hierarchical atlas of a floor, and what a robot that wakes up can make of it. Needs no roscore."
 
-MODULES: Dict[str, Any] = {"build": atlas_build, "show": atlas_show, "check": atlas_check, "explain": atlas_explain,
-                           "wake-up": atlas_wake_up}
+MODULES: Dict[str, Any] = {
+    "build": atlas_build,
+    "show": atlas_show,
+    "check": atlas_check,
+    "explain": atlas_explain,
+    "wake-up": atlas_wake_up,
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

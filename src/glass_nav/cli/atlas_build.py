@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Callable, Iterator, Optional
 
 from glass_nav.cli.progress import Progress
-from glass_nav.topology import atlas_builder, atlas_file
-from glass_nav.topology.atlas import KINDS, Atlas
-from glass_nav.topology.atlas_builder import BuildParams
-from glass_nav.topology.edge_views import ViewParams
-from glass_nav.topology.voronoi_graph import VoronoiGraph, VoronoiParams
+from glass_nav.topology.atlas import atlas_builder, atlas_file
+from glass_nav.topology.atlas.atlas import KINDS, Atlas
+from glass_nav.topology.atlas.atlas_builder import BuildParams
+from glass_nav.topology.atlas.edge_views import ViewParams
+from glass_nav.topology.atlas.voronoi_graph import VoronoiGraph, VoronoiParams
 from glass_nav.world import map_file
 
 HELP = "make the atlas of a map"
@@ -28,30 +28,43 @@ _GRAPH, _VIEW = VoronoiParams(), ViewParams()
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the subcommand."""
     parser.add_argument("map", metavar="MAP", type=Path, help="map_server .yaml, or MRPT .gridmap[.gz]")
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR",
-                        help="folder for atlas.json, such as atlas/NAME; for an atlas of "
-                             f"{NPZ_FROM_NODES} nodes or more, atlas.npz")
+    parser.add_argument(
+        "--out",
+        required=True,
+        type=Path,
+        metavar="DIR",
+        help=f"folder for atlas.json, such as atlas/NAME; for an atlas of {NPZ_FROM_NODES} nodes or more, atlas.npz",
+    )
     parser.add_argument("--name", help="of the atlas; default: that of the folder")
     parser.add_argument("--force", action="store_true", help="replace an atlas in which robots have left statistics")
-    _numbers(parser.add_argument_group("robot"), [
-        ("--robot-radius", "robot_radius_m", "narrower passages are closed to it, m"),
-        ("--passage-margin", "passage_margin_m", "room that it needs besides on each side of a passage, m"),
-        ("--view-range", "view_range_m", "of the lidar for the segment maps, m"),
-        ("--field-of-view", "field_of_view_deg", "of the lidar around straight ahead, degrees")])
-    _numbers(parser.add_argument_group("graph"), [
-        ("--smallest-obstacle", "smallest_obstacle_m", "smaller things that stand free make no meetpoints, m"),
-        ("--leaf", "leaf_m", "a dead end has to reach so much further than the walls do, m"),
-        ("--leaf-share", "leaf_share_of_r", "and by this share of the room at its junction"),
-        ("--merge", "merge_m", "meetpoints closer than this are one, m"),
-        ("--equidistance", "equidistance_m", "differences of distances that the robot takes for none, m"),
-        ("--smallest-component", "smallest_component_m", "parts of the floor with less way are left out, m")])
+    _numbers(
+        parser.add_argument_group("robot"),
+        [
+            ("--robot-radius", "robot_radius_m", "narrower passages are closed to it, m"),
+            ("--passage-margin", "passage_margin_m", "room that it needs besides on each side of a passage, m"),
+            ("--view-range", "view_range_m", "of the lidar for the segment maps, m"),
+            ("--field-of-view", "field_of_view_deg", "of the lidar around straight ahead, degrees"),
+        ],
+    )
+    _numbers(
+        parser.add_argument_group("graph"),
+        [
+            ("--smallest-obstacle", "smallest_obstacle_m", "smaller things that stand free make no meetpoints, m"),
+            ("--leaf", "leaf_m", "a dead end has to reach so much further than the walls do, m"),
+            ("--leaf-share", "leaf_share_of_r", "and by this share of the room at its junction"),
+            ("--merge", "merge_m", "meetpoints closer than this are one, m"),
+            ("--equidistance", "equidistance_m", "differences of distances that the robot takes for none, m"),
+            ("--smallest-component", "smallest_component_m", "parts of the floor with less way are left out, m"),
+        ],
+    )
 
 
 def _numbers(group: "argparse._ArgumentGroup", options: "list[tuple[str, str, str]]") -> None:
     for option, field, what in options:
         default = getattr(_GRAPH, field) if hasattr(_GRAPH, field) else getattr(_VIEW, field)
-        group.add_argument(option, dest=field, type=float, default=default, metavar="N",
-                           help=f"{what} (default {default:g})")
+        group.add_argument(
+            option, dest=field, type=float, default=default, metavar="N", help=f"{what} (default {default:g})"
+        )
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
@@ -76,7 +89,7 @@ def main(arguments: argparse.Namespace) -> None:
         for path in old:
             _refuse_to_lose_visits(path)
     name = arguments.name or arguments.out.resolve().name
-    atlas, graph = atlas_builder.build(grid_map, name, map_name(arguments.map), _params(arguments), _watch)
+    atlas, graph = atlas_builder.build(grid_map, name, map_file.name_of(arguments.map), _params(arguments), _watch)
     arguments.out.mkdir(parents=True, exist_ok=True)
     chosen = old[len(atlas.nodes) >= NPZ_FROM_NODES]
     atlas_file.save(atlas, chosen)
@@ -84,12 +97,6 @@ def main(arguments: argparse.Namespace) -> None:
         if path != chosen and path.exists():  # the folder holds one atlas
             path.unlink()
     print(f"{_line(atlas, graph)}; written to {chosen} ({chosen.stat().st_size / 1e3:.0f} kB)")
-
-
-def map_name(path: Path) -> str:
-    """What an atlas calls its map: the file's stem, or its folder's name where all maps are called map.yaml."""
-    stem = path.name.partition(".")[0]
-    return path.resolve().parent.name if stem == "map" else stem
 
 
 def _refuse_to_lose_visits(path: Path) -> None:
@@ -102,8 +109,10 @@ def _refuse_to_lose_visits(path: Path) -> None:
 
 def _params(arguments: argparse.Namespace) -> BuildParams:
     values = vars(arguments)
-    return BuildParams(VoronoiParams(**{field: values[field] for field in vars(_GRAPH)}),
-                       ViewParams(**{field: values[field] for field in vars(_VIEW) if field in values}))
+    return BuildParams(
+        VoronoiParams(**{field: values[field] for field in vars(_GRAPH)}),
+        ViewParams(**{field: values[field] for field in vars(_VIEW) if field in values}),
+    )
 
 
 @contextmanager
@@ -116,11 +125,15 @@ def _watch(what: str, steps: int) -> Iterator[Callable[[], None]]:
 
 
 def _line(atlas: Atlas, graph: VoronoiGraph) -> str:
-    kinds = ", ".join(f"{count} {name.replace('_', ' ')}{'s' if count != 1 else ''}"
-                      for name, count in ((name, int((atlas.nodes.kind == kind).sum()))
-                                          for kind, name in enumerate(KINDS)) if count)
+    kinds = ", ".join(
+        f"{count} {name.replace('_', ' ')}{'s' if count != 1 else ''}"
+        for name, count in ((name, int((atlas.nodes.kind == kind).sum())) for kind, name in enumerate(KINDS))
+        if count
+    )
     parts, _ = atlas.components()
     left_out = f" ({graph.left_out} too small)" if graph.left_out else ""
-    return (f"{len(atlas.nodes)} nodes ({kinds}), {len(atlas.edges)} edges, {atlas.edges.length_m.sum():.0f} m of "
-            f"ways in {parts} part{'s' if parts != 1 else ''} of the floor{left_out}, "
-            f"{len(atlas.darts.segments_m.values)} segments")
+    return (
+        f"{len(atlas.nodes)} nodes ({kinds}), {len(atlas.edges)} edges, {atlas.edges.length_m.sum():.0f} m of "
+        f"ways in {parts} part{'s' if parts != 1 else ''} of the floor{left_out}, "
+        f"{len(atlas.darts.segments_m.values)} segments"
+    )

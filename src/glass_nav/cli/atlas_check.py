@@ -10,27 +10,34 @@ import numpy as np
 
 from glass_nav.cli import search_params
 from glass_nav.cli.progress import Progress
-from glass_nav.topology import atlas_file, distinguishability, shipped_atlases
-from glass_nav.topology.atlas import KINDS, Atlas, AtlasError
-from glass_nav.topology.distinguishability import Distinguishability
+from glass_nav.topology.atlas import atlas_file, shipped_atlases
+from glass_nav.topology.atlas.atlas import KINDS, Atlas, AtlasError
+from glass_nav.topology.search import distinguishability
+from glass_nav.topology.search.distinguishability import Distinguishability
 from glass_nav.world import map_file
 
 HELP = "validate an atlas, and say what cannot be told apart"
 DESCRIPTION = """Checks every rule of an atlas, then sends a robot without errors through the search from everywhere:
 which places are indistinguishable from which, and how many edges a robot needs at most and on average."""
 
-MOST_STARTS = 2000
-MOST_LISTED = 20
+MAX_STARTS = 2000
+MAX_LISTED = 20
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the subcommand."""
-    parser.add_argument("atlas", metavar="ATLAS",
-                        help="atlas.json, atlas.npz, the folder of one, or the name of a shipped one")
+    parser.add_argument(
+        "atlas", metavar="ATLAS", help="atlas.json, atlas.npz, the folder of one, or the name of a shipped one"
+    )
     parser.add_argument("--map", type=Path, help="the atlas must be one of this map")
     parser.add_argument("--params", type=Path, metavar="FILE", help="yaml of parameters, names as for topology_node")
-    parser.add_argument("--starts", type=int, default=MOST_STARTS, metavar="N",
-                        help=f"from so many places at most, spread over the atlas (default {MOST_STARTS})")
+    parser.add_argument(
+        "--starts",
+        type=int,
+        default=MAX_STARTS,
+        metavar="N",
+        help=f"from so many places at most, spread over the atlas (default {MAX_STARTS})",
+    )
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
@@ -69,39 +76,53 @@ def main(arguments: argparse.Namespace) -> None:
 def summary(atlas: Atlas) -> List[str]:
     """What an atlas consists of."""
     counts = np.bincount(atlas.nodes.kind, minlength=len(KINDS)).tolist()
-    kinds = ", ".join(f"{count} {KINDS[kind].replace('_', ' ')}{'s' * (count != 1)}"
-                      for kind, count in enumerate(counts) if count)
+    kinds = ", ".join(
+        f"{count} {KINDS[kind].replace('_', ' ')}{'s' * (count != 1)}" for kind, count in enumerate(counts) if count
+    )
     components = atlas.components()[0]
-    return [f"map: {atlas.source.name or 'not known'}",
-            f"{len(atlas.nodes)} nodes ({kinds}), {len(atlas.edges)} edges of {atlas.edges.length_m.sum():.0f} m, "
-            f"{components} component{'s' * (components != 1)}",
-            f"visits by robots: {atlas.visits.node_count.sum()} of nodes, {atlas.visits.edge_count.sum()} of edges"]
+    return [
+        f"map: {atlas.source.name or 'not known'}",
+        f"{len(atlas.nodes)} nodes ({kinds}), {len(atlas.edges)} edges of {atlas.edges.length_m.sum():.0f} m, "
+        f"{components} component{'s' * (components != 1)}",
+        f"visits by robots: {atlas.visits.node_count.sum()} of nodes, {atlas.visits.edge_count.sum()} of edges",
+    ]
 
 
 def verdict(atlas: Atlas, found: Distinguishability) -> List[str]:
     """What can be told apart, and by how many edges."""
     tried = len(found.starts)
     of = "everywhere" if tried == len(atlas.darts) else f"{tried} of {len(atlas.darts)} places"
-    lines = [f"a robot that wakes up ({of}) knows its place after at most {found.edges[found.confirmed].max()} edges, "
-             f"{found.edges[found.confirmed].mean():.1f} on average, those that confirm it included"
-             ] if found.confirmed.any() else [f"no robot that wakes up ({of}) can find out where it is"]
+    lines = (
+        [
+            f"a robot that wakes up ({of}) knows its place after at most {found.edges[found.confirmed].max()} edges, "
+            f"{found.edges[found.confirmed].mean():.1f} on average, those that confirm it included"
+        ]
+        if found.confirmed.any()
+        else [f"no robot that wakes up ({of}) can find out where it is"]
+    )
     if not found.alike:
         lines.append("no two places are indistinguishable")
     else:
-        lines.append(f"{len(found.alike)} sets of places are indistinguishable; a robot knows so after at most "
-                     f"{found.edges[~found.confirmed].max()} edges:")
-        lines += [f"  {_places(atlas, alike)}" for alike in found.alike[:MOST_LISTED]]
-        if len(found.alike) > MOST_LISTED:
-            lines.append(f"  ... and {len(found.alike) - MOST_LISTED} more")
+        lines.append(
+            f"{len(found.alike)} sets of places are indistinguishable; a robot knows so after at most "
+            f"{found.edges[~found.confirmed].max()} edges:"
+        )
+        lines += [f"  {_places(atlas, alike)}" for alike in found.alike[:MAX_LISTED]]
+        if len(found.alike) > MAX_LISTED:
+            lines.append(f"  ... and {len(found.alike) - MAX_LISTED} more")
     if len(found.unresolved):
-        lines.append(f"from {len(found.unresolved)} places the search did not end, the first is node "
-                     f"{atlas.darts.node[found.unresolved[0]]}")
+        lines.append(
+            f"from {len(found.unresolved)} places the search did not end, the first is node "
+            f"{atlas.darts.node[found.unresolved[0]]}"
+        )
     return lines
 
 
 def _places(atlas: Atlas, alike: FrozenSet[int]) -> str:
     """Nodes with the directions of the darts in question."""
     darts = np.array(sorted(alike))
-    shown = [f"node {atlas.darts.node[dart]} looking {np.degrees(atlas.darts.bearing_rad[dart]):.0f} deg"
-             for dart in darts[:MOST_LISTED]]
-    return ", ".join(shown) + (f" and {len(darts) - MOST_LISTED} more" if len(darts) > MOST_LISTED else "")
+    shown = [
+        f"node {atlas.darts.node[dart]} looking {np.degrees(atlas.darts.bearing_rad[dart]):.0f} deg"
+        for dart in darts[:MAX_LISTED]
+    ]
+    return ", ".join(shown) + (f" and {len(darts) - MAX_LISTED} more" if len(darts) > MAX_LISTED else "")

@@ -10,10 +10,11 @@ from typing import Optional
 import numpy as np
 
 from glass_nav.cli import search_params
-from glass_nav.topology import atlas_file, explanation, shipped_atlases
-from glass_nav.topology.atlas import AtlasError
-from glass_nav.topology.atlas_localizer import AtlasLocalizer, SearchParams
-from glass_nav.topology.wake_up import AtlasRobot, Surroundings, TrialParams
+from glass_nav.topology.atlas import atlas_file, shipped_atlases
+from glass_nav.topology.atlas.atlas import AtlasError
+from glass_nav.topology.search import forest_explanation
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer, SearchParams
+from glass_nav.topology.search.wake_up_trials import AtlasRobot, Surroundings, TrialParams
 
 HELP = "print a search forest row by row"
 DESCRIPTION = """Wakes up a robot without errors and prints its search forest: in each row every edge of every
@@ -26,15 +27,26 @@ DEEPEST = 50
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the subcommand."""
-    parser.add_argument("atlas", metavar="ATLAS", nargs="?", default=EXAMPLE,
-                        help="atlas.json, atlas.npz, the folder of one, or the name of a shipped one "
-                             f"(default {EXAMPLE})")
-    parser.add_argument("--dart", type=int, default=0, metavar="N",
-                        help="by which the robot leaves first: 2e where edge e begins, 2e + 1 where it ends "
-                             "(default 0)")
-    parser.add_argument("--best", action="store_true",
-                        help="search as topology_node does, not as the document: best-splitting turns, edges that "
-                             "confirm, proof of ambiguity")
+    parser.add_argument(
+        "atlas",
+        metavar="ATLAS",
+        nargs="?",
+        default=EXAMPLE,
+        help=f"atlas.json, atlas.npz, the folder of one, or the name of a shipped one (default {EXAMPLE})",
+    )
+    parser.add_argument(
+        "--dart",
+        type=int,
+        default=0,
+        metavar="N",
+        help="by which the robot leaves first: 2e where edge e begins, 2e + 1 where it ends (default 0)",
+    )
+    parser.add_argument(
+        "--best",
+        action="store_true",
+        help="search as topology_node does, not as the document: best-splitting turns, edges that "
+        "confirm, proof of ambiguity",
+    )
     parser.add_argument("--params", type=Path, metavar="FILE", help="yaml of parameters, names as for topology_node")
 
 
@@ -74,6 +86,6 @@ def _exact(params: SearchParams) -> TrialParams:
 
 def _print_row(localizer: AtlasLocalizer) -> None:
     assert localizer.estimate is not None
-    for line in explanation.row(localizer, localizer.estimate):
+    for line in forest_explanation.row(localizer, localizer.estimate):
         print(line)
     print()

@@ -8,12 +8,12 @@ from typing import Optional
 
 import numpy as np
 
-from glass_nav.evaluation import atlas_picture
-from glass_nav.evaluation.atlas_picture import AtlasDrawing
-from glass_nav.evaluation.pictures import MapImage
+from glass_nav.evaluation.plots import atlas_picture
+from glass_nav.evaluation.plots.atlas_picture import AtlasDrawing
+from glass_nav.evaluation.plots.run_pictures import MapImage
 from glass_nav.simulation import shipped_buildings
-from glass_nav.topology import atlas_file, shipped_atlases
-from glass_nav.topology.atlas import Atlas, AtlasError
+from glass_nav.topology.atlas import atlas_file, shipped_atlases
+from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.world import map_file
 from glass_nav.world.grid_map import GridMap
 
@@ -24,11 +24,18 @@ each edge, there and back; or one edge alone."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the subcommand."""
-    parser.add_argument("atlas", metavar="ATLAS",
-                        help="atlas.json, atlas.npz, the folder of one, or the name of an atlas of the package: "
-                             f"{', '.join(shipped_atlases.shipped())}")
-    parser.add_argument("--map", type=Path, help="map_server .yaml, or MRPT .gridmap[.gz]; default: the map of the "
-                                                 "package that the atlas was made from, else none")
+    parser.add_argument(
+        "atlas",
+        metavar="ATLAS",
+        help="atlas.json, atlas.npz, the folder of one, or the name of an atlas of the package: "
+        f"{', '.join(shipped_atlases.shipped())}",
+    )
+    parser.add_argument(
+        "--map",
+        type=Path,
+        help="map_server .yaml, or MRPT .gridmap[.gz]; default: the map of the "
+        "package that the atlas was made from, else none",
+    )
     parser.add_argument("--edge", type=int, metavar="N", help="draw this one only")
     parser.add_argument("--out", type=Path, metavar="PNG", help="default: here, NAME.png or NAME_edge_N.png")
 
@@ -80,7 +87,12 @@ def _drawing(atlas: Atlas) -> AtlasDrawing:
     lines = []
     for edge in edges:
         line = atlas.edges.polyline_m[edge]
-        lines.append(line if len(line) > 1 else atlas.nodes.position_m[atlas.darts.node[2 * edge:2 * edge + 2]])
-    return AtlasDrawing(atlas.nodes.position_m, atlas.nodes.r_m, np.asarray(atlas.degree), lines,
-                        [atlas.darts.segments_m[2 * edge] for edge in edges],
-                        [atlas.darts.segments_m[2 * edge + 1] for edge in edges])
+        lines.append(line if len(line) > 1 else atlas.nodes.position_m[atlas.darts.node[2 * edge : 2 * edge + 2]])
+    return AtlasDrawing(
+        atlas.nodes.position_m,
+        atlas.nodes.r_m,
+        np.asarray(atlas.degree),
+        lines,
+        [atlas.darts.segments_m[2 * edge] for edge in edges],
+        [atlas.darts.segments_m[2 * edge + 1] for edge in edges],
+    )

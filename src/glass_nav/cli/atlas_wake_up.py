@@ -9,9 +9,10 @@ from typing import Dict, Optional
 from glass_nav import params
 from glass_nav.cli import search_params
 from glass_nav.cli.progress import Progress
-from glass_nav.evaluation import replay_result
-from glass_nav.topology import atlas_file, shipped_atlases, wake_up
-from glass_nav.topology.wake_up import TrialParams
+from glass_nav.evaluation.metrics import replay_result
+from glass_nav.topology.atlas import atlas_file, shipped_atlases
+from glass_nav.topology.search import wake_up_trials
+from glass_nav.topology.search.wake_up_trials import TrialParams
 
 HELP = "try out how robots that wake up in an atlas fare"
 DESCRIPTION = """Simulated robots wake up anywhere in an atlas, report what they measure (with errors as large as
@@ -22,21 +23,36 @@ edges they drove; the CPU time of the slowest step."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the subcommand."""
-    parser.add_argument("atlas", metavar="ATLAS",
-                        help="atlas.json, atlas.npz, the folder of one, or the name of a shipped one")
+    parser.add_argument(
+        "atlas", metavar="ATLAS", help="atlas.json, atlas.npz, the folder of one, or the name of a shipped one"
+    )
     parser.add_argument("--trials", type=int, default=1000, metavar="N", help="robots (default 1000)")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the random numbers (default 0)")
     parser.add_argument("--missed", type=float, default=0.0, metavar="P", help="chance to drive past a meetpoint")
-    parser.add_argument("--spurious", type=float, default=0.0, metavar="P",
-                        help="chance of an edge to show a meetpoint where there is none")
-    parser.add_argument("--noise", type=float, default=1.0, metavar="X",
-                        help="errors are so many times as large as the tolerances say (default 1)")
-    parser.add_argument("--elsewhere", action="store_true",
-                        help="the robots are not in the atlas, but where its parts are put together otherwise")
+    parser.add_argument(
+        "--spurious",
+        type=float,
+        default=0.0,
+        metavar="P",
+        help="chance of an edge to show a meetpoint where there is none",
+    )
+    parser.add_argument(
+        "--noise",
+        type=float,
+        default=1.0,
+        metavar="X",
+        help="errors are so many times as large as the tolerances say (default 1)",
+    )
+    parser.add_argument(
+        "--elsewhere",
+        action="store_true",
+        help="the robots are not in the atlas, but where its parts are put together otherwise",
+    )
     parser.add_argument("--max-edges", type=int, default=100, metavar="N", help="then a robot gives up (default 100)")
     parser.add_argument("--params", type=Path, metavar="FILE", help="yaml of parameters, names as for topology_node")
-    parser.add_argument("--out", type=Path, default=Path("metrics.json"), metavar="FILE",
-                        help="default: metrics.json here")
+    parser.add_argument(
+        "--out", type=Path, default=Path("metrics.json"), metavar="FILE", help="default: metrics.json here"
+    )
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
@@ -61,27 +77,47 @@ def main(arguments: argparse.Namespace) -> None:
     search = search_params.load(arguments.params)
     path = shipped_atlases.find(arguments.atlas)
     atlas = atlas_file.load(path)
-    robots = TrialParams(noise=search.tolerances, noise_gain=arguments.noise, missed=arguments.missed,
-                         spurious=arguments.spurious, max_edges=arguments.max_edges)
+    robots = TrialParams(
+        noise=search.tolerances,
+        noise_gain=arguments.noise,
+        missed=arguments.missed,
+        spurious=arguments.spurious,
+        max_edges=arguments.max_edges,
+    )
     progress = Progress("wake-up", arguments.trials, unit="robots")
     done = []
     try:
-        for trial in wake_up.trials(atlas, search, robots, arguments.trials, arguments.seed, arguments.elsewhere):
+        for trial in wake_up_trials.trials(
+            atlas, search, robots, arguments.trials, arguments.seed, arguments.elsewhere
+        ):
             done.append(trial)
             progress.step()
     finally:
         progress.finish()
-    figures = wake_up.metrics(done)
-    replay_result.write_json(arguments.out, {
-        **figures, "atlas": str(path), "seed": arguments.seed, "elsewhere": arguments.elsewhere,
-        "missed": arguments.missed, "spurious": arguments.spurious, "noise": arguments.noise,
-        "params": params.as_mapping(search)})
+    figures = wake_up_trials.metrics(done)
+    replay_result.write_json(
+        arguments.out,
+        {
+            **figures,
+            "atlas": str(path),
+            "seed": arguments.seed,
+            "elsewhere": arguments.elsewhere,
+            "missed": arguments.missed,
+            "spurious": arguments.spurious,
+            "noise": arguments.noise,
+            "params": params.as_mapping(search),
+        },
+    )
     print(_table(figures))
     print(f"written to {arguments.out}")
 
 
 def _table(figures: Dict[str, float]) -> str:
-    shares = ", ".join(f"{name} {100.0 * figures[f'{name}_share']:.2f} %"
-                       for name in ("confirmed", "wrong", "ambiguous", "lost", "undecided"))
-    return (f"{figures['trials']:.0f} robots: {shares}\n{figures['edges_mean']:.1f} edges on average, 95 % within "
-            f"{figures['edges_p95']:.0f}; slowest step {figures['step_ms_max']:.1f} ms CPU")
+    shares = ", ".join(
+        f"{name} {100.0 * figures[f'{name}_share']:.2f} %"
+        for name in ("confirmed", "wrong", "ambiguous", "lost", "undecided")
+    )
+    return (
+        f"{figures['trials']:.0f} robots: {shares}\n{figures['edges_mean']:.1f} edges on average, 95 % within "
+        f"{figures['edges_p95']:.0f}; slowest step {figures['step_ms_max']:.1f} ms CPU"
+    )

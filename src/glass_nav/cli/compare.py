@@ -7,13 +7,16 @@ import sys
 from pathlib import Path
 from typing import Dict, List, Optional, Tuple
 
-from glass_nav.cli import compare_runs, engine, replay
-from glass_nav.cli.compare_runs import Contestant, Job, Log
-from glass_nav.cli.engine import Failed
+from glass_nav.cli import replay
 from glass_nav.cli.progress import Progress
-from glass_nav.evaluation import comparison, comparison_page, comparison_pictures, pictures, thresholds
-from glass_nav.evaluation.comparison import Comparison, Run
-from glass_nav.evaluation.thresholds import Threshold
+from glass_nav.compare import compare_runs, engine
+from glass_nav.compare.compare_runs import Contestant, Job, Log
+from glass_nav.compare.engine import Failed
+from glass_nav.evaluation.metrics import comparison, thresholds
+from glass_nav.evaluation.metrics.comparison import Comparison, Run
+from glass_nav.evaluation.metrics.thresholds import Threshold
+from glass_nav.evaluation.pages import comparison_page
+from glass_nav.evaluation.plots import comparison_pictures, run_pictures
 from glass_nav.world import map_file
 
 HELP = "runs, parameters or recorded poses side by side, with confidence over seeds"
@@ -27,24 +30,50 @@ for. A mean has its 95 % interval: Student's t over the seeds of each log, the l
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the subcommand."""
-    parser.add_argument("contestants", metavar="[NAME=]CONTESTANT", nargs="+",
-                        help="folder of results, yaml of parameters, default, topic:/TOPIC or tf:FRAME")
+    parser.add_argument(
+        "contestants",
+        metavar="[NAME=]CONTESTANT",
+        nargs="+",
+        help="folder of results, yaml of parameters, default, topic:/TOPIC or tf:FRAME",
+    )
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for the comparison")
-    parser.add_argument("--log", action="append", default=[], metavar="BAG=MAP",
-                        help="a log and its map, for all but folders; may be repeated")
-    parser.add_argument("--logs", type=Path, metavar="FILE",
-                        help="yaml list of many: {log: a.bag, map: a.yaml}, also ground_truth and initial_pose; "
-                             "log: [a_0.bag, a_1.bag] are the parts of one run")
+    parser.add_argument(
+        "--log",
+        action="append",
+        default=[],
+        metavar="BAG=MAP",
+        help="a log and its map, for all but folders; may be repeated",
+    )
+    parser.add_argument(
+        "--logs",
+        type=Path,
+        metavar="FILE",
+        help="yaml list of many: {log: a.bag, map: a.yaml}, also ground_truth and initial_pose; "
+        "log: [a_0.bag, a_1.bag] are the parts of one run",
+    )
     parser.add_argument("--seeds", type=int, default=3, metavar="N", help="runs of each over each log (default 3)")
     parser.add_argument("--first-seed", type=int, default=0, metavar="K", help="seeds K to K + N - 1 (default 0)")
-    parser.add_argument("--jobs", type=int, default=1, metavar="N",
-                        help="runs at a time, on so many cores (default 1; more: needs joblib); changes no result")
-    parser.add_argument("--scheduler", metavar="ADDRESS",
-                        help="run on a Dask cluster, such as tcp://10.0.0.7:8786 (needs distributed); its workers need "
-                             "this package and the files under the same paths")
-    parser.add_argument("--fail-if", action="append", default=[], metavar="METRIC>LIMIT",
-                        help="exit with 1 if a contestant's mean over all logs and seeds is beyond a limit, such as "
-                             "'position_p95_m>0.3'; metrics as in runs.csv, cpu_ms_per_scan too; may be repeated")
+    parser.add_argument(
+        "--jobs",
+        type=int,
+        default=1,
+        metavar="N",
+        help="runs at a time, on so many cores (default 1; more: needs joblib); changes no result",
+    )
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="run on a Dask cluster, such as tcp://10.0.0.7:8786 (needs distributed); its workers need "
+        "this package and the files under the same paths",
+    )
+    parser.add_argument(
+        "--fail-if",
+        action="append",
+        default=[],
+        metavar="METRIC>LIMIT",
+        help="exit with 1 if a contestant's mean over all logs and seeds is beyond a limit, such as "
+        "'position_p95_m>0.3'; metrics as in runs.csv, cpu_ms_per_scan too; may be repeated",
+    )
     replay.add_log_arguments(parser)
 
 
@@ -100,8 +129,9 @@ def main(arguments: argparse.Namespace) -> bool:
     print(table(compared))
     print(f"written to {arguments.out / 'compare.html'}")
     if failed:
-        raise ValueError(f"{len(failed)} of {len(failed) + len(made)} runs could not be made, see above; the others "
-                         "are compared")
+        raise ValueError(
+            f"{len(failed)} of {len(failed) + len(made)} runs could not be made, see above; the others are compared"
+        )
     missed = comparison.failures(compared, _limits(arguments))
     for line in missed:
         _say(line)
@@ -123,13 +153,16 @@ def _run(jobs: List[Job], logs: List[Log], arguments: argparse.Namespace) -> "Tu
         answers = engine.run(jobs, compare_runs.make, progress.step, arguments.jobs, arguments.scheduler)
     finally:
         progress.finish()
-    return ([each for each in answers if not isinstance(each, Failed)],
-            [each for each in answers if isinstance(each, Failed)])
+    return (
+        [each for each in answers if not isinstance(each, Failed)],
+        [each for each in answers if isinstance(each, Failed)],
+    )
 
 
 def _opened(log: Log, jobs: List[Job]) -> "Tuple[int, List[Job]]":
     """About how many scans it has, and the jobs with where they start; says what was chosen in the log, and refuses one
-    that cannot be used before anything runs."""
+    that cannot be used before anything runs.
+    """
     ready = replay.prepare(jobs[0].arguments)
     jobs, start = compare_runs.started(jobs, ready)
     for note in ready.notes:
@@ -140,17 +173,21 @@ def _opened(log: Log, jobs: List[Job]) -> "Tuple[int, List[Job]]":
     return ready.expected_scans, jobs
 
 
-def _write(compared: Comparison, maps: Dict[str, Path], everyone: List[Contestant],
-           arguments: argparse.Namespace) -> None:
+def _write(
+    compared: Comparison, maps: Dict[str, Path], everyone: List[Contestant], arguments: argparse.Namespace
+) -> None:
     arguments.out.mkdir(parents=True, exist_ok=True)
-    about = {"versions": replay.versions(), "maps": {log: str(maps[log]) for log in compared.logs},
-             "what": {each.name: _what(each) for each in everyone}}
+    about = {
+        "versions": replay.versions(),
+        "maps": {log: str(maps[log]) for log in compared.logs},
+        "what": {each.name: _what(each) for each in everyone},
+    }
     comparison.write(compared, arguments.out, about)
     grids = {}
-    for log in compared.logs[:comparison_pictures.MOST_LOGS]:
+    for log in compared.logs[: comparison_pictures.MAX_LOGS]:
         if maps[log].exists():  # results may come from elsewhere
             grid = map_file.load(maps[log])
-            grids[log] = pictures.MapImage(grid.occupancy, grid.resolution_m, grid.map_from_grid)
+            grids[log] = run_pictures.MapImage(grid.occupancy, grid.resolution_m, grid.map_from_grid)
     drawn = comparison_pictures.draw_all(arguments.out, compared, grids)
     comparison_page.write(arguments.out / "compare.html", compared, drawn, about)
 

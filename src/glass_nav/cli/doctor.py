@@ -18,17 +18,26 @@ HELP = "say what is wrong with a bag or a running robot, and what to do"
 DESCRIPTION = """Looks at the scans, frames, stamps and odometry in a bag (of ROS 1 or ROS 2), or of the running
 robot, and with --map at how the scans fit the map; says what is wrong, each with what to do. Exit code 0: nothing,
 1: something is wrong, 2: wrong usage, 3: bad input."""
-LIVE_MODULE = "glass_nav.ros.doctor_live"
+LIVE_MODULE = "glass_nav.ros.tools.doctor_live"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the subcommand."""
     parser.add_argument("bag", metavar="BAG", type=Path, nargs="*", help="bag; several: the parts of one run")
-    parser.add_argument("--map", type=Path, help="map_server .yaml, or MRPT .gridmap[.gz]; with --live the default is "
-                                                 "what static_map or the topic map gives")
+    parser.add_argument(
+        "--map",
+        type=Path,
+        help="map_server .yaml, or MRPT .gridmap[.gz]; with --live the default is "
+        "what static_map or the topic map gives",
+    )
     parser.add_argument("--live", action="store_true", help="listen to the running robot instead")
-    parser.add_argument("--seconds", type=float, default=10.0, metavar="S",
-                        help="with --live: how long to listen (default 10); drive meanwhile, with a turn")
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        default=10.0,
+        metavar="S",
+        help="with --live: how long to listen (default 10); drive meanwhile, with a turn",
+    )
     parser.add_argument("--odom-frame", default="odom", metavar="FRAME", help="default: odom")
     parser.add_argument("--base-frame", metavar="FRAME", help="default: base_link, else base_footprint")
 

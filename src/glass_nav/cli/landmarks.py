@@ -10,11 +10,11 @@ from typing import List, Optional
 
 import numpy as np
 
-from glass_nav.evaluation import landmark_picture
-from glass_nav.evaluation.landmark_picture import Panel, Tags
-from glass_nav.evaluation.pictures import MapImage
-from glass_nav.localization import bearing_errors, landmark_planning
-from glass_nav.localization.landmark_planning import Suggestion
+from glass_nav.evaluation.plots import landmark_picture
+from glass_nav.evaluation.plots.landmark_picture import Panel, Tags
+from glass_nav.evaluation.plots.run_pictures import MapImage
+from glass_nav.localization.bearings import bearing_errors, landmark_planning
+from glass_nav.localization.bearings.landmark_planning import Suggestion
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.world import landmark_file, map_file
 from glass_nav.world.grid_map import GridMap
@@ -25,7 +25,7 @@ DESCRIPTION = """plan: how well a robot that sees the landmarks of a file will k
 where more of them help most. Prints a line for each state, writes the picture landmarks.png and the file
 landmarks.yaml with the suggested ones added."""
 
-GOOD_M = 0.3        # the seed document's bar for a position
+GOOD_M = 0.3  # the seed document's bar for a position
 GLASS_PERCENT = 50  # of a cell of a glass map that lets the light through
 PICTURE, FILE = "landmarks.png", "landmarks.yaml"
 
@@ -36,19 +36,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     tasks.required = True
     plan = tasks.add_parser("plan", help=HELP, description=DESCRIPTION)
     plan.add_argument("map", type=Path, metavar="MAP", help="map_server .yaml or MRPT .gridmap[.gz]")
-    plan.add_argument("landmarks", type=Path, metavar="LANDMARKS",
-                      help="landmarks.yaml: sigma, and landmarks, a list of {id, position: [x, y], facing_deg, "
-                           "view_deg, range}; an empty list plans from nothing")
-    plan.add_argument("--out", type=Path, default=Path("."), metavar="DIR",
-                      help=f"for {PICTURE} and {FILE} (default .)")
+    plan.add_argument(
+        "landmarks",
+        type=Path,
+        metavar="LANDMARKS",
+        help="landmarks.yaml: sigma, and landmarks, a list of {id, position: [x, y], facing_deg, "
+        "view_deg, range}; an empty list plans from nothing",
+    )
+    plan.add_argument(
+        "--out", type=Path, default=Path("."), metavar="DIR", help=f"for {PICTURE} and {FILE} (default .)"
+    )
     plan.add_argument("--add", type=int, default=1, metavar="N", help="tags to suggest (default 1)")
-    plan.add_argument("--step-deg", type=float, default=1.0, metavar="DEG",
-                      help="steps in which bearings are read, degrees (default 1)")
-    plan.add_argument("--glass-map", type=Path, metavar="MAP",
-                      help="glass_map.yaml of glass_nav replay: walls that proved glassy hide no tag; without it all "
-                           "do")
-    plan.add_argument("--spacing", type=float, default=0.5, metavar="M",
-                      help="of the places looked at, m (default 0.5)")
+    plan.add_argument(
+        "--step-deg",
+        type=float,
+        default=1.0,
+        metavar="DEG",
+        help="steps in which bearings are read, degrees (default 1)",
+    )
+    plan.add_argument(
+        "--glass-map",
+        type=Path,
+        metavar="MAP",
+        help="glass_map.yaml of glass_nav replay: walls that proved glassy hide no tag; without it all do",
+    )
+    plan.add_argument(
+        "--spacing", type=float, default=0.5, metavar="M", help="of the places looked at, m (default 0.5)"
+    )
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
@@ -84,22 +98,43 @@ def main(arguments: argparse.Namespace) -> None:
     more = _as_map(suggestions, landmarks)
     for name, each in zip(more.ids, suggestions):
         x, y = each.position_m
-        print(f"+ {name} at x {x:.2f} m, y {y:.2f} m, facing {math.degrees(each.facing_rad):.0f} degrees: "
-              f"{_line(each.sigma_m, each.seen)}")
+        print(
+            f"+ {name} at x {x:.2f} m, y {y:.2f} m, facing {math.degrees(each.facing_rad):.0f} degrees: "
+            f"{_line(each.sigma_m, each.seen)}"
+        )
     if len(suggestions) < arguments.add:
         print("no other place on a wall helps")
     arguments.out.mkdir(parents=True, exist_ok=True)
-    landmark_file.save(landmarks.joined(more), arguments.out / FILE, f"{arguments.landmarks.name} and what "
-                       f"glass_nav landmarks plan added")
-    panels = [Panel(f"{len(landmarks)} landmarks: {_line(sigma_m, seen.sum(axis=1))}", _tags(landmarks),
-                    _tags(_as_map([], landmarks)), sigma_m)]
+    landmark_file.save(
+        landmarks.joined(more),
+        arguments.out / FILE,
+        f"{arguments.landmarks.name} and what glass_nav landmarks plan added",
+    )
+    panels = [
+        Panel(
+            f"{len(landmarks)} landmarks: {_line(sigma_m, seen.sum(axis=1))}",
+            _tags(landmarks),
+            _tags(_as_map([], landmarks)),
+            sigma_m,
+        )
+    ]
     if suggestions:
-        panels.append(Panel(f"with {', '.join(more.ids)}: {_line(suggestions[-1].sigma_m, suggestions[-1].seen)}",
-                            _tags(landmarks), _tags(more), suggestions[-1].sigma_m))
-    landmark_picture.draw(arguments.out / PICTURE,
-                          MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid), points,
-                          arguments.spacing, panels,
-                          f"{arguments.map}: positions from bearings in steps of {arguments.step_deg:g} degrees")
+        panels.append(
+            Panel(
+                f"with {', '.join(more.ids)}: {_line(suggestions[-1].sigma_m, suggestions[-1].seen)}",
+                _tags(landmarks),
+                _tags(more),
+                suggestions[-1].sigma_m,
+            )
+        )
+    landmark_picture.draw(
+        arguments.out / PICTURE,
+        MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid),
+        points,
+        arguments.spacing,
+        panels,
+        f"{arguments.map}: positions from bearings in steps of {arguments.step_deg:g} degrees",
+    )
     print(f"written to {arguments.out / PICTURE} and {arguments.out / FILE}")
 
 
@@ -108,8 +143,10 @@ def _check_inside(arguments: argparse.Namespace, grid_map: GridMap, landmarks: L
     if not inside.all():
         number = int(np.argmin(inside))
         x, y = landmarks.positions_m[number]
-        raise ValueError(f"{arguments.landmarks}: landmark {landmarks.ids[number]!r} at x {x:g} m, y {y:g} m lies "
-                         f"outside the map {arguments.map}")
+        raise ValueError(
+            f"{arguments.landmarks}: landmark {landmarks.ids[number]!r} at x {x:g} m, y {y:g} m lies "
+            f"outside the map {arguments.map}"
+        )
 
 
 def _see_through(grid_map: GridMap, path: Optional[Path]) -> GridMap:
@@ -118,8 +155,10 @@ def _see_through(grid_map: GridMap, path: Optional[Path]) -> GridMap:
         return grid_map
     glass = map_file.load(path)
     if glass.occupancy.shape != grid_map.occupancy.shape:
-        raise ValueError(f"{path}: a glass map must have the cells of the map, {grid_map.occupancy.shape}, got "
-                         f"{glass.occupancy.shape}")
+        raise ValueError(
+            f"{path}: a glass map must have the cells of the map, {grid_map.occupancy.shape}, got "
+            f"{glass.occupancy.shape}"
+        )
     occupancy = np.where(glass.occupancy >= GLASS_PERCENT, 0, grid_map.occupancy)
     return replace(grid_map, occupancy=occupancy.astype(np.int8))
 
@@ -128,8 +167,10 @@ def _line(sigma_m: np.ndarray, seen: np.ndarray) -> str:
     """How much of the map has a position, and how good it is."""
     good, known = np.mean(sigma_m <= GOOD_M), np.isfinite(sigma_m)
     median = f", median sigma {np.median(sigma_m[known]):.2f} m" if known.any() else ""
-    return (f"three or more in sight of {np.mean(seen >= 3):.0%} of the places, position within {GOOD_M:g} m (1 sigma) "
-            f"at {good:.0%}{median}")
+    return (
+        f"three or more in sight of {np.mean(seen >= 3):.0%} of the places, position within {GOOD_M:g} m (1 sigma) "
+        f"at {good:.0%}{median}"
+    )
 
 
 def _as_map(suggestions: List[Suggestion], landmarks: LandmarkMap) -> LandmarkMap:
@@ -143,8 +184,14 @@ def _as_map(suggestions: List[Suggestion], landmarks: LandmarkMap) -> LandmarkMa
     count = len(suggestions)
     positions_m = np.array([each.position_m for each in suggestions], float).reshape(-1, 2)
     facing_deg = np.rint(np.degrees([each.facing_rad for each in suggestions]))  # nobody hangs a tag more exactly
-    return LandmarkMap(tuple(names), np.round(positions_m, 2), np.radians(facing_deg), np.full(count, VIEW_RAD),
-                       np.full(count, RANGE_M), landmarks.sigma_m)
+    return LandmarkMap(
+        tuple(names),
+        np.round(positions_m, 2),
+        np.radians(facing_deg),
+        np.full(count, VIEW_RAD),
+        np.full(count, RANGE_M),
+        landmarks.sigma_m,
+    )
 
 
 def _tags(landmarks: LandmarkMap) -> Tags:

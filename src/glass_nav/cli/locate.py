@@ -9,13 +9,17 @@ from typing import Optional
 
 import numpy as np
 
-from glass_nav.evaluation import location_picture
-from glass_nav.evaluation.location_picture import LocatedScan
-from glass_nav.evaluation.pictures import MapImage
+from glass_nav.evaluation.plots import location_picture
+from glass_nav.evaluation.plots.location_picture import LocatedScan
+from glass_nav.evaluation.plots.run_pictures import MapImage
 from glass_nav.geometry import angles
-from glass_nav.localization.segment_correction import (METHODS, SegmentCorrection, SegmentCorrectionParams,
-                                                       SegmentQuality)
-from glass_nav.localization.segment_locator import Located, SegmentLocator
+from glass_nav.localization.segments.segment_correction import (
+    METHODS,
+    SegmentCorrection,
+    SegmentCorrectionParams,
+    SegmentQuality,
+)
+from glass_nav.localization.segments.segment_locator import Located, SegmentLocator
 from glass_nav.recording import scan_file
 from glass_nav.recording.log_file import open_log
 from glass_nav.recording.recording import LogOptions, RecordingError, Refusal
@@ -27,31 +31,56 @@ DESCRIPTION = """Moves a rough pose so that the scan's beams end at the wall seg
 do there, and which directions the walls do not constrain. Draws the scan before and after. Good from
 about 0.5 m and 10 degrees away. Ends with 3 if the scan fits nowhere near the pose."""
 
-LEAST_SHARE = 0.4  # of the answering beams, that must end at walls
-MOST_M, MOST_RAD = 1.0, np.radians(20.0)  # that a pose may move: from farther away a fit is chance
+MIN_SHARE = 0.4  # of the answering beams, that must end at walls
+MAX_M, MAX_RAD = 1.0, np.radians(20.0)  # that a pose may move: from farther away a fit is chance
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the subcommand."""
     parser.add_argument("--map", required=True, type=Path, help="map_server .yaml, or MRPT .gridmap[.gz]")
-    parser.add_argument("--scan", required=True, type=Path, metavar="FILE",
-                        help="ROS bag or MRPT .rawlog (see --index), .yaml as rostopic echo -n 1 writes a LaserScan, "
-                             "or .csv: a line for each beam, angle [rad], range [m]")
-    parser.add_argument("--pose", required=True, type=float, nargs=3, metavar=("X", "Y", "YAW"),
-                        help="rough pose of the robot in the map; m, m, rad")
+    parser.add_argument(
+        "--scan",
+        required=True,
+        type=Path,
+        metavar="FILE",
+        help="ROS bag or MRPT .rawlog (see --index), .yaml as rostopic echo -n 1 writes a LaserScan, "
+        "or .csv: a line for each beam, angle [rad], range [m]",
+    )
+    parser.add_argument(
+        "--pose",
+        required=True,
+        type=float,
+        nargs=3,
+        metavar=("X", "Y", "YAW"),
+        help="rough pose of the robot in the map; m, m, rad",
+    )
     parser.add_argument("--index", type=int, metavar="N", help="which scan of a log, from 0 (default 0)")
-    parser.add_argument("--method", choices=METHODS, default=METHODS[0],
-                        help="least_squares: x, y and yaw at once; document: the mean of all displacements, slower to "
-                             "arrive (default least_squares)")
-    parser.add_argument("--iterations", type=int, metavar="T", help="steps of a correction (default "
-                        f"{SegmentCorrectionParams().iterations}; document 40)")
-    parser.add_argument("--out", type=Path, default=Path("located.png"), metavar="PNG",
-                        help="the picture (default located.png)")
+    parser.add_argument(
+        "--method",
+        choices=METHODS,
+        default=METHODS[0],
+        help="least_squares: x, y and yaw at once; document: the mean of all displacements, slower to "
+        "arrive (default least_squares)",
+    )
+    parser.add_argument(
+        "--iterations",
+        type=int,
+        metavar="T",
+        help=f"steps of a correction (default {SegmentCorrectionParams().iterations}; document 40)",
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("located.png"), metavar="PNG", help="the picture (default located.png)"
+    )
     parser.add_argument("--scan-topic", metavar="TOPIC", help="of a log; default: the only one, or /scan")
     parser.add_argument("--base-frame", metavar="FRAME", help="of a bag; default: base_link, else base_footprint")
     parser.add_argument("--odom-frame", metavar="FRAME", help="of a bag; default: odom")
-    parser.add_argument("--laser-pose", type=float, nargs=3, metavar=("X", "Y", "YAW"),
-                        help="of the laser on the robot; m, m, rad; default: tf of a bag, else 0 0 0")
+    parser.add_argument(
+        "--laser-pose",
+        type=float,
+        nargs=3,
+        metavar=("X", "Y", "YAW"),
+        help="of the laser on the robot; m, m, rad; default: tf of a bag, else 0 0 0",
+    )
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
@@ -88,9 +117,14 @@ def main(arguments: argparse.Namespace) -> None:
     for line in _lines(scan, located, rough, len(locator.segments_m)):
         print(line)
     drawn = LocatedScan(scan.points_in_base(), located.case, locator.segments_m, rough, found.map_from_base)
-    location_picture.draw(arguments.out, MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid),
-                          drawn, f"{arguments.scan.name} on {arguments.map.name}",
-                          f"before: {_measures(found.before)}", f"after: {_measures(found.after)}")
+    location_picture.draw(
+        arguments.out,
+        MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid),
+        drawn,
+        f"{arguments.scan.name} on {arguments.map.name}",
+        f"before: {_measures(found.before)}",
+        f"after: {_measures(found.after)}",
+    )
     print(f"drawn to {arguments.out}")
     _refuse_chance(scan, located, found.map_from_base - rough)
 
@@ -99,13 +133,17 @@ def _refuse_chance(scan: Scan, located: Located, moved: np.ndarray) -> None:
     """Raises ValueError if the scan does not fit, or only so far away that no rough pose led there."""
     share = _share_at_walls(scan, located)
     way_m, turn_rad = float(np.hypot(moved[0], moved[1])), float(abs(angles.wrap(moved[2])))
-    if share < LEAST_SHARE:
-        raise ValueError(f"the scan fits nowhere near the pose: {share:.0%} of its answering beams end at walls, "
-                         f"at least {LEAST_SHARE:.0%} must")
-    if way_m > MOST_M or turn_rad > MOST_RAD:
-        raise ValueError(f"the scan fits nowhere near the pose: the correction led {way_m:.2f} m and "
-                         f"{np.degrees(turn_rad):.0f} deg away, at most {MOST_M:g} m and {np.degrees(MOST_RAD):.0f} "
-                         f"deg are no chance")
+    if share < MIN_SHARE:
+        raise ValueError(
+            f"the scan fits nowhere near the pose: {share:.0%} of its answering beams end at walls, "
+            f"at least {MIN_SHARE:.0%} must"
+        )
+    if way_m > MAX_M or turn_rad > MAX_RAD:
+        raise ValueError(
+            f"the scan fits nowhere near the pose: the correction led {way_m:.2f} m and "
+            f"{np.degrees(turn_rad):.0f} deg away, at most {MAX_M:g} m and {np.degrees(MAX_RAD):.0f} "
+            f"deg are no chance"
+        )
 
 
 def _params(arguments: argparse.Namespace) -> SegmentCorrectionParams:
@@ -121,13 +159,16 @@ def _scan(arguments: argparse.Namespace) -> Scan:
     if arguments.scan.suffix in scan_file.SUFFIXES:
         return scan_file.load(arguments.scan, (0.0, 0.0, 0.0) if pose is None else pose)
     laser_pose = None if pose is None else (pose[0], pose[1], pose[2])
-    recording = open_log(arguments.scan, LogOptions(arguments.scan_topic, None, arguments.base_frame,
-                                                    arguments.odom_frame, laser_pose, "none", "none"))
+    recording = open_log(
+        arguments.scan,
+        LogOptions(arguments.scan_topic, None, arguments.base_frame, arguments.odom_frame, laser_pose, "none", "none"),
+    )
     index = arguments.index or 0
     entry = next(itertools.islice(recording, index, None), None)
     if entry is None:
-        raise RecordingError(f"{arguments.scan}: --index must be below {len(recording)}, the number of its scans, "
-                             f"got {index}")
+        raise RecordingError(
+            f"{arguments.scan}: --index must be below {len(recording)}, the number of its scans, got {index}"
+        )
     if isinstance(entry, Refusal):
         raise RecordingError(f"{arguments.scan}: scan {index} cannot be used: {entry.reason}")
     return entry.scan
@@ -150,7 +191,8 @@ def _lines(scan: Scan, located: Located, rough: np.ndarray, segments: int) -> "l
         f"free      {free_in_words(found)}",
         f"quality   {_measures(found.after)}; {found.after.inlier_share:.0%} of those that pull within "
         f"{SegmentCorrectionParams().outlier_m:g} m of walls",
-        f"before    {_measures(found.before)}"]
+        f"before    {_measures(found.before)}",
+    ]
 
 
 def free_in_words(found: SegmentCorrection) -> str:
@@ -167,5 +209,4 @@ def free_in_words(found: SegmentCorrection) -> str:
 
 
 def _measures(quality: SegmentQuality) -> str:
-    return (f"Emse {quality.mse_m2:.5f} m^2, Ecf {quality.classification_factor:.3f}, "
-            f"combined {quality.combined:.3f}")
+    return f"Emse {quality.mse_m2:.5f} m^2, Ecf {quality.classification_factor:.3f}, combined {quality.combined:.3f}"

@@ -24,12 +24,21 @@ def main(argv: Optional[List[str]] = None) -> int:
     except ImportError as err:
         if not str(err.name).startswith("glass_nav"):
             raise
-        print(f"glass_nav: {err.name or err} is not there: build the package and source its setup.bash",
-              file=sys.stderr)
+        print(
+            f"glass_nav: {err.name or err} is not there: build the package and source its setup.bash", file=sys.stderr
+        )
         return BAD_INPUT
-    modules: Dict[str, Any] = {"atlas": atlas, "compare": compare, "doctor": doctor, "landmarks": landmarks,
-                               "locate": locate, "params": params, "replay": replay, "report": report,
-                               "simulate": simulate}  # each: see replay.py
+    modules: Dict[str, Any] = {
+        "atlas": atlas,
+        "compare": compare,
+        "doctor": doctor,
+        "landmarks": landmarks,
+        "locate": locate,
+        "params": params,
+        "replay": replay,
+        "report": report,
+        "simulate": simulate,
+    }  # each: see replay.py
     parser = argparse.ArgumentParser(prog="glass_nav", description="Localization in buildings of glass: offline tools.")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     commands.required = True  # as an attribute: the argument came with Python 3.7 only for some callers

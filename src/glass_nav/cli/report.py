@@ -10,8 +10,10 @@ import numpy as np
 
 from glass_nav.cli import replay
 from glass_nav.cli.progress import Progress
-from glass_nav.evaluation import pictures, replay_result, report_page, report_pictures, run_story
-from glass_nav.evaluation.report_pictures import Ground
+from glass_nav.evaluation.metrics import replay_result, run_story
+from glass_nav.evaluation.pages import report_page
+from glass_nav.evaluation.plots import report_pictures, run_pictures
+from glass_nav.evaluation.plots.report_pictures import Ground
 from glass_nav.world import map_file
 
 HELP = "tell one run as an HTML file with pictures"
@@ -24,10 +26,14 @@ that)."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the subcommand."""
-    parser.add_argument("run", metavar="RESULTS|LOG", type=Path,
-                        help="folder of results of a replay; or a ROS bag or MRPT .rawlog")
-    parser.add_argument("--map", type=Path, help="map_server .yaml, or MRPT .gridmap[.gz]; default for RESULTS: the "
-                                                 "map that the replay had")
+    parser.add_argument(
+        "run", metavar="RESULTS|LOG", type=Path, help="folder of results of a replay; or a ROS bag or MRPT .rawlog"
+    )
+    parser.add_argument(
+        "--map",
+        type=Path,
+        help="map_server .yaml, or MRPT .gridmap[.gz]; default for RESULTS: the map that the replay had",
+    )
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for the report")
     replay.add_run_arguments(parser)
     replay.add_log_arguments(parser)
@@ -55,7 +61,7 @@ def main(arguments: argparse.Namespace) -> None:
     if arguments.map is None and not path_map.exists():
         raise ValueError(f"{folder}: the map of that replay, {path_map}, is not there from here: give --map")
     grid_map = map_file.load(path_map)
-    image = pictures.MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid)
+    image = run_pictures.MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid)
     ground = Ground(image, _glass(folder, grid_map.occupancy.shape))
     arguments.out.mkdir(parents=True, exist_ok=True)
     scores: Optional[Dict[str, Any]] = metrics.get("cases")
@@ -95,6 +101,8 @@ def _glass(folder: Path, shape: "tuple[int, ...]") -> Optional[np.ndarray]:
         return None
     glass = map_file.load(folder / "glass_map.yaml").occupancy
     if glass.shape != shape:
-        raise ValueError(f"{folder}: its glass map has {glass.shape[1]} x {glass.shape[0]} cells, the map {shape[1]} x "
-                         f"{shape[0]}: it is of another map")
+        raise ValueError(
+            f"{folder}: its glass map has {glass.shape[1]} x {glass.shape[0]} cells, the map {shape[1]} x "
+            f"{shape[0]}: it is of another map"
+        )
     return glass

@@ -25,6 +25,6 @@ def run(module: str, arguments: Sequence[str], program: str, codes: "tuple[int, 
         last = lines[-1] if lines else f"{module} ended with {done.returncode}"
         if "No module named" in last:
             last = f"this needs ROS: {last}; source its setup.bash"
-        raise ValueError(last[len(program) + 2:] if last.startswith(f"{program}: ") else last)
+        raise ValueError(last[len(program) + 2 :] if last.startswith(f"{program}: ") else last)
     print(done.stdout, end="")
     return done.returncode

@@ -9,12 +9,24 @@ from pathlib import Path
 from typing import Optional
 
 from glass_nav import params
-from glass_nav.cli import replay_params
-from glass_nav.topology.atlas_localizer import SearchParams
+from glass_nav.replay import replay_params
+from glass_nav.topology.search.atlas_localizer import SearchParams
 
-NODE_ONLY = frozenset(["atlas", "global_frame_id", "check_map", "judge_by_scans", "search_at_start",
-                       "publish_initial_pose", "initial_pose_sigma_m", "initial_pose_sigma_rad", "listed_candidates",
-                       "pairing_tolerance_s", "visits_file"])
+NODE_ONLY = frozenset(
+    [
+        "atlas",
+        "global_frame_id",
+        "check_map",
+        "judge_by_scans",
+        "search_at_start",
+        "publish_initial_pose",
+        "initial_pose_sigma_m",
+        "initial_pose_sigma_rad",
+        "listed_candidates",
+        "pairing_tolerance_s",
+        "visits_file",
+    ]
+)
 
 
 def load(path: Optional[Path]) -> SearchParams:
@@ -26,5 +38,6 @@ def load(path: Optional[Path]) -> SearchParams:
     if path is None:
         return SearchParams()
     mapping = replay_params.read_mapping(path)
-    return params.load(SearchParams, {name: value for name, value in mapping.items() if name not in NODE_ONLY},
-                       str(path))
+    return params.load(
+        SearchParams, {name: value for name, value in mapping.items() if name not in NODE_ONLY}, str(path)
+    )

@@ -13,7 +13,7 @@ from typing import Optional
 import numpy as np
 
 from glass_nav.cli.progress import Progress
-from glass_nav.evaluation.case_scores import CASE_NAMES
+from glass_nav.evaluation.metrics.case_scores import CASE_NAMES
 from glass_nav.recording.bag_writer import BagWriter
 from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings
 from glass_nav.simulation.lidar import ECHOES, LidarModel
@@ -30,23 +30,46 @@ Needs no roscore. The same seed gives the same bag."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the subcommand."""
-    parser.add_argument("building", metavar="BUILDING",
-                        help="building.yaml, its folder, or the name of a building of the package: "
-                             f"{', '.join(shipped_buildings.shipped())}")
-    parser.add_argument("--out", required=True, type=Path, metavar="BAG",
-                        help="the bag, such as run.bag; the map goes beside it as run.map.yaml")
-    parser.add_argument("--path", default=FIRST, metavar="NAME_OR_FILE",
-                        help="a path of the building, or a file of waypoints: yaml, a list of [x, y], or lines of x,y; "
-                             "default: the building's first path")
-    parser.add_argument("--lidar", default="sensitive", metavar="PRESET",
-                        help=f"{', '.join(lidar.PRESETS)} (default sensitive)")
+    parser.add_argument(
+        "building",
+        metavar="BUILDING",
+        help="building.yaml, its folder, or the name of a building of the package: "
+        f"{', '.join(shipped_buildings.shipped())}",
+    )
+    parser.add_argument(
+        "--out",
+        required=True,
+        type=Path,
+        metavar="BAG",
+        help="the bag, such as run.bag; the map goes beside it as run.map.yaml",
+    )
+    parser.add_argument(
+        "--path",
+        default=FIRST,
+        metavar="NAME_OR_FILE",
+        help="a path of the building, or a file of waypoints: yaml, a list of [x, y], or lines of x,y; "
+        "default: the building's first path",
+    )
+    parser.add_argument(
+        "--lidar", default="sensitive", metavar="PRESET", help=f"{', '.join(lidar.PRESETS)} (default sensitive)"
+    )
     parser.add_argument("--robot", default="diff", choices=KINDS, help="its kind of base (default diff)")
     parser.add_argument("--seed", type=int, default=0, help="of everything random (default 0)")
-    parser.add_argument("--changed", type=float, default=0.0, metavar="SHARE",
-                        help="0 to 1 of the movable furniture stands elsewhere than on the map (default 0)")
+    parser.add_argument(
+        "--changed",
+        type=float,
+        default=0.0,
+        metavar="SHARE",
+        help="0 to 1 of the movable furniture stands elsewhere than on the map (default 0)",
+    )
     parser.add_argument("--rate", type=float, default=10.0, metavar="HZ", help="scans a second (default 10)")
-    parser.add_argument("--turn-time", type=float, default=0.0, metavar="S",
-                        help="from the first beam of a scan to the last one, while the robot moves on; default 0")
+    parser.add_argument(
+        "--turn-time",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="from the first beam of a scan to the last one, while the robot moves on; default 0",
+    )
     parser.add_argument("--beams", type=int, metavar="N", help="of a scan; default: the preset's")
     parser.add_argument("--echo", choices=ECHOES, help="which echo the lidar reports; default: the preset's")
     parser.add_argument("--speed", type=float, default=0.6, metavar="M_S", help="m/s along the path (default 0.6)")
@@ -81,9 +104,15 @@ def main(arguments: argparse.Namespace) -> None:
         BuildingError, PathError, SimulationError, RecordingError, OSError: bad input; one line.
     """
     building = building_file.load(shipped_buildings.find(arguments.building))
-    simulation = Simulation(building, _lidar_model(arguments), RobotParams(arguments.robot), seed=arguments.seed,
-                            scan_rate_hz=arguments.rate, changed_share=arguments.changed,
-                            turn_time_s=arguments.turn_time)
+    simulation = Simulation(
+        building,
+        _lidar_model(arguments),
+        RobotParams(arguments.robot),
+        seed=arguments.seed,
+        scan_rate_hz=arguments.rate,
+        changed_share=arguments.changed,
+        turn_time_s=arguments.turn_time,
+    )
     pace = FollowerParams(speed_m_s=arguments.speed)
     way_m = simulation.follower(arguments.path, pace).length_m
     grid_map = building_map.draw(building, arguments.resolution)
@@ -140,8 +169,9 @@ class _Tally:
         times = seconds / max(time.perf_counter() - self._began_s, 1e-9)
         total = sum(self._cases.values())
         shares = ", ".join(f"{name} {100.0 * self._cases[case] / total:.1f} %" for case, name in enumerate(CASE_NAMES))
-        return (f"{self._scans} scans, {self.way_m:.1f} m, {seconds:.1f} s ({times:.0f} times real time); "
-                f"beams: {shares}")
+        return (
+            f"{self._scans} scans, {self.way_m:.1f} m, {seconds:.1f} s ({times:.0f} times real time); beams: {shares}"
+        )
 
 
 def _lidar_model(arguments: argparse.Namespace) -> LidarModel:

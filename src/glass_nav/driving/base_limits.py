@@ -9,8 +9,9 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class BaseLimits:
     """Limits of a base that drives forward and turns. The defaults are those of a slow indoor robot of 50 kg."""
-    robot_radius_m: float = 0.22              # of its round outline
-    margin_m: float = 0.02                    # kept between outline and obstacles
+
+    robot_radius_m: float = 0.22  # of its round outline
+    margin_m: float = 0.02  # kept between outline and obstacles
     max_speed_m_s: float = 0.5
     max_turn_rad_s: float = 1.0
     max_acceleration_m_s2: float = 0.5

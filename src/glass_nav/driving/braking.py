@@ -15,7 +15,7 @@ _SQUEEZE_M = 0.01
 _TIGHT_M = 0.3  # with less room other arcs are tried,
 _OTHER_ARCS_RAD_M = (0.5, -0.5, 1.0, -1.0, 2.0, -2.0)  # bent by so much more,
 _WORTH_M = 0.06  # and taken if they lead so much further
-_LEAST_M_S = 0.04
+_MIN_M_S = 0.04
 _CREEPING_MARGIN_M = 0.005  # kept at that speed, which stops within it
 _DELAY_S = 0.15  # until a command acts
 
@@ -42,12 +42,16 @@ def room_m(velocity: np.ndarray, obstacles_m: np.ndarray, limits: BaseLimits, re
     along = np.arange(0.0, reach_m + _STEP_M, _STEP_M)
     turned = velocity[2] / speed * along
     heading = math.atan2(velocity[1], velocity[0]) + turned
-    step = 0.5 * _STEP_M * (np.cos(heading[1:]) + np.cos(heading[:-1])), 0.5 * _STEP_M * (np.sin(heading[1:])
-                                                                                       + np.sin(heading[:-1]))
+    step = (
+        0.5 * _STEP_M * (np.cos(heading[1:]) + np.cos(heading[:-1])),
+        0.5 * _STEP_M * (np.sin(heading[1:]) + np.sin(heading[:-1])),
+    )
     x, y = np.concatenate([[0.0], np.cumsum(step[0])]), np.concatenate([[0.0], np.cumsum(step[1])])
     away = np.hypot(x[:, None] - obstacles_m[:, 0], y[:, None] - obstacles_m[:, 1])  # (steps, K)
-    wanted = np.minimum(limits.robot_radius_m + limits.margin_m,
-                        np.minimum(np.maximum(away[0] - _SQUEEZE_M, limits.robot_radius_m), away[0] - 5e-3))
+    wanted = np.minimum(
+        limits.robot_radius_m + limits.margin_m,
+        np.minimum(np.maximum(away[0] - _SQUEEZE_M, limits.robot_radius_m), away[0] - 5e-3),
+    )
     touched = (away < wanted).any(axis=1)
     return float(along[max(int(touched.argmax()) - 1, 0)]) if touched.any() else reach_m
 
@@ -63,24 +67,25 @@ def allowed(velocity: np.ndarray, obstacles_m: np.ndarray, limits: BaseLimits, c
     speed = math.hypot(velocity[0], velocity[1])
     if speed < 1e-6:
         return velocity
-    reach = 0.5 * speed ** 2 / limits.max_acceleration_m_s2 + 0.5
+    reach = 0.5 * speed**2 / limits.max_acceleration_m_s2 + 0.5
     velocity, room = _furthest(velocity, obstacles_m, limits, reach)
     if creep and room <= _STEP_M:
         limits = replace(limits, margin_m=min(limits.margin_m, _CREEPING_MARGIN_M))
         velocity, room = _furthest(velocity, obstacles_m, limits, reach)
         if room > _STEP_M:
-            return velocity * (min(_LEAST_M_S, speed) / speed)
+            return velocity * (min(_MIN_M_S, speed) / speed)
     lost = _DELAY_S * limits.max_acceleration_m_s2
-    fastest = max(math.sqrt(lost ** 2 + 2.0 * limits.max_acceleration_m_s2 * room) - lost, 0.0)
+    fastest = max(math.sqrt(lost**2 + 2.0 * limits.max_acceleration_m_s2 * room) - lost, 0.0)
     if fastest >= speed:
         return velocity
     if room <= _STEP_M:
         return np.array([0.0, 0.0, velocity[2]])
-    return velocity * (max(fastest, _LEAST_M_S) / speed)
+    return velocity * (max(fastest, _MIN_M_S) / speed)
 
 
-def _furthest(velocity: np.ndarray, obstacles_m: np.ndarray, limits: BaseLimits,
-              reach_m: float) -> Tuple[np.ndarray, float]:
+def _furthest(
+    velocity: np.ndarray, obstacles_m: np.ndarray, limits: BaseLimits, reach_m: float
+) -> Tuple[np.ndarray, float]:
     """The velocity, or between close obstacles one along an arc that leads further; and how far that is free."""
     room = room_m(velocity, obstacles_m, limits, reach_m)
     if room < _TIGHT_M:

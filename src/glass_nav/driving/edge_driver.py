@@ -28,49 +28,50 @@ from glass_nav.driving.local_pose import LocalPose
 from glass_nav.geometry import angles, polyline, se2
 from glass_nav.geometry.polyline import Polyline
 from glass_nav.sensing.scan import Scan
+from glass_nav.topology.atlas.voronoi_graph import VoronoiParams
 from glass_nav.topology.observations import Meetpoint, Traversal, refuse_rank
-from glass_nav.topology.voronoi_graph import VoronoiParams
 from glass_nav.world.grid_map import GridMap
 
 # phases
-IDLE = "IDLE"            # stands, nothing asked for
-SEEKING = "SEEKING"      # on its way to the graph and along it to any meetpoint
+IDLE = "IDLE"  # stands, nothing asked for
+SEEKING = "SEEKING"  # on its way to the graph and along it to any meetpoint
 FOLLOWING = "FOLLOWING"  # along an edge
-HOMING = "HOMING"        # the last way to a meetpoint, and a look around there
+HOMING = "HOMING"  # the last way to a meetpoint, and a look around there
 RETURNING = "RETURNING"  # back along an edge to the meetpoint where it began
-ARRIVED = "ARRIVED"      # stands at a meetpoint
-FAILED = "FAILED"        # stands: cannot go on
+ARRIVED = "ARRIVED"  # stands at a meetpoint
+FAILED = "FAILED"  # stands: cannot go on
 _DRIVING = (SEEKING, FOLLOWING, HOMING, RETURNING)
 
 # why it FAILED
 NO_GRAPH, BLOCKED = "NO_GRAPH", "BLOCKED"
 
 _LOOKAHEAD_M = 0.35
-_TURN_FIRST_RAD = 0.7    # a point further to the side is turned to on the spot
+_TURN_FIRST_RAD = 0.7  # a point further to the side is turned to on the spot
 _AT_END_M = 0.02
 _GRAPH_PERIOD_NS = 300_000_000  # between two graphs
-_LEAST_SCANS = 3         # before the first graph
-_LOOKS = 4               # graphs that must agree on a meetpoint: over a second, people walk on
-_MOST_LOOKS = 9          # then it is none
-_AHEAD_M = 0.4            # of the robot, where its edge is told from others
-_FOOT_M = 0.4            # the line moves by no more from one graph to the next
-_TO_GRAPH_M = 4.0        # the graph may be so far away at the beginning
-_AT_NODE_M = 0.08        # the robot stands at a node
-_ALMOST_M = 0.45         # ... or as near as it gets, if something stands in the way
-_SAME_NODE_M = 0.3       # a node moves by no more from one graph to the next
-_SHORT_EDGE_M = 0.7      # along a longer edge no node follows within
-_SPLIT_M = 0.6           # so much: it would be a part of the one that the robot left
-_BEHIND_M = 1.0          # a node that shows only once the robot is past it
-_DOUBT_M = 0.15          # an obstacle that is further from any wall: look around first
+_MIN_SCANS = 3  # before the first graph
+_LOOKS = 4  # graphs that must agree on a meetpoint: over a second, people walk on
+_MAX_LOOKS = 9  # then it is none
+_AHEAD_M = 0.4  # of the robot, where its edge is told from others
+_FOOT_M = 0.4  # the line moves by no more from one graph to the next
+_TO_GRAPH_M = 4.0  # the graph may be so far away at the beginning
+_AT_NODE_M = 0.08  # the robot stands at a node
+_ALMOST_M = 0.45  # ... or as near as it gets, if something stands in the way
+_SAME_NODE_M = 0.3  # a node moves by no more from one graph to the next
+_SHORT_EDGE_M = 0.7  # along a longer edge no node follows within
+_SPLIT_M = 0.6  # so much: it would be a part of the one that the robot left
+_BEHIND_M = 1.0  # a node that shows only once the robot is past it
+_DOUBT_M = 0.15  # an obstacle that is further from any wall: look around first
 _BLOCKED_S = 4.0
-_LOST_LINE_S = 3.0       # driven on along the last line, without a graph that has it
-_SEEN_M = 0.12          # a wall of the map beside a point of the scan is the same
-_NEAR_M = 2.0            # obstacles further away are not braked for
+_LOST_LINE_S = 3.0  # driven on along the last line, without a graph that has it
+_SEEN_M = 0.12  # a wall of the map beside a point of the scan is the same
+_NEAR_M = 2.0  # obstacles further away are not braked for
 
 
 @dataclass(frozen=True)
 class EdgeDriverParams:
     """How edges are followed and meetpoints found."""
+
     limits: BaseLimits = field(default_factory=BaseLimits)
     graph: VoronoiParams = field(default_factory=VoronoiParams)  # as the atlas was built with
     local_map: LocalMapParams = field(default_factory=LocalMapParams)
@@ -79,8 +80,9 @@ class EdgeDriverParams:
 @dataclass(frozen=True)
 class Arrival:
     """What is reported at a meetpoint."""
-    stamp_ns: int                   # of the scan that showed it
-    odom_from_base: np.ndarray      # (3,) then
+
+    stamp_ns: int  # of the scan that showed it
+    odom_from_base: np.ndarray  # (3,) then
     meetpoint: Meetpoint
     traversal: Optional[Traversal]  # None: it was sought, not reached along an edge that began at a meetpoint
 
@@ -88,10 +90,11 @@ class Arrival:
 @dataclass(frozen=True)
 class Progress:
     """Where the driver is."""
+
     phase: str
-    reason: str          # one sentence
-    travelled_m: float   # since the last meetpoint
-    failure: str = ""    # NO_GRAPH or BLOCKED if FAILED
+    reason: str  # one sentence
+    travelled_m: float  # since the last meetpoint
+    failure: str = ""  # NO_GRAPH or BLOCKED if FAILED
 
 
 class EdgeDriver:
@@ -101,20 +104,20 @@ class EdgeDriver:
     _phase: str
     _reason: str
     _failure: str
-    _way: Optional[Polyline]       # that it drives along; None: none known yet
-    _trace: Optional[Trace]        # of the edge so far; None: no edge that began at a meetpoint
-    _rank: int                     # by which the edge left
-    _near_start_m: float           # nodes so near to its beginning are that
-    _target: np.ndarray            # (2,) the node that it homes to
-    _looking: bool                 # it stands there, or brakes, and looks
-    _looks: int                    # graphs since then
-    _nodes: List[Node]             # what was there in these
-    _dismissed: List[np.ndarray]   # (2,) places that turned out to be no nodes
-    _swept: bool                   # it has turned round once to see more
-    _sweep_rad: float              # what is left of that turn
-    _yaw: float                    # at the last command
+    _way: Optional[Polyline]  # that it drives along; None: none known yet
+    _trace: Optional[Trace]  # of the edge so far; None: no edge that began at a meetpoint
+    _rank: int  # by which the edge left
+    _near_start_m: float  # nodes so near to its beginning are that
+    _target: np.ndarray  # (2,) the node that it homes to
+    _looking: bool  # it stands there, or brakes, and looks
+    _looks: int  # graphs since then
+    _nodes: List[Node]  # what was there in these
+    _dismissed: List[np.ndarray]  # (2,) places that turned out to be no nodes
+    _swept: bool  # it has turned round once to see more
+    _sweep_rad: float  # what is left of that turn
+    _yaw: float  # at the last command
     _blocked_s: float
-    _lost_since_ns: int            # no graph has had its line since then; 0: the last one has
+    _lost_since_ns: int  # no graph has had its line since then; 0: the last one has
 
     def __init__(self, p: EdgeDriverParams = EdgeDriverParams()) -> None:
         self._p = p
@@ -130,13 +133,13 @@ class EdgeDriver:
         self._graph: Optional[LocalGraph] = None
         self._graph_ns = 0
         self._scans = 0
-        self._scan: Optional[Scan] = None   # the last one
-        self._points_m = np.zeros((0, 2))   # of the last scan, in odom
-        self._walls_m = np.zeros((0, 2))    # of the local map near the robot, in odom
+        self._scan: Optional[Scan] = None  # the last one
+        self._points_m = np.zeros((0, 2))  # of the last scan, in odom
+        self._walls_m = np.zeros((0, 2))  # of the local map near the robot, in odom
         self._pose = np.zeros(3)
         self._stamp_ns = 0
         self._velocity = np.zeros(3)
-        self._node: Optional[Node] = None   # where it stands, or began
+        self._node: Optional[Node] = None  # where it stands, or began
         self._arrival: Optional[Arrival] = None
         self._halted: Optional[Tuple[str, Optional[Trace], int, Optional[Polyline]]] = None
         self._begin(IDLE, "nothing to do")
@@ -249,13 +252,13 @@ class EdgeDriver:
         return self._at.now(odom_from_base)
 
     def obstacles_m(self, odom_from_base: np.ndarray) -> np.ndarray:
-        """(K, 2) what stands near the robot at that pose (3,), in its frame: the last scan, the walls of the local map.
-        """
+        """(K, 2) what stands near the robot at that pose (3,), in its frame: the last scan, the walls of the local map."""
         return self._obstacles_at(self._at.now(odom_from_base))
 
     def _obstacles_at(self, pose: np.ndarray) -> np.ndarray:
-        points, walls = (among[np.abs(among - pose[:2]).max(axis=1) < _NEAR_M]
-                         for among in (self._points_m, self._walls_m))
+        points, walls = (
+            among[np.abs(among - pose[:2]).max(axis=1) < _NEAR_M] for among in (self._points_m, self._walls_m)
+        )
         if len(points) and len(walls):  # what the scan shows now it shows better than the cells do
             walls = walls[cKDTree(points).query(walls, distance_upper_bound=_SEEN_M)[0] > _SEEN_M]
         return se2.transform_points(se2.inverse(pose), np.concatenate([points, walls]))
@@ -276,7 +279,7 @@ class EdgeDriver:
         if self._phase in _DRIVING:
             if self._sweep_rad > 0.0:
                 self._sweep_rad -= turned
-                if self._scans >= _LEAST_SCANS:
+                if self._scans >= _MIN_SCANS:
                     wanted[2] = self._p.limits.max_turn_rad_s
             elif self._way is not None and not self._looking:
                 wanted = self._along_way(self._way, pose)
@@ -309,8 +312,11 @@ class EdgeDriver:
     def _note_blocked(self, wanted: np.ndarray, safe: np.ndarray, dt_s: float) -> None:
         stuck = wanted[0] > 0.02 and safe[0] < 0.03
         self._blocked_s = self._blocked_s + dt_s if stuck else 0.0
-        if self._phase == HOMING and self._blocked_s > 1.0 and float(
-                np.hypot(*(self._pose[:2] - self._target))) < _ALMOST_M:
+        if (
+            self._phase == HOMING
+            and self._blocked_s > 1.0
+            and float(np.hypot(*(self._pose[:2] - self._target))) < _ALMOST_M
+        ):
             self._begin_looking()
         elif self._blocked_s > _BLOCKED_S:
             assert self._way is not None
@@ -319,8 +325,10 @@ class EdgeDriver:
                 self._home(self._way.points[-1], self._way.points)
                 self._begin_looking()
             else:
-                self._fail(BLOCKED, f"something stands in the way, {remaining_m:.1f} m before the end of what is seen "
-                                    "of the edge")
+                self._fail(
+                    BLOCKED,
+                    f"something stands in the way, {remaining_m:.1f} m before the end of what is seen of the edge",
+                )
 
     # -- thinking, once for each graph
 
@@ -335,7 +343,7 @@ class EdgeDriver:
         reach = int(_NEAR_M / grid.resolution_m)
         row, column = (int(index) for index in grid.cells(self._pose[:2]))
         top, left = max(row - reach, 0), max(column - reach, 0)
-        rows, columns = np.nonzero(grid.occupied[top:row + reach, left:column + reach])
+        rows, columns = np.nonzero(grid.occupied[top : row + reach, left : column + reach])
         self._walls_m = grid.centres(rows + top, columns + left)
 
     def _think(self) -> None:
@@ -488,7 +496,7 @@ class EdgeDriver:
                     return
                 self._arrive(latest[-1])
                 return
-        if self._looks >= _MOST_LOOKS and not self._home_to_nearer_end(graph):
+        if self._looks >= _MAX_LOOKS and not self._home_to_nearer_end(graph):
             self._dismiss()
 
     def _home_to_nearer_end(self, graph: LocalGraph) -> bool:
@@ -496,8 +504,9 @@ class EdgeDriver:
         if self._trace is None:
             return False
         position = graph.graph.position_m
-        ends = np.flatnonzero((graph.degree == 1) & self._counts(graph)
-                              & (np.hypot(*(position - self._target).T) < _BEHIND_M))
+        ends = np.flatnonzero(
+            (graph.degree == 1) & self._counts(graph) & (np.hypot(*(position - self._target).T) < _BEHIND_M)
+        )
         trace = cKDTree(self._trace.way_m)
         for node in ends[np.argsort(np.hypot(*(position[ends] - self._pose[:2]).T))].tolist():
             passed = trace.query(position[node])[0] < _SAME_NODE_M
@@ -521,9 +530,12 @@ class EdgeDriver:
             past = edge_report.bearing_back(back)
         else:
             past = float(self._pose[2]) + math.pi
-        return Node(position, float(found.r_m[node]), edge_report.sigma_r_m(float(found.spread_m[node]),
-                                                                           float(found.doubt_m[node])),
-                    edge_report.ranked(branches, past))
+        return Node(
+            position,
+            float(found.r_m[node]),
+            edge_report.sigma_r_m(float(found.spread_m[node]), float(found.doubt_m[node])),
+            edge_report.ranked(branches, past),
+        )
 
     def _arrive(self, node: Node) -> None:
         assert self._grid is not None
@@ -559,8 +571,7 @@ class EdgeDriver:
         """Stand, and remember what it did; what it remembers already stays if it did nothing."""
         if self._phase in _DRIVING and self._phase != RETURNING:
             seeking = self._trace is None
-            self._halted = (
-                SEEKING if seeking else FOLLOWING, self._trace, self._rank, self._way)
+            self._halted = (SEEKING if seeking else FOLLOWING, self._trace, self._rank, self._way)
         trace = self._trace
         self._begin(phase, reason)
         self._trace = trace

@@ -14,24 +14,25 @@ import numpy as np
 
 from glass_nav.driving.local_graph import Branch
 from glass_nav.geometry import angles, se2, segments
-from glass_nav.topology import atlas_builder
-from glass_nav.topology.edge_views import EdgeViews, ViewParams
+from glass_nav.topology.atlas import atlas_builder
+from glass_nav.topology.atlas.edge_views import EdgeViews, ViewParams
 from glass_nav.topology.observations import Meetpoint, Traversal
 from glass_nav.world.grid_map import GridMap
 
-_WOBBLE_M = 0.04   # of a line between one graph and the next
+_WOBBLE_M = 0.04  # of a line between one graph and the next
 _R_SIGMA_M = 0.03  # of an equidistance, besides what its obstacles leave open
-_LEAST_TRACE_M = 0.05
+_MIN_TRACE_M = 0.05
 _LATE_POINTS = 40  # of a trace: a robot backs off by no more
 
 
 @dataclass(frozen=True)
 class Node:
     """A meetpoint in the frame odom."""
-    position_m: np.ndarray    # (2,)
+
+    position_m: np.ndarray  # (2,)
     r_m: float
     sigma_r_m: float
-    branches: List[Branch]    # by rank: the edge it came along first, then clockwise
+    branches: List[Branch]  # by rank: the edge it came along first, then clockwise
 
     @property
     def degree(self) -> int:
@@ -46,12 +47,12 @@ class Trace:
 
     def add(self, point_m: np.ndarray) -> None:
         """Where the robot is on the edge now; small steps are left out, what it backed off from is forgotten."""
-        if np.hypot(*(point_m - self._points[-1])) < _LEAST_TRACE_M:
+        if np.hypot(*(point_m - self._points[-1])) < _MIN_TRACE_M:
             return
         late = np.array(self._points[1:][-_LATE_POINTS:]).reshape(-1, 2)
-        passed = np.flatnonzero(np.hypot(*(late - point_m).T) < _LEAST_TRACE_M)
+        passed = np.flatnonzero(np.hypot(*(late - point_m).T) < _MIN_TRACE_M)
         if len(passed):
-            del self._points[len(self._points) - len(late) + int(passed[0]) + 1:]
+            del self._points[len(self._points) - len(late) + int(passed[0]) + 1 :]
         else:
             self._points.append(np.array(point_m, float))
 
@@ -59,12 +60,12 @@ class Trace:
         """The edge ended there already, behind the robot: forget what was driven beyond."""
         points = np.array(self._points)
         nearest = int(np.hypot(*(points - point_m).T).argmin())
-        self._points = self._points[:max(nearest, 1)]
+        self._points = self._points[: max(nearest, 1)]
 
     def line_m(self, end_m: np.ndarray) -> np.ndarray:
         """(n, 2) without wobbles, up to a point."""
         points = np.array(self._points)
-        near_end = np.hypot(*(points[1:] - end_m).T) < _LEAST_TRACE_M
+        near_end = np.hypot(*(points[1:] - end_m).T) < _MIN_TRACE_M
         points = np.concatenate([points[:1], points[1:][~near_end], [end_m]])
         return points[segments.corners(points, _WOBBLE_M)]
 
@@ -87,7 +88,7 @@ def ranked(branches: Sequence[Branch], back_rad: float) -> List[Branch]:
 
 def sigma_r_m(spread_m: float, doubt_m: float) -> float:
     """Of an equidistance, from what the graph says of a node."""
-    return math.sqrt(_R_SIGMA_M ** 2 + spread_m ** 2 + doubt_m ** 2)
+    return math.sqrt(_R_SIGMA_M**2 + spread_m**2 + doubt_m**2)
 
 
 def meetpoint(node: Node, odom_from_base: np.ndarray, stamp_ns: int) -> Meetpoint:
@@ -115,8 +116,14 @@ def traversal(line_m: np.ndarray, rank: int, grid: GridMap) -> Traversal:
     seen, _ = EdgeViews(grid, ViewParams()).of(line_m)
     start_from_odom = se2.inverse(np.array([line_m[0, 0], line_m[0, 1], leaving]))
     rows = se2.transform_points(start_from_odom, seen.reshape(-1, 2)).reshape(-1, 4)
-    return Traversal(rank, length, chord, chord_bearing_rad=bearing,
-                     turn_rad=float(angles.wrap(back + math.pi - leaving)), segments_m=rows)
+    return Traversal(
+        rank,
+        length,
+        chord,
+        chord_bearing_rad=bearing,
+        turn_rad=float(angles.wrap(back + math.pi - leaving)),
+        segments_m=rows,
+    )
 
 
 def bearing_back(line_m: np.ndarray) -> float:

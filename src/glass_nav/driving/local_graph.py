@@ -11,21 +11,22 @@ from typing import List, Optional, Tuple
 
 import numpy as np
 
-from glass_nav.topology import atlas_builder, voronoi_graph
-from glass_nav.topology.voronoi_graph import VoronoiGraph, VoronoiParams
+from glass_nav.topology.atlas import atlas_builder, voronoi_graph
+from glass_nav.topology.atlas.voronoi_graph import VoronoiGraph, VoronoiParams
 from glass_nav.world.grid_map import GridMap
 
-_THICKER_M = 0.03   # walls of the local map than those of a drawn one: noise of the ranges
-_ALONG_COS = 0.35   # an edge that turns away by more than 70 degrees is another one
+_THICKER_M = 0.03  # walls of the local map than those of a drawn one: noise of the ranges
+_ALONG_COS = 0.35  # an edge that turns away by more than 70 degrees is another one
 
 
 @dataclass(frozen=True)
 class Ahead:
     """An edge from a point of it to the node at its end."""
-    way_m: np.ndarray   # (n, 2), the point first
-    node: int           # where it ends
+
+    way_m: np.ndarray  # (n, 2), the point first
+    node: int  # where it ends
     edge: int
-    end: int            # 1: it runs as the edge's line does; 0: against it
+    end: int  # 1: it runs as the edge's line does; 0: against it
     back_m: np.ndarray  # (k, 2) the rest of the edge, from the point to the node at the other end
     back_node: int
 
@@ -33,8 +34,9 @@ class Ahead:
 @dataclass(frozen=True)
 class Branch:
     """A way that leaves a node."""
+
     bearing_rad: float  # as in the atlas, from the node to the point BEARING_AT_M along
-    way_m: np.ndarray   # (n, 2) from the node on
+    way_m: np.ndarray  # (n, 2) from the node on
 
 
 def params_beside(atlas: VoronoiParams) -> VoronoiParams:
@@ -116,8 +118,7 @@ class LocalGraph:
         found: List[Branch] = []
         for line, ends in zip(self.graph.lines_m, self.graph.edge_node.tolist()):
             bearings = atlas_builder.bearings(line)
-            found += [Branch(bearings[side], line[::-1] if side else line)
-                      for side in (0, 1) if ends[side] == node]
+            found += [Branch(bearings[side], line[::-1] if side else line) for side in (0, 1) if ends[side] == node]
         return sorted(found, key=lambda branch: -branch.bearing_rad)
 
     def walk(self, start: Ahead, wanted: "np.ndarray") -> Tuple[np.ndarray, int]:
@@ -133,8 +134,7 @@ class LocalGraph:
             way, node = np.concatenate([way, line[1:]]), int(self.graph.edge_node[edge, end])
         return way, node
 
-    def _straight_on(self, node: int, edge: int, end: int,
-                     way: np.ndarray) -> Optional[Tuple[int, int, np.ndarray]]:
+    def _straight_on(self, node: int, edge: int, end: int, way: np.ndarray) -> Optional[Tuple[int, int, np.ndarray]]:
         heading = direction_at_end(way)
         best, chosen = -2.0, None
         for other, ends in enumerate(self.graph.edge_node.tolist()):

@@ -26,24 +26,25 @@ from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import UNKNOWN, GridMap
 
 FREE, OCCUPIED = 0, 100
-_FORGET_AT = 60    # beams counted in a cell from one direction: halved, so that what is new counts
-_BEFORE_M = 0.05   # so near in front of where a beam ended it proves nothing: noise, and the cell's own size
-_LEAST_PIECE = 4   # cells of a pane that give a line
+_FORGET_AT = 60  # beams counted in a cell from one direction: halved, so that what is new counts
+_BEFORE_M = 0.05  # so near in front of where a beam ended it proves nothing: noise, and the cell's own size
+_MIN_PIECE = 4  # cells of a pane that give a line
 _LOOK_PER_ROOM = 1.9  # of a meetpoint r from its obstacles all ways show that are longer than 1.6 r, and a little more
 
 
 @dataclass(frozen=True)
 class LocalMapParams:
     """Lengths in metres."""
-    window_m: float = 20.0           # edge of the square around the robot
-    narrow_window_m: float = 12.0    # of it, so much is looked at in narrow places, more in wide ones
-    resolution_m: float = 0.05       # edge of a cell; that of the atlas' map
-    directions: int = 16             # of beams, told apart
-    least_ends: int = 2              # beams that must have ended in a cell from one direction ...
-    least_share: float = 0.15        # ... and at least this share of those that came about that way
-    unanswered_m: float = 4.0        # a beam that did not come back proves free space so far at most
-    extend_glass_m: float = 0.6      # how far beyond what was seen of it a pane is taken to go on; 0: not
-    robot_radius_m: float = 0.22     # where the robot stands there is room for it
+
+    window_m: float = 20.0  # edge of the square around the robot
+    narrow_window_m: float = 12.0  # of it, so much is looked at in narrow places, more in wide ones
+    resolution_m: float = 0.05  # edge of a cell; that of the atlas' map
+    directions: int = 16  # of beams, told apart
+    least_ends: int = 2  # beams that must have ended in a cell from one direction ...
+    least_share: float = 0.15  # ... and at least this share of those that came about that way
+    unanswered_m: float = 4.0  # a beam that did not come back proves free space so far at most
+    extend_glass_m: float = 0.6  # how far beyond what was seen of it a pane is taken to go on; 0: not
+    robot_radius_m: float = 0.22  # where the robot stands there is room for it
 
     def __post_init__(self) -> None:
         for name in ("window_m", "narrow_window_m", "resolution_m", "robot_radius_m", "unanswered_m"):
@@ -105,7 +106,7 @@ class LocalMap:
         direction = np.arctan2(y[cells // self._size, 0], x[0, cells % self._size])
         self._count(self._passed, self._direction(direction), cells)
         body = (x + laser[0] - odom_from_base[0]) ** 2 + (y + laser[1] - odom_from_base[1]) ** 2
-        self._stood |= body <= self._p.robot_radius_m ** 2
+        self._stood |= body <= self._p.robot_radius_m**2
 
     # -- what stands where
 
@@ -117,11 +118,12 @@ class LocalMap:
 
     def _worked_out(self) -> np.ndarray:
         likely = np.flatnonzero((self._ended >= self._p.least_ends).any(axis=0))  # few cells: the rest is quick
-        ended, passed = (counts.reshape(self._p.directions, -1)[:, likely].astype(np.int64)
-                         for counts in (self._ended, self._passed))
+        ended, passed = (
+            counts.reshape(self._p.directions, -1)[:, likely].astype(np.int64) for counts in (self._ended, self._passed)
+        )
         passed += np.roll(passed, 1, axis=0) + np.roll(passed, -1, axis=0)
         stands = (ended >= self._p.least_ends) & (ended >= self._p.least_share * (ended + passed))
-        occupied = np.zeros(self._size ** 2, bool)
+        occupied = np.zeros(self._size**2, bool)
         occupied[likely] = stands.any(axis=0)
         return occupied.reshape(self._size, self._size) & ~self._stood
 
@@ -154,8 +156,11 @@ class LocalMap:
         reach_m = min(max(0.5 * self._p.narrow_window_m, _LOOK_PER_ROOM * room_m), 0.5 * self._p.window_m)
         low = np.maximum(np.rint(at - reach_m / cell_m), 0).astype(np.int64)
         high = np.rint(at + reach_m / cell_m).astype(np.int64)
-        return GridMap(np.ascontiguousarray(whole.occupancy[low[1]:high[1], low[0]:high[0]]), cell_m,
-                       np.append((self._first + low) * cell_m, 0.0))
+        return GridMap(
+            np.ascontiguousarray(whole.occupancy[low[1] : high[1], low[0] : high[0]]),
+            cell_m,
+            np.append((self._first + low) * cell_m, 0.0),
+        )
 
     def _as_map(self, occupancy: np.ndarray) -> GridMap:
         return GridMap(occupancy, self._p.resolution_m, np.append(self._first * self._p.resolution_m, 0.0))
@@ -213,7 +218,7 @@ class LocalMap:
 
     def _count(self, counts: np.ndarray, direction: np.ndarray, cell: np.ndarray) -> None:
         """One more for each pair of direction and cell, once; both counts are halved where there are many."""
-        flat = np.unique(direction * self._size ** 2 + cell)
+        flat = np.unique(direction * self._size**2 + cell)
         counts = counts.reshape(-1)
         counts[flat] += 1
         many = flat[counts[flat] >= _FORGET_AT]
@@ -237,7 +242,7 @@ class LocalMap:
             label, count = ndimage.label(ended[direction] & glass, beside)
             for number, window in enumerate(ndimage.find_objects(label), start=1):
                 rows, columns = np.nonzero(label[window] == number)
-                if len(rows) < _LEAST_PIECE:
+                if len(rows) < _MIN_PIECE:
                     continue
                 points = np.column_stack([columns + window[1].start, rows + window[0].start]).astype(float)
                 for cells in self._beyond(points, direction):
@@ -246,7 +251,8 @@ class LocalMap:
 
     def _beyond(self, points: np.ndarray, direction: int) -> List[np.ndarray]:
         """Rows of column and row (k, 2) along the line of a piece (m, 2) of a pane, from either end outwards; none if
-        it is no line across that direction."""
+        it is no line across that direction.
+        """
         centre = points.mean(axis=0)
         values, vectors = np.linalg.eigh(np.cov((points - centre).T))
         along = vectors[:, 1]
@@ -257,8 +263,10 @@ class LocalMap:
         at = (points - centre) @ along
         reach = self._p.extend_glass_m / self._p.resolution_m
         steps = np.arange(0.5, reach, 0.5)
-        return [np.rint(centre + (end + sign * steps)[:, None] * along).astype(np.int64)
-                for end, sign in ((at.max(), 1.0), (at.min(), -1.0))]
+        return [
+            np.rint(centre + (end + sign * steps)[:, None] * along).astype(np.int64)
+            for end, sign in ((at.max(), 1.0), (at.min(), -1.0))
+        ]
 
     def _stand(self, cells: np.ndarray, more: np.ndarray, occupied: np.ndarray, passed: np.ndarray) -> None:
         """Mark cells in their order, until something stands there or beams passed."""

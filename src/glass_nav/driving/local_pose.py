@@ -12,17 +12,17 @@ from typing import Optional
 import numpy as np
 
 from glass_nav.geometry import se2
-from glass_nav.localization import scan_alignment
+from glass_nav.hypotheses import scan_alignment
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import GridMap
 
-_BEAMS = 180              # of a scan that are used
-_LEAST_BEAMS = 30         # that end near walls of the map
-_KNOWN_M = 0.3            # so near
+_BEAMS = 180  # of a scan that are used
+_MIN_BEAMS = 30  # that end near walls of the map
+_KNOWN_M = 0.3  # so near
 _HELD_PER_M2, _HELD_PER_RAD2 = 40.0, 40.0  # how firmly odometry holds, in beams
 _FIRST_M, _LAST_M = 0.1, 0.05  # scales of the alignment
-_MOST_M = 0.15            # it corrects no more at once: that would be another place
+_MAX_M = 0.15  # it corrects no more at once: that would be another place
 
 
 class LocalPose:
@@ -53,12 +53,12 @@ class LocalPose:
         points = points[np.isfinite(points).all(axis=1)]
         there = se2.transform_points(predicted, points)
         points = points[self._field.distance(there[:, 0], there[:, 1]) < _KNOWN_M]
-        if len(points) < _LEAST_BEAMS:
+        if len(points) < _MIN_BEAMS:
             return predicted
-        points = points[::max(len(points) // _BEAMS, 1)]
+        points = points[:: max(len(points) // _BEAMS, 1)]
         held = np.diag([_HELD_PER_M2, _HELD_PER_M2, _HELD_PER_RAD2])
         aligned = scan_alignment.align_near(self._field, points, predicted[None], held, 3, _FIRST_M, _LAST_M)[0]
-        if float(np.hypot(*(aligned[:2] - predicted[:2]))) > _MOST_M:
+        if float(np.hypot(*(aligned[:2] - predicted[:2]))) > _MAX_M:
             return predicted
         self.local_from_odom = se2.compose(aligned, se2.inverse(odom_from_base))
         return aligned

@@ -23,25 +23,26 @@ from glass_nav.driving.local_map import LocalMap, LocalMapParams
 from glass_nav.driving.local_pose import LocalPose
 from glass_nav.geometry import se2
 from glass_nav.sensing.scan import Scan
-from glass_nav.topology.voronoi_graph import VoronoiParams
+from glass_nav.topology.atlas.voronoi_graph import VoronoiParams
 
-_SAME_NODE_M = 0.3    # a node moves by no more from one graph to the next
+_SAME_NODE_M = 0.3  # a node moves by no more from one graph to the next
 _STILL_M, _STILL_RAD = 0.02, 0.05  # a robot that moved less since the last graph sees nothing new
-_AGREE = 5            # graphs next to the nearest point of the way whose word counts: some before, some after
-_FOOT_M = 1.0         # the robot follows an edge if it is no further away than this
+_AGREE = 5  # graphs next to the nearest point of the way whose word counts: some before, some after
+_FOOT_M = 1.0  # the robot follows an edge if it is no further away than this
 
 
 @dataclass(frozen=True)
 class PassingParams:
     """When a node counts as passed, and when as seen."""
-    near_m: float = 0.5           # the robot passes a node if it comes so near to it, in sight,
+
+    near_m: float = 0.5  # the robot passes a node if it comes so near to it, in sight,
     near_share_of_r: float = 0.5  # or nearer than this share of its distance from the obstacles
-    linger_m: float = 1.0         # it is watched for so much further than that, coming and going
-    graph_period_s: float = 0.3   # of the log, between two graphs,
-    graph_step_m: float = 0.15    # unless the robot moved so far
-    least_looks: int = 3          # graphs that must have a node
-    least_share: float = 0.5      # of those made next to the nearest point of the way
-    most_doubt_m: float = 0.15    # its obstacles are no further from any wall: the driver would look around first
+    linger_m: float = 1.0  # it is watched for so much further than that, coming and going
+    graph_period_s: float = 0.3  # of the log, between two graphs,
+    graph_step_m: float = 0.15  # unless the robot moved so far
+    least_looks: int = 3  # graphs that must have a node
+    least_share: float = 0.5  # of those made next to the nearest point of the way
+    most_doubt_m: float = 0.15  # its obstacles are no further from any wall: the driver would look around first
     graph: VoronoiParams = field(default_factory=VoronoiParams)  # as the atlas was built with
     local_map: LocalMapParams = field(default_factory=LocalMapParams)
 
@@ -65,31 +66,33 @@ class PassingParams:
 @dataclass(frozen=True)
 class PassedNode:
     """A node of the local graphs that the robot was near to."""
-    stamp_ns: int               # of the graph that had it and was made nearest to it
-    first_ns: int               # of the first graph that had it while the robot was about,
-    last_ns: int                # and of the last one
-    local_m: np.ndarray         # (2,) in the frame local
-    in_base_m: np.ndarray       # (2,) in the robot's frame at stamp_ns
-    away_m: float               # of the robot then
+
+    stamp_ns: int  # of the graph that had it and was made nearest to it
+    first_ns: int  # of the first graph that had it while the robot was about,
+    last_ns: int  # and of the last one
+    local_m: np.ndarray  # (2,) in the frame local
+    in_base_m: np.ndarray  # (2,) in the robot's frame at stamp_ns
+    away_m: float  # of the robot then
     degree: int
     r_m: float
     doubt_m: float
-    looks: int                  # graphs that had it
-    share: float                # of those next to the nearest point of the way, from first_ns on
+    looks: int  # graphs that had it
+    share: float  # of those next to the nearest point of the way, from first_ns on
 
 
 @dataclass(frozen=True)
 class WayPoint:
     """Where the robot was on the graph."""
+
     stamp_ns: int
-    local_m: np.ndarray         # (2,) the point of the graph nearest to the robot; the robot itself if none is near
+    local_m: np.ndarray  # (2,) the point of the graph nearest to the robot; the robot itself if none is near
 
 
 @dataclass(frozen=True)
 class _Look:
     stamp_ns: int
-    number: int                 # of the graph
-    position_m: np.ndarray      # (2,)
+    number: int  # of the graph
+    position_m: np.ndarray  # (2,)
     local_from_base: np.ndarray  # (3,)
     away_m: float
     degree: int
@@ -127,7 +130,7 @@ class PassingObserver:
         self._last_ns = 0
         self._last_pose: Optional[np.ndarray] = None  # at the last graph
         self.passed: List[PassedNode] = []  # all that were near, in the order in which the robot left them
-        self.way: List[WayPoint] = []       # one of each graph
+        self.way: List[WayPoint] = []  # one of each graph
 
     @property
     def params(self) -> PassingParams:
@@ -189,10 +192,20 @@ class PassingObserver:
         found = graph.graph
         away = np.hypot(*(found.position_m - pose[:2]).T)
         about = np.flatnonzero((graph.degree != 2) & (away <= self._p.near(found.r_m) + self._p.linger_m))
-        return [_Look(stamp_ns, self._graphs, found.position_m[node], pose, float(away[node]),
-                      int(graph.degree[node]), float(found.r_m[node]), float(found.doubt_m[node]))
-                for node in about[np.argsort(away[about], kind="stable")].tolist()
-                if graph.sees(pose[:2], found.position_m[node])]
+        return [
+            _Look(
+                stamp_ns,
+                self._graphs,
+                found.position_m[node],
+                pose,
+                float(away[node]),
+                int(graph.degree[node]),
+                float(found.r_m[node]),
+                float(found.doubt_m[node]),
+            )
+            for node in about[np.argsort(away[about], kind="stable")].tolist()
+            if graph.sees(pose[:2], found.position_m[node])
+        ]
 
     def _follow(self, look: _Look) -> None:
         """To the node that it shows, which no other look of this graph showed; a new one if there is none."""
@@ -209,11 +222,21 @@ class PassingObserver:
         agree = sorted(looks, key=lambda look: abs(look.number - nearest.number))[:_AGREE]
         degree = Counter(look.degree for look in agree).most_common(1)[0][0]
         local_m = np.median([look.position_m for look in agree], axis=0)
-        self.passed.append(PassedNode(
-            nearest.stamp_ns, looks[0].stamp_ns, looks[-1].stamp_ns, local_m,
-            se2.transform_points(se2.inverse(nearest.local_from_base), local_m), nearest.away_m, degree,
-            float(np.median([look.r_m for look in agree])), float(np.median([look.doubt_m for look in agree])),
-            len(looks), track.share()))
+        self.passed.append(
+            PassedNode(
+                nearest.stamp_ns,
+                looks[0].stamp_ns,
+                looks[-1].stamp_ns,
+                local_m,
+                se2.transform_points(se2.inverse(nearest.local_from_base), local_m),
+                nearest.away_m,
+                degree,
+                float(np.median([look.r_m for look in agree])),
+                float(np.median([look.doubt_m for look in agree])),
+                len(looks),
+                track.share(),
+            )
+        )
 
     def line_between(self, first: PassedNode, second: PassedNode) -> np.ndarray:
         """(n, 2) in the frame local: the edge that the robot followed from one node to the next."""

@@ -14,13 +14,13 @@ from glass_nav.driving import velocity
 from glass_nav.driving.base_limits import BaseLimits
 
 LATERAL_M_S2 = 0.4  # slower in bends
-CREEP = 0.04        # [m/s] or [rad/s], so that braking arrives
+CREEP = 0.04  # [m/s] or [rad/s], so that braking arrives
 
 
 def along_arc(to_point_m: np.ndarray, limits: BaseLimits, remaining_m: float = math.inf) -> np.ndarray:
     """The velocity along the arc to a point (2,) in the robot's frame, slow enough to stand after a way."""
     distance = max(math.hypot(to_point_m[0], to_point_m[1]), 1e-6)
-    curvature = 2.0 * float(to_point_m[1]) / distance ** 2
+    curvature = 2.0 * float(to_point_m[1]) / distance**2
     bend = max(abs(curvature), 1e-6)
     speed = min(limits.max_speed_m_s, limits.max_turn_rad_s / bend, math.sqrt(LATERAL_M_S2 / bend))
     if math.isfinite(remaining_m):

@@ -18,17 +18,17 @@ from glass_nav.driving.base_limits import BaseLimits
 from glass_nav.geometry import angles
 
 # what is going on
-NONE = "NONE"                # nothing to recover from
-WAIT = "WAIT"                # stands: people walk on
-BACK_OFF = "BACK_OFF"        # a little way back
-TURN = "TURN"                # once round, to see what is there
-RETRY = "RETRY"              # drive as before
+NONE = "NONE"  # nothing to recover from
+WAIT = "WAIT"  # stands: people walk on
+BACK_OFF = "BACK_OFF"  # a little way back
+TURN = "TURN"  # once round, to see what is there
+RETRY = "RETRY"  # drive as before
 NEXT_CHOICE = "NEXT_CHOICE"  # another way, if there is one
-ABORT = "ABORT"              # nothing helped
+ABORT = "ABORT"  # nothing helped
 
 LADDER = (WAIT, BACK_OFF, TURN, NEXT_CHOICE, ABORT)
 MOVES = (WAIT, BACK_OFF, TURN)
-STALL_TOLD_M = 0.4   # a base that was told to drive so far ...
+STALL_TOLD_M = 0.4  # a base that was told to drive so far ...
 STALL_MOVED_M = 0.1  # ... and did not come so far is held by something
 STILL_S = 2.0  # a base that makes no way for so long in a step cannot
 
@@ -36,6 +36,7 @@ STILL_S = 2.0  # a base that makes no way for so long in a step cannot
 @dataclass(frozen=True)
 class RecoveryParams:
     """How much of each."""
+
     recovery_wait_s: float = 3.0
     recovery_back_off_m: float = 0.3
     recovery_speed_m_s: float = 0.1
@@ -52,9 +53,10 @@ class RecoveryParams:
 @dataclass(frozen=True)
 class Step:
     """What to do now."""
+
     name: str
     command: np.ndarray  # (3,) wanted, by WAIT, BACK_OFF and TURN; else zero
-    reason: str          # one sentence
+    reason: str  # one sentence
 
 
 class Stall:
@@ -151,9 +153,15 @@ class Recovery:
         return np.zeros(3)
 
     def _reason(self) -> str:
-        return {NONE: "nothing is in the way", RETRY: "tries to go on", ABORT: f"gives up: {self._why}",
-                WAIT: f"waits: {self._why}", BACK_OFF: f"backs off: {self._why}", TURN: f"turns in place: {self._why}",
-                NEXT_CHOICE: f"takes another way: {self._why}"}[self._step]
+        return {
+            NONE: "nothing is in the way",
+            RETRY: "tries to go on",
+            ABORT: f"gives up: {self._why}",
+            WAIT: f"waits: {self._why}",
+            BACK_OFF: f"backs off: {self._why}",
+            TURN: f"turns in place: {self._why}",
+            NEXT_CHOICE: f"takes another way: {self._why}",
+        }[self._step]
 
     @staticmethod
     def _away_m(first: np.ndarray, second: np.ndarray) -> float:

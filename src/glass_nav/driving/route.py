@@ -16,11 +16,11 @@ import numpy as np
 from glass_nav.driving.base_limits import BaseLimits
 from glass_nav.geometry import polyline
 from glass_nav.geometry.polyline import Polyline
-from glass_nav.topology.atlas import DEAD_END, Atlas
+from glass_nav.topology.atlas.atlas import DEAD_END, Atlas
 from glass_nav.world.grid_map import GridMap
 
-STEP_M = 0.02     # of the points that are looked at along a straight line
-JOINED_M = 0.02   # points of a way nearer to each other are one
+STEP_M = 0.02  # of the points that are looked at along a straight line
+JOINED_M = 0.02  # points of a way nearer to each other are one
 
 
 class RouteError(ValueError):
@@ -30,8 +30,9 @@ class RouteError(ValueError):
 @dataclass(frozen=True)
 class Route:
     """A way along edges of the atlas."""
-    darts: Tuple[int, ...]    # in the order in which they are driven, the first and the last perhaps in part
-    polyline_m: np.ndarray    # (M, 2) in the frame map, from the robot to the goal; M is 1 if it stands there
+
+    darts: Tuple[int, ...]  # in the order in which they are driven, the first and the last perhaps in part
+    polyline_m: np.ndarray  # (M, 2) in the frame map, from the robot to the goal; M is 1 if it stands there
 
     @property
     def length_m(self) -> float:
@@ -41,6 +42,7 @@ class Route:
 @dataclass(frozen=True)
 class _Joint:
     """Where a place meets the graph."""
+
     edge: int
     way_m: float  # along the edge, as dart 2e runs
     off_m: float  # from the place
@@ -84,24 +86,33 @@ class RoutePlanner:
 
     def nearest_edge(self, point_m: np.ndarray, darts: Collection[int]) -> Optional[int]:
         """Of those of the darts, the edge nearest to a point (2,); None without darts."""
+
         def away_m(edge: int) -> float:
             line = self._lines[edge]
             return float(np.hypot(*(line.at(line.nearest(point_m)) - point_m)))
+
         edges = {dart >> 1 for dart in darts}
         return min(edges, key=away_m) if edges else None
 
     # -- the graph
 
-    def _route(self, from_m: np.ndarray, darts: "Optional[List[int]]", points: "List[np.ndarray]",
-               goal_m: Optional[np.ndarray], where: str) -> Route:
+    def _route(
+        self,
+        from_m: np.ndarray,
+        darts: "Optional[List[int]]",
+        points: "List[np.ndarray]",
+        goal_m: Optional[np.ndarray],
+        where: str,
+    ) -> Route:
         if darts is None:
             raise RouteError(f"no way along edges from x {from_m[0]:.2f} m, y {from_m[1]:.2f} m to {where}")
         ends = [] if goal_m is None else [np.asarray(goal_m, float)[None]]
         whole_m = _joined(np.concatenate([np.asarray(from_m, float)[None], *points, *ends]))
         return Route(tuple(darts), self._without_narrow_end(whole_m))
 
-    def _way(self, start: _Joint, end: Optional[_Joint], node: int,
-             avoided: Collection[int]) -> "Tuple[Optional[List[int]], List[np.ndarray]]":
+    def _way(
+        self, start: _Joint, end: Optional[_Joint], node: int, avoided: Collection[int]
+    ) -> "Tuple[Optional[List[int]], List[np.ndarray]]":
         """Darts and their points from a joint to another one or to a node; None: there is none."""
         from scipy.sparse import csgraph, csr_matrix  # slow to import
 
@@ -142,16 +153,21 @@ class RoutePlanner:
         """From a joint to both ends of its edge."""
         length_m = self._lines[joint.edge].length
         first, last = self._ends[joint.edge].tolist()
-        return [(joint.way_m, number, first, joint.edge, joint.way_m, 0.0),
-                (length_m - joint.way_m, number, last, joint.edge, joint.way_m, length_m)]
+        return [
+            (joint.way_m, number, first, joint.edge, joint.way_m, 0.0),
+            (length_m - joint.way_m, number, last, joint.edge, joint.way_m, length_m),
+        ]
 
     def _is_passable(self, edge: int, avoided: Collection[int]) -> bool:
         """Wide enough; one that ends in a corner is, up to there. Clearance 0 is not known."""
         if edge in avoided:
             return False
         clearance_m = float(self.atlas.edges.clearance_m[edge])
-        return (clearance_m == 0.0 or clearance_m >= self._limits.robot_radius_m
-                or bool((self.atlas.nodes.kind[self._ends[edge]] == DEAD_END).any()))
+        return (
+            clearance_m == 0.0
+            or clearance_m >= self._limits.robot_radius_m
+            or bool((self.atlas.nodes.kind[self._ends[edge]] == DEAD_END).any())
+        )
 
     # -- beside the graph
 
@@ -165,8 +181,10 @@ class RoutePlanner:
         for joint in sorted(joints, key=lambda each: each.off_m):
             if self._is_open(point, self._lines[joint.edge].at(joint.way_m)):
                 return joint
-        raise RouteError(f"{who} at x {point[0]:.2f} m, y {point[1]:.2f} m reaches no edge of the atlas "
-                         f"{self.atlas.name} in a straight line")
+        raise RouteError(
+            f"{who} at x {point[0]:.2f} m, y {point[1]:.2f} m reaches no edge of the atlas "
+            f"{self.atlas.name} in a straight line"
+        )
 
     def _without_narrow_end(self, points_m: np.ndarray) -> np.ndarray:
         """(n, 2) the way (M, 2) up to where the robot stands free for the last time."""
@@ -198,7 +216,7 @@ class RoutePlanner:
 
 def _edge_line(atlas: Atlas, edge: int) -> Polyline:
     """From node to node, by the line that the atlas has of the edge."""
-    ends = atlas.nodes.position_m[atlas.darts.node[2 * edge:2 * edge + 2]]
+    ends = atlas.nodes.position_m[atlas.darts.node[2 * edge : 2 * edge + 2]]
     points = _joined(np.concatenate([ends[:1], atlas.edges.polyline_m[edge], ends[1:]]))
     if len(points) < 2:  # a loop of which the atlas has no line
         points = np.array([ends[0], ends[0] + [JOINED_M, 0.0]])

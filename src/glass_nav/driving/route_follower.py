@@ -17,13 +17,14 @@ from glass_nav.driving.base_limits import BaseLimits
 from glass_nav.geometry import polyline, se2
 from glass_nav.geometry.polyline import Polyline
 
-TURN_FIRST_RAD = 0.8   # a point farther off to the side is turned to on the spot ...
-TURNED_RAD = 0.1       # ... until it is so near
+TURN_FIRST_RAD = 0.8  # a point farther off to the side is turned to on the spot ...
+TURNED_RAD = 0.1  # ... until it is so near
 
 
 @dataclass(frozen=True)
 class FollowerParams:
     """How a route is followed."""
+
     lookahead_m: float = 0.4
     goal_tolerance_m: float = 0.05
     goal_tolerance_rad: float = 0.05
@@ -37,14 +38,18 @@ class FollowerParams:
 class RouteFollower:
     """Commands a base along a route from wherever it is, and then to stand."""
 
-    def __init__(self, points_m: np.ndarray, limits: BaseLimits, p: FollowerParams = FollowerParams(),
-                 final_yaw_rad: Optional[float] = None) -> None:
-        """
-        Args:
-            points_m: (M, 2), M >= 1.
-            limits: of the base.
-            p: how.
-            final_yaw_rad: to stand with at the end; None: as it comes.
+    def __init__(
+        self,
+        points_m: np.ndarray,
+        limits: BaseLimits,
+        p: FollowerParams = FollowerParams(),
+        final_yaw_rad: Optional[float] = None,
+    ) -> None:
+        """Args:
+        points_m: (M, 2), M >= 1.
+        limits: of the base.
+        p: how.
+        final_yaw_rad: to stand with at the end; None: as it comes.
         """
         points = polyline.distinct(np.asarray(points_m, float))
         self._end_m = points[-1]

@@ -7,9 +7,8 @@ class SeekPolicy:
     """Told what happens to the robot, it says whether to seek; only so often in a row without success."""
 
     def __init__(self, attempts: int) -> None:
-        """
-        Args:
-            attempts: tasks of the search that may fail in a row, >= 1; then it is for others to go on.
+        """Args:
+        attempts: tasks of the search that may fail in a row, >= 1; then it is for others to go on.
         """
         self._attempts = attempts
         self.reset()
@@ -47,5 +46,4 @@ class SeekPolicy:
             waits: a search waits for a meetpoint.
             searching: one has begun and has not ended.
         """
-        return self._failures < self._attempts and (
-            not self._sought or waits or (searching and self._failures > 0))
+        return self._failures < self._attempts and (not self._sought or waits or (searching and self._failures > 0))

@@ -27,32 +27,35 @@ SUCCEEDED, BLOCKED, NO_GRAPH, NO_WAY = "SUCCEEDED", "BLOCKED", "NO_GRAPH", "NO_W
 GOING, RECOVERING = "GOING", "RECOVERING"
 
 HELD = "the robot makes no way, something that the lidar does not see may hold it"
-BLOCKED_S = 3.0        # braked to a standstill for so long
-OFF_ROUTE_M = 0.6      # then there is another route
+BLOCKED_S = 3.0  # braked to a standstill for so long
+OFF_ROUTE_M = 0.6  # then there is another route
 STANDSTILL_M_S = 0.03
 
 
 @dataclass(frozen=True)
 class Moment:
     """What is known at a control step."""
-    odom_from_base: np.ndarray           # (3,)
+
+    odom_from_base: np.ndarray  # (3,)
     map_from_base: Optional[np.ndarray]  # (3,); None: not localized
-    last_command: np.ndarray             # (3,)
-    dt_s: float                          # since then
+    last_command: np.ndarray  # (3,)
+    dt_s: float  # since then
 
 
 @dataclass(frozen=True)
 class Outcome:
     """How a task ended."""
-    code: str    # SUCCEEDED, BLOCKED, NO_GRAPH, NO_WAY, or another one of the actions
+
+    code: str  # SUCCEEDED, BLOCKED, NO_GRAPH, NO_WAY, or another one of the actions
     reason: str  # one sentence
 
 
 class Task(Protocol):
     """What the driver may be doing; none of it moves without step()."""
-    needs_pose: bool              # in the map
-    steers: bool                  # its commands go to the base; False: somebody else's do
-    outcome: Optional[Outcome]    # None: it goes on
+
+    needs_pose: bool  # in the map
+    steers: bool  # its commands go to the base; False: somebody else's do
+    outcome: Optional[Outcome]  # None: it goes on
 
     def step(self, now: Moment) -> np.ndarray:
         """(3,) the command of this control step; zero once there is an outcome."""
@@ -78,10 +81,15 @@ class EdgeTask:
 
     needs_pose, steers = False, True
 
-    def __init__(self, driver: EdgeDriver, p: RecoveryParams, limits: BaseLimits, rank: Optional[int] = None,
-                 may_choose: bool = False) -> None:
-        """
-        Args:
+    def __init__(
+        self,
+        driver: EdgeDriver,
+        p: RecoveryParams,
+        limits: BaseLimits,
+        rank: Optional[int] = None,
+        may_choose: bool = False,
+    ) -> None:
+        """Args:
             driver: asked at once to seek or to leave.
             p: of the recovery.
             limits: of the base.
@@ -183,17 +191,24 @@ class GoTask:
 
     needs_pose, steers = True, True
 
-    def __init__(self, planner: RoutePlanner, driver: EdgeDriver, follower: FollowerParams, p: RecoveryParams,
-                 limits: BaseLimits, goal: "int | np.ndarray", final_yaw_rad: Optional[float] = None) -> None:
-        """
-        Args:
-            planner: of the atlas.
-            driver: that sees the obstacles.
-            follower: how routes are followed.
-            p: of the recovery.
-            limits: of the base.
-            goal: a node, or a point (2,) of the map.
-            final_yaw_rad: to stand with; None: as it comes.
+    def __init__(
+        self,
+        planner: RoutePlanner,
+        driver: EdgeDriver,
+        follower: FollowerParams,
+        p: RecoveryParams,
+        limits: BaseLimits,
+        goal: "int | np.ndarray",
+        final_yaw_rad: Optional[float] = None,
+    ) -> None:
+        """Args:
+        planner: of the atlas.
+        driver: that sees the obstacles.
+        follower: how routes are followed.
+        p: of the recovery.
+        limits: of the base.
+        goal: a node, or a point (2,) of the map.
+        final_yaw_rad: to stand with; None: as it comes.
         """
         self._planner, self._driver, self._follower_params, self._limits = planner, driver, follower, limits
         self._recovery, self._stall = Recovery(p, limits), Stall()
@@ -247,12 +262,14 @@ class GoTask:
         self._stopped_s = self._stopped_s + now.dt_s if stuck else 0.0
         if self._stopped_s > BLOCKED_S:
             self._stopped_s = 0.0
-            self._recovery.begin(f"something stands in the way, {self.remaining_m:.1f} m before the goal",
-                                 now.odom_from_base)
+            self._recovery.begin(
+                f"something stands in the way, {self.remaining_m:.1f} m before the goal", now.odom_from_base
+            )
             return self._recover(now, obstacles_m)
         command = velocity.limited(safe, now.last_command, self._limits, now.dt_s)
-        command[0] = min(command[0], max(safe[0], now.last_command[0] - 2.0 * self._limits.max_acceleration_m_s2
-                                         * now.dt_s))  # what braking asks for comes first
+        command[0] = min(
+            command[0], max(safe[0], now.last_command[0] - 2.0 * self._limits.max_acceleration_m_s2 * now.dt_s)
+        )  # what braking asks for comes first
         return command
 
     def _plan(self, map_from_base: np.ndarray) -> None:
@@ -266,8 +283,7 @@ class GoTask:
             blocked = f", without the {len(self._avoided)} that are blocked" if self._avoided else ""
             self.outcome = Outcome(BLOCKED if self._avoided else NO_WAY, f"{err}{blocked}")
             return
-        self._follower = RouteFollower(self.route.polyline_m, self._limits, self._follower_params,
-                                       self._final_yaw_rad)
+        self._follower = RouteFollower(self.route.polyline_m, self._limits, self._follower_params, self._final_yaw_rad)
 
     def _recover(self, now: Moment, obstacles_m: np.ndarray) -> np.ndarray:
         self._stall.clear()

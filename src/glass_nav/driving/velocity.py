@@ -21,8 +21,13 @@ def limited(wanted: np.ndarray, last: np.ndarray, limits: BaseLimits, dt_s: floa
     """
     forward, turn = float(wanted[0]), float(wanted[2])
     share = min(1.0, limits.max_speed_m_s / max(abs(forward), 1e-9), limits.max_turn_rad_s / max(abs(turn), 1e-9))
-    return np.array([_approached(float(last[0]), share * forward, limits.max_acceleration_m_s2 * dt_s), 0.0,
-                     _approached(float(last[2]), share * turn, limits.max_turn_acceleration_rad_s2 * dt_s)])
+    return np.array(
+        [
+            _approached(float(last[0]), share * forward, limits.max_acceleration_m_s2 * dt_s),
+            0.0,
+            _approached(float(last[2]), share * turn, limits.max_turn_acceleration_rad_s2 * dt_s),
+        ]
+    )
 
 
 def braking_speed(way: float, acceleration: float) -> float:

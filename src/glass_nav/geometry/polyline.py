@@ -9,9 +9,8 @@ class Polyline:
     """Straight pieces from point to point."""
 
     def __init__(self, points: np.ndarray) -> None:
-        """
-        Args:
-            points: (W, 2), at least two, each apart from the one before; see distinct().
+        """Args:
+        points: (W, 2), at least two, each apart from the one before; see distinct().
         """
         self.points = points
         self._lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -30,7 +29,8 @@ class Polyline:
 
     def nearest(self, point: np.ndarray, from_way: float = 0.0, window: float = np.inf) -> float:
         """Way to the point of the line that is nearest to a point (2,), neither before from_way nor on a piece that
-        begins more than the window after it: a line may cross itself."""
+        begins more than the window after it: a line may cross itself.
+        """
         first, last = self._piece(from_way), self._piece(from_way + window)
         parts = slice(first, last + 1)
         along = ((point - self.points[:-1][parts]) * self._directions[parts]).sum(axis=1)

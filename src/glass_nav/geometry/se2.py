@@ -6,6 +6,8 @@ All functions broadcast over leading axes.
 
 from __future__ import annotations
 
+from typing import Tuple
+
 import numpy as np
 
 from glass_nav.geometry import angles
@@ -16,9 +18,14 @@ def compose(a_from_b: np.ndarray, b_from_c: np.ndarray) -> np.ndarray:
     a_from_b, b_from_c = np.asarray(a_from_b, float), np.asarray(b_from_c, float)
     cos, sin = angles.cos_sin(a_from_b[..., 2])
     x, y = b_from_c[..., 0], b_from_c[..., 1]
-    return np.stack(np.broadcast_arrays(a_from_b[..., 0] + cos * x - sin * y,
-                                        a_from_b[..., 1] + sin * x + cos * y,
-                                        angles.wrap(a_from_b[..., 2] + b_from_c[..., 2])), axis=-1)
+    return np.stack(
+        np.broadcast_arrays(
+            a_from_b[..., 0] + cos * x - sin * y,
+            a_from_b[..., 1] + sin * x + cos * y,
+            angles.wrap(a_from_b[..., 2] + b_from_c[..., 2]),
+        ),
+        axis=-1,
+    )
 
 
 def inverse(a_from_b: np.ndarray) -> np.ndarray:
@@ -34,5 +41,11 @@ def transform_points(a_from_b: np.ndarray, points_b: np.ndarray) -> np.ndarray:
     a_from_b, points_b = np.asarray(a_from_b, float), np.asarray(points_b, float)
     cos, sin = angles.cos_sin(a_from_b[..., 2])
     x, y = points_b[..., 0], points_b[..., 1]
-    return np.stack(np.broadcast_arrays(a_from_b[..., 0] + cos * x - sin * y,
-                                        a_from_b[..., 1] + sin * x + cos * y), axis=-1)
+    return np.stack(
+        np.broadcast_arrays(a_from_b[..., 0] + cos * x - sin * y, a_from_b[..., 1] + sin * x + cos * y), axis=-1
+    )
+
+
+def travelled(before_from_after: np.ndarray) -> Tuple[float, float]:
+    """Distance [m] and turn [rad], both >= 0, of one step of odometry (3,)."""
+    return float(np.hypot(*before_from_after[:2])), float(abs(angles.wrap(before_from_after[2])))

@@ -16,15 +16,16 @@ import numpy as np
 
 from glass_nav.geometry.segments import NO_SEGMENT
 
-_HALVINGS = 5          # of the squares that are looked at first
-_MOST_PAIRS = 4_000_000  # of points and segments at once
+_HALVINGS = 5  # of the squares that are looked at first
+_MAX_PAIRS = 4_000_000  # of points and segments at once
 _SLACK = 1e-9
 
 
 @dataclass(frozen=True)
 class Nearest:
     """Of each point."""
-    segment: np.ndarray   # (N,) int: the nearest one, the first of equals; NO_SEGMENT: there is none
+
+    segment: np.ndarray  # (N,) int: the nearest one, the first of equals; NO_SEGMENT: there is none
     distance: np.ndarray  # (N,) to it; inf: there is none
 
 
@@ -32,8 +33,7 @@ class SegmentIndex:
     """Segments, prepared to be asked often."""
 
     def __init__(self, segments: np.ndarray, square: float = 0.25, margin: float = 2.0) -> None:
-        """
-        Args:
+        """Args:
             segments: (S, 4) x1 y1 x2 y2; S = 0 is allowed.
             square: edge of the squares.
             margin: how far around the segments they reach; points beyond are looked up slowly.
@@ -115,13 +115,13 @@ class SegmentIndex:
 
     def _first_candidates(self, corner: np.ndarray, edge: float) -> Tuple[np.ndarray, np.ndarray]:
         """Pairs (K,), (K,) of a square and a segment that may be the nearest to a point in it."""
-        each = max(1, _MOST_PAIRS // len(self.segments))
+        each = max(1, _MAX_PAIRS // len(self.segments))
         of, candidate = [], []
         for begin in range(0, len(corner), each):
-            count = len(corner[begin:begin + each])
+            count = len(corner[begin : begin + each])
             square = np.repeat(np.arange(count), len(self.segments))
             segment = np.tile(np.arange(len(self.segments)), count)
-            kept = self._may_be_nearest(corner[begin:begin + each], edge, square, segment)
+            kept = self._may_be_nearest(corner[begin : begin + each], edge, square, segment)
             of.append(square[kept] + begin)
             candidate.append(segment[kept])
         return np.concatenate(of), np.concatenate(candidate)
@@ -129,8 +129,8 @@ class SegmentIndex:
     def _may_be_nearest(self, corner: np.ndarray, edge: float, of: np.ndarray, candidate: np.ndarray) -> np.ndarray:
         """(K,) bool of pairs of a square and a segment; each square has at least one, in pairs that are together."""
         distance = np.empty(len(of))
-        for begin in range(0, len(of), _MOST_PAIRS):
-            part = slice(begin, begin + _MOST_PAIRS)
+        for begin in range(0, len(of), _MAX_PAIRS):
+            part = slice(begin, begin + _MAX_PAIRS)
             centre = self._origin + (corner[of[part]] + 0.5) * edge
             distance[part] = np.sqrt(_squared(centre, self._rows[candidate[part]]))
         order = np.argsort(of, kind="stable")
@@ -144,7 +144,7 @@ def nearest_of_all(points: np.ndarray, segments: np.ndarray) -> Tuple[np.ndarray
     length = np.hypot(*(segments[:, 2:] - segments[:, :2]).T)
     rows = np.column_stack([segments[:, :2], (segments[:, 2:] - segments[:, :2]) / length[:, None], length])
     found, away = np.empty(len(points), np.int64), np.empty(len(points))
-    each = max(1, _MOST_PAIRS // len(segments))
+    each = max(1, _MAX_PAIRS // len(segments))
     for begin in range(0, len(points), each):
         part = slice(begin, begin + each)
         squared = _squared(points[part, None], rows)

@@ -21,7 +21,7 @@ def corners(points: np.ndarray, tolerance: float) -> np.ndarray:
         first, last = pieces.pop()
         if last - first < 2:
             continue
-        away = _away_from_chord(points[first:last + 1])
+        away = _away_from_chord(points[first : last + 1])
         furthest = int(away.argmax())
         if away[furthest] > tolerance:
             kept.append(first + furthest)
@@ -46,14 +46,14 @@ def split_and_merge(points: np.ndarray, tolerance: float, least_length: float) -
     ends = corners(points, tolerance).tolist()
     runs: List[Tuple[int, int]] = []
     for first, last in zip(ends[:-1], ends[1:]):
-        if runs and _away_from_line(points[runs[-1][0]:last + 1]).max() <= tolerance:
+        if runs and _away_from_line(points[runs[-1][0] : last + 1]).max() <= tolerance:
             first = runs.pop()[0]
         runs.append((first, last))
     segments: List[np.ndarray] = []
     for first, last in runs:
-        segment = fit(points[first:last + 1])
+        segment = fit(points[first : last + 1])
         if np.hypot(*(segment[2:] - segment[:2])) >= least_length:
-            label[first:last + 1] = len(segments)
+            label[first : last + 1] = len(segments)
             segments.append(segment)
     return np.array(segments).reshape(-1, 4), label
 

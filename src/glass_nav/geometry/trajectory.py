@@ -19,13 +19,15 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Trajectory:
     """Poses of one frame in another, by ascending time."""
+
     stamps_ns: np.ndarray  # (N,) int64, strictly ascending
-    poses: np.ndarray      # (N, 3) x [m], y [m], yaw [rad]
+    poses: np.ndarray  # (N, 3) x [m], y [m], yaw [rad]
 
     def __post_init__(self) -> None:
         if self.poses.shape != (len(self.stamps_ns), 3):
-            raise ValueError(f"expected stamps_ns (N,) and poses (N, 3), got "
-                             f"{self.stamps_ns.shape} and {self.poses.shape}")
+            raise ValueError(
+                f"expected stamps_ns (N,) and poses (N, 3), got {self.stamps_ns.shape} and {self.poses.shape}"
+            )
         if not np.all(np.diff(self.stamps_ns) > 0):
             raise ValueError("stamps of a trajectory must ascend")
 
@@ -37,8 +39,7 @@ class Trajectory:
         if not len(self):
             return np.zeros(np.shape(stamp_ns), bool)
         stamp_ns = np.asarray(stamp_ns)
-        return ((stamp_ns >= self.stamps_ns[0] - slack_ns)
-                & (stamp_ns <= self.stamps_ns[-1] + slack_ns))
+        return (stamp_ns >= self.stamps_ns[0] - slack_ns) & (stamp_ns <= self.stamps_ns[-1] + slack_ns)
 
     def at(self, stamp_ns: ArrayLike) -> np.ndarray:
         """Poses (..., 3) at stamps (...), linear in x, y and the shorter way in yaw.

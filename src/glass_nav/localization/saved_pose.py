@@ -17,13 +17,12 @@ import numpy as np
 import yaml
 
 from glass_nav.geometry import se2
-from glass_nav.localization import motion
-from glass_nav.localization.pose_quality import LOCALIZED, UNCERTAIN
+from glass_nav.localization.integrity.pose_state import LOCALIZED, UNCERTAIN
 
-_LEAST_DEVIATION = np.array([0.1, 0.1, 0.05])  # [m, m, rad] of a start: somebody may have leant against the robot
+_MIN_DEVIATION = np.array([0.1, 0.1, 0.05])  # [m, m, rad] of a start: somebody may have leant against the robot
 _DEVIATION_PER_M = np.array([0.1, 0.1, 0.05])  # of odometry while nobody looked
-_AT_ORIGIN_M, _AT_ORIGIN_RAD = 0.3, 0.3        # odometry that began anew and has hardly moved
-_SLACK_M = 0.1                                 # of odometry over any time
+_AT_ORIGIN_M, _AT_ORIGIN_RAD = 0.3, 0.3  # odometry that began anew and has hardly moved
+_SLACK_M = 0.1  # of odometry over any time
 _CLOCK_SLACK_S = 1.0
 
 
@@ -34,9 +33,10 @@ class SavedPoseError(ValueError):
 @dataclass(frozen=True)
 class PoseFile:
     """Where the pose is kept, and how long it holds."""
-    pose_file: str = ""                     # "": none
-    pose_file_max_age_s: float = 604800.0   # [s] a week
-    pose_file_max_speed_m_s: float = 2.0    # [m/s] odometry that went farther since is not that robot's
+
+    pose_file: str = ""  # "": none
+    pose_file_max_age_s: float = 604800.0  # [s] a week
+    pose_file_max_speed_m_s: float = 2.0  # [m/s] odometry that went farther since is not that robot's
 
     def __post_init__(self) -> None:
         for name in ("pose_file_max_age_s", "pose_file_max_speed_m_s"):
@@ -54,12 +54,13 @@ class PoseFile:
 @dataclass(frozen=True)
 class SavedPose:
     """A pose, and what it needs to be believed later."""
-    stamp_ns: int               # of the scan that it was worked out from
-    map_from_base: np.ndarray   # (3,)
-    covariance: np.ndarray      # (3, 3) of x [m], y [m], yaw [rad]
+
+    stamp_ns: int  # of the scan that it was worked out from
+    map_from_base: np.ndarray  # (3,)
+    covariance: np.ndarray  # (3, 3) of x [m], y [m], yaw [rad]
     odom_from_base: np.ndarray  # (3,) of odometry then
-    map_digest: str             # GridMap.digest
-    state: str                  # of the filter
+    map_digest: str  # GridMap.digest
+    state: str  # of the filter
 
 
 def save(path: Path, saved: SavedPose) -> None:
@@ -68,10 +69,17 @@ def save(path: Path, saved: SavedPose) -> None:
     Raises:
         OSError: it cannot be written.
     """
-    text = yaml.safe_dump({
-        "stamp_ns": int(saved.stamp_ns), "state": saved.state, "map": saved.map_digest,
-        "map_from_base": _numbers(saved.map_from_base), "covariance": [_numbers(row) for row in saved.covariance],
-        "odom_from_base": _numbers(saved.odom_from_base)}, sort_keys=False)
+    text = yaml.safe_dump(
+        {
+            "stamp_ns": int(saved.stamp_ns),
+            "state": saved.state,
+            "map": saved.map_digest,
+            "map_from_base": _numbers(saved.map_from_base),
+            "covariance": [_numbers(row) for row in saved.covariance],
+            "odom_from_base": _numbers(saved.odom_from_base),
+        },
+        sort_keys=False,
+    )
     handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     try:
         with open(handle, "w", encoding="utf-8") as file:
@@ -99,17 +107,25 @@ def load(path: Path) -> SavedPose:
         raise SavedPoseError(f"it cannot be read: {' '.join(str(err).split())}") from err
     if not isinstance(content, dict):
         raise SavedPoseError(f"it must hold names and values, got {type(content).__name__}")
-    stamp_ns, state, digest = (_entry(content, name, kind) for name, kind in (("stamp_ns", int), ("state", str),
-                                                                              ("map", str)))
+    stamp_ns, state, digest = (
+        _entry(content, name, kind) for name, kind in (("stamp_ns", int), ("state", str), ("map", str))
+    )
     covariance = _array(content, "covariance", (3, 3))
     if np.abs(covariance - covariance.T).max() > 1e-9 or np.linalg.eigvalsh(covariance).min() < -1e-9:
         raise SavedPoseError(f"its covariance must be symmetric and not negative, got {covariance.tolist()}")
-    return SavedPose(stamp_ns, _array(content, "map_from_base", (3,)), covariance,
-                     _array(content, "odom_from_base", (3,)), digest, state)
+    return SavedPose(
+        stamp_ns,
+        _array(content, "map_from_base", (3,)),
+        covariance,
+        _array(content, "odom_from_base", (3,)),
+        digest,
+        state,
+    )
 
 
-def resumed(saved: SavedPose, now_ns: int, map_digest: str, odom_from_base: np.ndarray,
-            limits: PoseFile) -> Tuple[np.ndarray, np.ndarray, str]:
+def resumed(
+    saved: SavedPose, now_ns: int, map_digest: str, odom_from_base: np.ndarray, limits: PoseFile
+) -> Tuple[np.ndarray, np.ndarray, str]:
     """Where the robot is now: pose (3,), covariance (3, 3), and in words why that is believed.
 
     Args:
@@ -132,21 +148,26 @@ def resumed(saved: SavedPose, now_ns: int, map_digest: str, odom_from_base: np.n
     if age_s > limits.pose_file_max_age_s:
         raise SavedPoseError(f"it is {age_s:.0f} s old, ~pose_file_max_age_s is {limits.pose_file_max_age_s:g} s")
     moved = se2.compose(se2.inverse(saved.odom_from_base), odom_from_base)
-    way_m = motion.travelled(moved)[0]
+    way_m = se2.travelled(moved)[0]
     if _is_new(odom_from_base) and not _is_new(saved.odom_from_base):
         moved, why = odom_from_base, "odometry began anew, the robot is taken to stand where it stood"
     elif way_m <= limits.pose_file_max_speed_m_s * max(age_s, 0.0) + _SLACK_M:
         why = f"odometry says that it moved by {way_m:.2f} m since"
     else:
-        raise SavedPoseError(f"odometry is {way_m:.2f} m away from where it was {age_s:.1f} s before, more than "
-                             f"~pose_file_max_speed_m_s = {limits.pose_file_max_speed_m_s:g} m/s allows")
-    deviation = _LEAST_DEVIATION + _DEVIATION_PER_M * motion.travelled(moved)[0]
-    return (se2.compose(saved.map_from_base, moved), saved.covariance + np.diag(deviation ** 2),
-            f"{age_s:.0f} s old; {why}")
+        raise SavedPoseError(
+            f"odometry is {way_m:.2f} m away from where it was {age_s:.1f} s before, more than "
+            f"~pose_file_max_speed_m_s = {limits.pose_file_max_speed_m_s:g} m/s allows"
+        )
+    deviation = _MIN_DEVIATION + _DEVIATION_PER_M * se2.travelled(moved)[0]
+    return (
+        se2.compose(saved.map_from_base, moved),
+        saved.covariance + np.diag(deviation**2),
+        f"{age_s:.0f} s old; {why}",
+    )
 
 
 def _is_new(odom_from_base: np.ndarray) -> bool:
-    way_m, turn_rad = motion.travelled(odom_from_base)
+    way_m, turn_rad = se2.travelled(odom_from_base)
     return bool(way_m <= _AT_ORIGIN_M and turn_rad <= _AT_ORIGIN_RAD)
 
 

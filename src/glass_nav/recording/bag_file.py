@@ -19,8 +19,16 @@ from glass_nav.geometry import se2
 from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.recording import frames, messages, trajectory_file
 from glass_nav.recording.frames import FrameError, FrameTree, Transform
-from glass_nav.recording.recording import (BeamTruth, Entry, LogOptions, Recording, RecordingError, Refusal, Step,
-                                           trajectory_from_samples)
+from glass_nav.recording.recording import (
+    BeamTruth,
+    Entry,
+    LogOptions,
+    Recording,
+    RecordingError,
+    Refusal,
+    Step,
+    trajectory_from_samples,
+)
 from glass_nav.sensing import deskew
 from glass_nav.sensing.scan import Scan, ScanError, scan_from_fields
 
@@ -53,9 +61,11 @@ def open_log(paths: Sequence[Path], options: LogOptions) -> Recording:
             base_frame = _base_frame(bag, tree, odometry, options)
             _check_laser(bag, scan_topic, tree, base_frame, options)
             notes += _turn_notes(bag, scan_topic, options.deskew)
-            truth = (_tf_truth(bag, tree, odometry, base_frame, scan_topic, options, notes)
-                     if (options.ground_truth or "").startswith(TF_SOURCE)
-                     else _ground_truth(bag, options.ground_truth, notes))
+            truth = (
+                _tf_truth(bag, tree, odometry, base_frame, scan_topic, options, notes)
+                if (options.ground_truth or "").startswith(TF_SOURCE)
+                else _ground_truth(bag, options.ground_truth, notes)
+            )
             truth_topic = _true_beams_topic(bag, options.true_beams, notes)
             scan_count = bag.count(scan_topic)
         except RecordingError as err:  # it may be missing because of the damage
@@ -86,8 +96,9 @@ class Bag:
         try:
             from rosbags.highlevel import AnyReader
         except ImportError as err:
-            raise RecordingError(f"{self.path}: reading bags needs the Python package rosbags "
-                                 f"(pip install rosbags): {err}") from err
+            raise RecordingError(
+                f"{self.path}: reading bags needs the Python package rosbags (pip install rosbags): {err}"
+            ) from err
         try:
             self._reader = AnyReader(self.paths, default_typestore=messages.ros2_store())
             self._reader.open()
@@ -101,12 +112,13 @@ class Bag:
     @property
     def topics(self) -> Dict[str, str]:
         """Topic -> message type as ROS 1 writes it, sorted by topic."""
-        return {connection.topic: connection.msgtype.replace("/msg/", "/")
-                for connection in sorted(self._reader.connections, key=lambda each: str(each.topic))}
+        return {
+            connection.topic: connection.msgtype.replace("/msg/", "/")
+            for connection in sorted(self._reader.connections, key=lambda each: str(each.topic))
+        }
 
     def count(self, topic: str) -> int:
-        return int(sum(connection.msgcount for connection in self._reader.connections
-                       if connection.topic == topic))
+        return int(sum(connection.msgcount for connection in self._reader.connections if connection.topic == topic))
 
     def topics_of(self, *kinds: str) -> List[str]:
         return [topic for topic, kind in self.topics.items() if kind in kinds]
@@ -130,8 +142,10 @@ class Bag:
             except StopIteration:
                 return
             except Exception as err:  # noqa: BLE001  rosbags lets errors of struct, asserts and codecs through
-                self.damage = (f"the bag is damaged, {' and '.join(topics)} cannot be read after {count} messages"
-                               f" ({_first_line(err)})")
+                self.damage = (
+                    f"the bag is damaged, {' and '.join(topics)} cannot be read after {count} messages"
+                    f" ({_first_line(err)})"
+                )
                 return
             count += 1
             yield connection, recorded_ns, message
@@ -152,6 +166,7 @@ class Bag:
 @dataclass(frozen=True)
 class _Odometry:
     """Where odom_from_base comes from: a frame of tf, or a topic."""
+
     frame: Optional[str] = None
     trajectory: Optional[Trajectory] = None
     child_frame: str = ""
@@ -191,8 +206,13 @@ def _frame_tree(bag: Bag) -> FrameTree:
         for stamped in message.transforms:
             transform = _transform(stamped.transform.translation, stamped.transform.rotation)
             if transform is not None:
-                tree.add(stamped.header.frame_id, stamped.child_frame_id, _stamp_ns(stamped.header),
-                         transform, static=topic.endswith("tf_static"))
+                tree.add(
+                    stamped.header.frame_id,
+                    stamped.child_frame_id,
+                    _stamp_ns(stamped.header),
+                    transform,
+                    static=topic.endswith("tf_static"),
+                )
     return tree
 
 
@@ -206,18 +226,23 @@ def _odometry(bag: Bag, tree: FrameTree, options: LogOptions, notes: List[str]) 
             notes.append(f"odometry from tf {odom_frame} <- {base}")
             return _Odometry(frame=odom_frame)
         if options.odom_frame is not None:
-            raise RecordingError(f"{bag.path}: no transform {odom_frame} <- {' or '.join(bases)}; "
-                                 f"frames in tf: {', '.join(tree.frames) or 'none'}")
+            raise RecordingError(
+                f"{bag.path}: no transform {odom_frame} <- {' or '.join(bases)}; "
+                f"frames in tf: {', '.join(tree.frames) or 'none'}"
+            )
         found = bag.topics_of(ODOMETRY)
         if options.ground_truth is not None:  # a reference is no odometry, even where it has the type
             found = [topic for topic in found if topic.lstrip("/") != options.ground_truth.lstrip("/")]
         found = [topic for topic in found if topic not in ("/ground_truth",)]
         if not found:
-            raise RecordingError(f"{bag.path}: no odometry: no transform {odom_frame} <- {' or '.join(bases)} "
-                                 f"in tf and no topic of {ODOMETRY}; it has {bag.listing()}")
+            raise RecordingError(
+                f"{bag.path}: no odometry: no transform {odom_frame} <- {' or '.join(bases)} "
+                f"in tf and no topic of {ODOMETRY}; it has {bag.listing()}"
+            )
         if len(found) > 1 and "/odom" not in found:
-            raise RecordingError(f"{bag.path}: {len(found)} topics of {ODOMETRY} ({', '.join(found)}), "
-                                 "choose one with --odom-topic")
+            raise RecordingError(
+                f"{bag.path}: {len(found)} topics of {ODOMETRY} ({', '.join(found)}), choose one with --odom-topic"
+            )
         topic = found[0] if len(found) == 1 else "/odom"
     else:
         topic = bag.check_topic(options.odom_topic, ODOMETRY)
@@ -241,12 +266,16 @@ def _check_laser(bag: Bag, scan_topic: str, tree: FrameTree, base_frame: str, op
     for _, message in bag.messages(scan_topic):
         laser_frame = message.header.frame_id.lstrip("/")
         if not laser_frame:
-            raise RecordingError(f"{bag.path}: the scans on {scan_topic} have no frame_id; "
-                                 "say where the laser is with --laser-pose X Y YAW")
+            raise RecordingError(
+                f"{bag.path}: the scans on {scan_topic} have no frame_id; "
+                "say where the laser is with --laser-pose X Y YAW"
+            )
         if laser_frame != base_frame and not tree.connected(base_frame, laser_frame):
-            raise RecordingError(f"{bag.path}: no transform {base_frame} <- {laser_frame} for the laser on "
-                                 f"{scan_topic}; frames in tf: {', '.join(tree.frames) or 'none'}; "
-                                 "say where it is with --laser-pose X Y YAW")
+            raise RecordingError(
+                f"{bag.path}: no transform {base_frame} <- {laser_frame} for the laser on "
+                f"{scan_topic}; frames in tf: {', '.join(tree.frames) or 'none'}; "
+                "say where it is with --laser-pose X Y YAW"
+            )
         return
 
 
@@ -263,18 +292,26 @@ def _turn_notes(bag: Bag, scan_topic: str, straighten: bool) -> List[str]:
     return []
 
 
-def _tf_truth(bag: Bag, tree: FrameTree, odometry: _Odometry, base_frame: str, scan_topic: str, options: LogOptions,
-              notes: List[str]) -> Trajectory:
+def _tf_truth(
+    bag: Bag,
+    tree: FrameTree,
+    odometry: _Odometry,
+    base_frame: str,
+    scan_topic: str,
+    options: LogOptions,
+    notes: List[str],
+) -> Trajectory:
     """Where tf says the robot is in the map, at the stamp of each scan that it covers.
 
     As tf answers afterwards: between two transforms map <- odom it interpolates.
     """
-    map_frame = (options.ground_truth or "")[len(TF_SOURCE):].lstrip("/")
+    map_frame = (options.ground_truth or "")[len(TF_SOURCE) :].lstrip("/")
     odom_frame = (options.odom_frame or odometry.frame or "odom").lstrip("/")
     whole = tree.connected(map_frame, base_frame)  # else odometry has a topic of its own
     if not whole and not (odometry.frame is None and tree.connected(map_frame, odom_frame)):
-        raise RecordingError(f"{bag.path}: no transform {map_frame} <- {base_frame}; frames in tf: "
-                             f"{', '.join(tree.frames) or 'none'}")
+        raise RecordingError(
+            f"{bag.path}: no transform {map_frame} <- {base_frame}; frames in tf: {', '.join(tree.frames) or 'none'}"
+        )
     stamps: List[int] = []
     poses: List[Tuple[float, float, float]] = []
     for _, message in bag.messages(scan_topic):
@@ -283,16 +320,19 @@ def _tf_truth(bag: Bag, tree: FrameTree, odometry: _Odometry, base_frame: str, s
             if whole:
                 pose = frames.planar(tree.lookup(map_frame, base_frame, stamp_ns))
             else:
-                x, y, yaw = se2.compose(np.array(frames.planar(tree.lookup(map_frame, odom_frame, stamp_ns))),
-                                        odometry.at(tree, base_frame, stamp_ns))
+                x, y, yaw = se2.compose(
+                    np.array(frames.planar(tree.lookup(map_frame, odom_frame, stamp_ns))),
+                    odometry.at(tree, base_frame, stamp_ns),
+                )
                 pose = (float(x), float(y), float(yaw))
         except FrameError:
             continue  # before the first, after the last
         stamps.append(stamp_ns)
         poses.append(pose)
     if not stamps:
-        raise RecordingError(f"{bag.path}: no scan on {scan_topic} is in the time of the transforms "
-                             f"{map_frame} <- {base_frame}")
+        raise RecordingError(
+            f"{bag.path}: no scan on {scan_topic} is in the time of the transforms {map_frame} <- {base_frame}"
+        )
     notes.append(f"ground truth from tf {map_frame} <- {base_frame}")
     return trajectory_from_samples(stamps, poses)
 
@@ -320,8 +360,9 @@ def _true_beams_topic(bag: Bag, wanted: Optional[str], notes: List[str]) -> Opti
     if wanted is not None:
         topic = bag.check_topic(wanted, TRUE_BEAMS, BEAM_CASES)
     else:
-        found = bag.topics_of(TRUE_BEAMS) + [topic for topic in bag.topics_of(BEAM_CASES)
-                                             if topic.rpartition("/")[2] == "true_cases"]
+        found = bag.topics_of(TRUE_BEAMS) + [
+            topic for topic in bag.topics_of(BEAM_CASES) if topic.rpartition("/")[2] == "true_cases"
+        ]
         if not found:
             return None
         topic = _only_or_usual(bag, found, "/true_beams", "topics with the truth about beams", "--true-beams")
@@ -349,8 +390,15 @@ def _trajectory(bag: Bag, topic: str) -> "Tuple[Trajectory, str]":
 class _Entries:
     """Iterates the scans of a bag, opening it anew each time."""
 
-    def __init__(self, paths: Sequence[Path], scan_topic: str, tree: FrameTree, odometry: _Odometry, base_frame: str,
-                 options: LogOptions) -> None:
+    def __init__(
+        self,
+        paths: Sequence[Path],
+        scan_topic: str,
+        tree: FrameTree,
+        odometry: _Odometry,
+        base_frame: str,
+        options: LogOptions,
+    ) -> None:
         self._paths, self._scan_topic, self._tree, self._odometry = paths, scan_topic, tree, odometry
         self._base_frame, self._laser_pose, self._deskew = base_frame, options.laser_pose, options.deskew
 
@@ -382,10 +430,18 @@ class _Entries:
                     return Refusal(stamp_ns, f"the laser is tilted by {tilt:.0f} degrees")
                 base_from_laser, upside_down = frames.planar(transform), up < 0.0
             odom_from_base = self._odometry.at(self._tree, self._base_frame, stamp_ns)
-            scan = scan_from_fields(stamp_ns, message.ranges, float(message.angle_min),
-                                    float(message.angle_increment), float(message.range_min),
-                                    float(message.range_max), np.array(base_from_laser), upside_down, laser_frame,
-                                    float(message.time_increment))
+            scan = scan_from_fields(
+                stamp_ns,
+                message.ranges,
+                float(message.angle_min),
+                float(message.angle_increment),
+                float(message.range_min),
+                float(message.range_max),
+                np.array(base_from_laser),
+                upside_down,
+                laser_frame,
+                float(message.time_increment),
+            )
             scan = self._straightened(scan, float(message.scan_time))
         except FrameError as err:
             return Refusal(stamp_ns, str(err))
@@ -414,12 +470,16 @@ class _TrueBeams:
             for _, message in bag.messages(self._topic):
                 stamp_ns, case = _stamp_ns(message.header), np.array(message.cases, np.uint8)
                 if case.size and case.max() > LAST_CASE:
-                    raise RecordingError(f"{bag.path}: {self._topic} at {stamp_ns * 1e-9:.3f} s: cases must be 0 to "
-                                         f"{LAST_CASE}, got {case.max()}")
+                    raise RecordingError(
+                        f"{bag.path}: {self._topic} at {stamp_ns * 1e-9:.3f} s: cases must be 0 to "
+                        f"{LAST_CASE}, got {case.max()}"
+                    )
                 crossing = getattr(message, "crossing", None)
                 if crossing is not None and len(crossing) != len(case):
-                    raise RecordingError(f"{bag.path}: {self._topic} at {stamp_ns * 1e-9:.3f} s: {len(case)} cases, "
-                                         f"but {len(crossing)} crossings")
+                    raise RecordingError(
+                        f"{bag.path}: {self._topic} at {stamp_ns * 1e-9:.3f} s: {len(case)} cases, "
+                        f"but {len(crossing)} crossings"
+                    )
                 yield BeamTruth(stamp_ns, case, None if crossing is None else np.array(crossing, float))
 
 
@@ -469,8 +529,9 @@ def _why_unreadable(paths: Sequence[Path], err: Exception) -> str:
     if path.suffix == ".bag" or head.startswith(b"#ROSBAG"):
         if head != b"#ROSBAG V2.0\n":
             return f"{path}: is no ROS 1 bag"
-        return (f"{path}: cut short or never closed (its index is missing); `rosbag reindex {path}` may save what it "
-                "holds")
+        return (
+            f"{path}: cut short or never closed (its index is missing); `rosbag reindex {path}` may save what it holds"
+        )
     return f"{path}: cannot be read: {_first_line(err)}"
 
 

@@ -30,13 +30,15 @@ def observe(paths: Sequence[Path], step_done: Optional[Callable[[], None]] = Non
             if topic in seen.scans:
                 seen.scans[topic].append(heard_scan(message, _stamp_ns(message.header), heard_ns))
             elif topic in seen.odometry:
-                seen.odometry[topic].append(HeardOdometry(_stamp_ns(message.header), heard_ns,
-                                                          message.header.frame_id, message.child_frame_id))
+                seen.odometry[topic].append(
+                    HeardOdometry(_stamp_ns(message.header), heard_ns, message.header.frame_id, message.child_frame_id)
+                )
             else:
                 sender = str(getattr(connection.ext, "callerid", None) or "")
                 seen.transforms += [
                     heard_transform(each, _stamp_ns(each.header), heard_ns, topic.endswith("tf_static"), sender)
-                    for each in message.transforms]
+                    for each in message.transforms
+                ]
             if step_done is not None:
                 step_done()
         seen.damage = bag.damage
@@ -51,18 +53,34 @@ def message_count(paths: Sequence[Path]) -> int:
 
 def heard_scan(message: Any, stamp_ns: int, heard_ns: int) -> HeardScan:
     """A LaserScan, of rosbags or of rospy."""
-    return HeardScan(stamp_ns, heard_ns, message.header.frame_id, np.array(message.ranges, np.float32),
-                     float(message.angle_min), float(message.angle_max), float(message.angle_increment),
-                     float(message.range_min), float(message.range_max), float(message.time_increment),
-                     float(message.scan_time))
+    return HeardScan(
+        stamp_ns,
+        heard_ns,
+        message.header.frame_id,
+        np.array(message.ranges, np.float32),
+        float(message.angle_min),
+        float(message.angle_max),
+        float(message.angle_increment),
+        float(message.range_min),
+        float(message.range_max),
+        float(message.time_increment),
+        float(message.scan_time),
+    )
 
 
 def heard_transform(message: Any, stamp_ns: int, heard_ns: int, static: bool, sender: str) -> HeardTransform:
     """A TransformStamped, of rosbags or of rospy."""
     offset, turn = message.transform.translation, message.transform.rotation
-    return HeardTransform(stamp_ns, heard_ns, message.header.frame_id, message.child_frame_id,
-                          (float(offset.x), float(offset.y), float(offset.z)),
-                          (float(turn.x), float(turn.y), float(turn.z), float(turn.w)), static, sender)
+    return HeardTransform(
+        stamp_ns,
+        heard_ns,
+        message.header.frame_id,
+        message.child_frame_id,
+        (float(offset.x), float(offset.y), float(offset.z)),
+        (float(turn.x), float(turn.y), float(turn.z), float(turn.w)),
+        static,
+        sender,
+    )
 
 
 def _stamp_ns(header: Any) -> int:

@@ -19,6 +19,7 @@ MAP, ODOM, BASE, LASER = "map", "odom", "base_link", "laser"
 
 class BagWriter(MessageWriter):
     """Write in the order of time."""
+
     KINDS = {
         "/scan": "sensor_msgs/msg/LaserScan",
         "/odom": "nav_msgs/msg/Odometry",
@@ -44,27 +45,51 @@ class BagWriter(MessageWriter):
         """
         self._send("/clock", stamp_ns, clock=self._time(stamp_ns))
         self._send("/tf", stamp_ns, transforms=[self._transform(stamp_ns, ODOM, BASE, odom_from_base)])
-        twist = self._new("geometry_msgs/Twist", linear=self._vector("Vector3", velocity[0], velocity[1]),
-                          angular=self._new("geometry_msgs/Vector3", x=0.0, y=0.0, z=float(velocity[2])))
-        self._send("/odom", stamp_ns, header=self._header(stamp_ns, ODOM), child_frame_id=BASE,
-                   pose=self._new("geometry_msgs/PoseWithCovariance", pose=self._pose(odom_from_base),
-                                  covariance=np.zeros(36)),
-                   twist=self._new("geometry_msgs/TwistWithCovariance", twist=twist, covariance=np.zeros(36)))
+        twist = self._new(
+            "geometry_msgs/Twist",
+            linear=self._vector("Vector3", velocity[0], velocity[1]),
+            angular=self._new("geometry_msgs/Vector3", x=0.0, y=0.0, z=float(velocity[2])),
+        )
+        self._send(
+            "/odom",
+            stamp_ns,
+            header=self._header(stamp_ns, ODOM),
+            child_frame_id=BASE,
+            pose=self._new(
+                "geometry_msgs/PoseWithCovariance", pose=self._pose(odom_from_base), covariance=np.zeros(36)
+            ),
+            twist=self._new("geometry_msgs/TwistWithCovariance", twist=twist, covariance=np.zeros(36)),
+        )
 
     def scan(self, scan: Scan, period_s: float) -> None:
         """/scan, recorded when its last beam was there; the laser turns once in period_s."""
         angles_rad = scan.angles_rad
         increment = float(angles_rad[1] - angles_rad[0]) if len(scan) > 1 else 0.0
-        self._send("/scan", scan.stamp_ns + deskew.turn_ns(len(scan), scan.time_increment_s),
-                   header=self._header(scan.stamp_ns, LASER),
-                   angle_min=float(angles_rad[0]), angle_max=float(angles_rad[-1]), angle_increment=increment,
-                   time_increment=scan.time_increment_s, scan_time=period_s,
-                   range_min=scan.range_min_m, range_max=scan.range_max_m,
-                   ranges=scan.ranges_m.astype(np.float32), intensities=np.zeros(0, np.float32))
+        self._send(
+            "/scan",
+            scan.stamp_ns + deskew.turn_ns(len(scan), scan.time_increment_s),
+            header=self._header(scan.stamp_ns, LASER),
+            angle_min=float(angles_rad[0]),
+            angle_max=float(angles_rad[-1]),
+            angle_increment=increment,
+            time_increment=scan.time_increment_s,
+            scan_time=period_s,
+            range_min=scan.range_min_m,
+            range_max=scan.range_max_m,
+            ranges=scan.ranges_m.astype(np.float32),
+            intensities=np.zeros(0, np.float32),
+        )
 
-    def truth(self, stamp_ns: int, map_from_base: np.ndarray, case: np.ndarray, exact_m: np.ndarray,
-              crossing_m: np.ndarray) -> None:
+    def truth(
+        self, stamp_ns: int, map_from_base: np.ndarray, case: np.ndarray, exact_m: np.ndarray, crossing_m: np.ndarray
+    ) -> None:
         """/ground_truth and /true_beams of the scan with that stamp: (3,), (B,) and (B,) as in TrueBeams.msg."""
         self._send("/ground_truth", stamp_ns, header=self._header(stamp_ns, MAP), pose=self._pose(map_from_base))
-        self._send("/true_beams", stamp_ns, header=self._header(stamp_ns, LASER), cases=case.astype(np.uint8),
-                   exact=exact_m.astype(np.float32), crossing=crossing_m.astype(np.float32))
+        self._send(
+            "/true_beams",
+            stamp_ns,
+            header=self._header(stamp_ns, LASER),
+            cases=case.astype(np.uint8),
+            exact=exact_m.astype(np.float32),
+            crossing=crossing_m.astype(np.float32),
+        )

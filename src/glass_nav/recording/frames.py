@@ -76,7 +76,7 @@ class FrameTree:
         common = next((frame for frame in from_source if frame in from_target), None)
         if common is None:
             raise FrameError(f"no transform {target} <- {source}")
-        return from_source[:from_source.index(common)], from_target[:from_target.index(common)]
+        return from_source[: from_source.index(common)], from_target[: from_target.index(common)]
 
     def _ancestry(self, frame: str) -> List[str]:
         path = [frame]
@@ -123,8 +123,10 @@ class _Link:
         before_ns, after_ns = self._stamps_ns[after - 1], self._stamps_ns[after]
         share = (stamp_ns - before_ns) / (after_ns - before_ns)
         (p, q), (r, s) = self._transforms[after - 1], self._transforms[after]
-        return ((p[0] + share * (r[0] - p[0]), p[1] + share * (r[1] - p[1]), p[2] + share * (r[2] - p[2])),
-                _slerp(q, s, share))
+        return (
+            (p[0] + share * (r[0] - p[0]), p[1] + share * (r[1] - p[1]), p[2] + share * (r[2] - p[2])),
+            _slerp(q, s, share),
+        )
 
 
 def normalised(quaternion: Quaternion) -> Optional[Quaternion]:
@@ -164,15 +166,18 @@ def upwardness(transform: Transform) -> float:
 def _multiply(a: Quaternion, b: Quaternion) -> Quaternion:
     ax, ay, az, aw = a
     bx, by, bz, bw = b
-    return (aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz)
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
 
 
 def _rotate(q: Quaternion, v: Vector) -> Vector:
     x, y, z, w = q
     tx, ty, tz = 2.0 * (y * v[2] - z * v[1]), 2.0 * (z * v[0] - x * v[2]), 2.0 * (x * v[1] - y * v[0])
-    return (v[0] + w * tx + y * tz - z * ty, v[1] + w * ty + z * tx - x * tz,
-            v[2] + w * tz + x * ty - y * tx)
+    return (v[0] + w * tx + y * tz - z * ty, v[1] + w * ty + z * tx - x * tz, v[2] + w * tz + x * ty - y * tx)
 
 
 def _slerp(a: Quaternion, b: Quaternion, share: float) -> Quaternion:
@@ -183,5 +188,9 @@ def _slerp(a: Quaternion, b: Quaternion, share: float) -> Quaternion:
         return a
     first, second = math.sin((1.0 - share) * angle), sign * math.sin(share * angle)
     scale = 1.0 / math.sin(angle)
-    return ((first * a[0] + second * b[0]) * scale, (first * a[1] + second * b[1]) * scale,
-            (first * a[2] + second * b[2]) * scale, (first * a[3] + second * b[3]) * scale)
+    return (
+        (first * a[0] + second * b[0]) * scale,
+        (first * a[1] + second * b[1]) * scale,
+        (first * a[2] + second * b[2]) * scale,
+        (first * a[3] + second * b[3]) * scale,
+    )

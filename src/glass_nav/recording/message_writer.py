@@ -40,8 +40,9 @@ class MessageWriter:
             from rosbags.rosbag1 import Writer
             from rosbags.typesys import Stores, get_types_from_msg, get_typestore
         except ImportError as err:
-            raise RecordingError(f"{self._path}: writing bags needs the Python package rosbags "
-                                 f"(pip install rosbags): {err}") from err
+            raise RecordingError(
+                f"{self._path}: writing bags needs the Python package rosbags (pip install rosbags): {err}"
+            ) from err
         self._store = get_typestore(Stores.ROS1_NOETIC)
         for name, definition in {TF_TYPE: TF_MESSAGE, **self.OWN_TYPES}.items():
             self._store.register(get_types_from_msg(definition, name))
@@ -58,8 +59,9 @@ class MessageWriter:
             raise RecordingError(f"{self._path}: cannot be written: {err.strerror}") from err
         return self
 
-    def __exit__(self, kind: Optional[Type[BaseException]], error: Optional[BaseException],
-                 trace: Optional[TracebackType]) -> None:
+    def __exit__(
+        self, kind: Optional[Type[BaseException]], error: Optional[BaseException], trace: Optional[TracebackType]
+    ) -> None:
         try:
             self._writer.close()
             if kind is None:
@@ -72,7 +74,8 @@ class MessageWriter:
         kind = self.KINDS[topic]
         if topic not in self._connections:
             self._connections[topic] = self._writer.add_connection(
-                topic, kind, typestore=self._store, latching=1 if topic in self.LATCHED else None)
+                topic, kind, typestore=self._store, latching=1 if topic in self.LATCHED else None
+            )
         message = self._store.types[kind](**fields)
         self._writer.write(self._connections[topic], stamp_ns, self._store.serialize_ros1(message, kind))
 
@@ -89,16 +92,25 @@ class MessageWriter:
         return self._new(f"geometry_msgs/{kind}", x=float(x), y=float(y), z=0.0)
 
     def _rotation(self, yaw_rad: float) -> Any:
-        return self._new("geometry_msgs/Quaternion", x=0.0, y=0.0, z=float(np.sin(0.5 * yaw_rad)),
-                         w=float(np.cos(0.5 * yaw_rad)))
+        return self._new(
+            "geometry_msgs/Quaternion", x=0.0, y=0.0, z=float(np.sin(0.5 * yaw_rad)), w=float(np.cos(0.5 * yaw_rad))
+        )
 
     def _pose(self, planar: np.ndarray) -> Any:
-        return self._new("geometry_msgs/Pose", position=self._vector("Point", planar[0], planar[1]),
-                         orientation=self._rotation(float(planar[2])))
+        return self._new(
+            "geometry_msgs/Pose",
+            position=self._vector("Point", planar[0], planar[1]),
+            orientation=self._rotation(float(planar[2])),
+        )
 
     def _transform(self, stamp_ns: int, parent: str, child: str, parent_from_child: np.ndarray) -> Any:
         x, y, yaw = (float(value) for value in parent_from_child)
-        transform = self._new("geometry_msgs/Transform", translation=self._vector("Vector3", x, y),
-                              rotation=self._rotation(yaw))
-        return self._new("geometry_msgs/TransformStamped", header=self._header(stamp_ns, parent),
-                         child_frame_id=child, transform=transform)
+        transform = self._new(
+            "geometry_msgs/Transform", translation=self._vector("Vector3", x, y), rotation=self._rotation(yaw)
+        )
+        return self._new(
+            "geometry_msgs/TransformStamped",
+            header=self._header(stamp_ns, parent),
+            child_frame_id=child,
+            transform=transform,
+        )

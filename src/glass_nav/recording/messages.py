@@ -6,8 +6,10 @@ from typing import Any
 
 TRUE_BEAMS = "Header header\nuint8[] cases\nfloat32[] exact\nfloat32[] crossing\n"  # msg/*.msg, bare
 BEAM_CASES = "Header header\nuint8[] cases\nfloat32[] expected\nfloat32[] residual\nfloat32[] weight\n"
-STATUS = ("uint8 UNKNOWN=0\nuint8 GLOBAL_SEARCH=1\nuint8 LOCALIZED=2\nuint8 UNCERTAIN=3\nuint8 LOST=4\n"
-          "Header header\nuint8 state\nstring state_name\nstring reason\nfloat32 used_share\nfloat32 reliability\n")
+STATUS = (
+    "uint8 UNKNOWN=0\nuint8 GLOBAL_SEARCH=1\nuint8 LOCALIZED=2\nuint8 UNCERTAIN=3\nuint8 LOST=4\n"
+    "Header header\nuint8 state\nstring state_name\nstring reason\nfloat32 used_share\nfloat32 reliability\n"
+)
 
 
 def ros2_store() -> Any:

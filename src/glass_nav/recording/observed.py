@@ -14,8 +14,9 @@ import numpy as np
 @dataclass(frozen=True)
 class HeardScan:
     """One LaserScan, as the driver wrote it."""
+
     stamp_ns: int
-    heard_ns: int      # when it was recorded, or came in
+    heard_ns: int  # when it was recorded, or came in
     frame: str
     ranges_m: np.ndarray  # (B,) float32, nothing changed
     angle_min_rad: float
@@ -30,6 +31,7 @@ class HeardScan:
 @dataclass(frozen=True)
 class HeardTransform:
     """One link of tf."""
+
     stamp_ns: int
     heard_ns: int
     parent: str
@@ -37,12 +39,13 @@ class HeardTransform:
     translation_m: Tuple[float, float, float]
     rotation_xyzw: Tuple[float, float, float, float]
     static: bool
-    sender: str = ""   # name of the node; "": not known
+    sender: str = ""  # name of the node; "": not known
 
 
 @dataclass(frozen=True)
 class HeardOdometry:
     """One Odometry message."""
+
     stamp_ns: int
     heard_ns: int
     frame: str
@@ -52,9 +55,10 @@ class HeardOdometry:
 @dataclass
 class Observed:
     """Everything heard, by topic where it has one, in the order in which it came."""
-    name: str                                                   # of the log, or of the robot
-    topics: Dict[str, str] = field(default_factory=dict)        # topic -> type
+
+    name: str  # of the log, or of the robot
+    topics: Dict[str, str] = field(default_factory=dict)  # topic -> type
     scans: Dict[str, List[HeardScan]] = field(default_factory=dict)
     transforms: List[HeardTransform] = field(default_factory=list)
     odometry: Dict[str, List[HeardOdometry]] = field(default_factory=dict)
-    damage: str = ""                                            # where reading had to stop, in words
+    damage: str = ""  # where reading had to stop, in words

@@ -10,8 +10,15 @@ import numpy as np
 
 from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.recording import trajectory_file
-from glass_nav.recording.recording import (Entry, LogOptions, Recording, RecordingError, Refusal, Step,
-                                           trajectory_from_samples)
+from glass_nav.recording.recording import (
+    Entry,
+    LogOptions,
+    Recording,
+    RecordingError,
+    Refusal,
+    Step,
+    trajectory_from_samples,
+)
 from glass_nav.sensing.scan import ScanError, scan_from_fields
 
 LEVEL = math.cos(math.radians(20.0))  # a scan plane tilted further does not show the plan of a floor
@@ -55,13 +62,15 @@ def _scans(path: Path, log: Dict[str, Any], options: LogOptions, holds: str, not
     names = sorted(set(log["labels"]))
     wanted = options.scan_topic
     if wanted is None and len(names) > 1:
-        raise RecordingError(f"{path}: has scans of {len(names)} sensors ({', '.join(map(repr, names))}), "
-                             "choose one with --scan-topic")
+        raise RecordingError(
+            f"{path}: has scans of {len(names)} sensors ({', '.join(map(repr, names))}), choose one with --scan-topic"
+        )
     if wanted is not None and wanted not in names:
         raise RecordingError(f"{path}: no sensor {wanted!r}; sensors with scans: {', '.join(map(repr, names))}")
     chosen = names[0] if wanted is None else wanted
-    notes.append(f"scans of sensor {chosen!r}, odometry from "
-                 f"{'the actions' if log['paired'] else 'CObservationOdometry'}")
+    notes.append(
+        f"scans of sensor {chosen!r}, odometry from {'the actions' if log['paired'] else 'CObservationOdometry'}"
+    )
     return np.nonzero(labels == chosen)[0]
 
 
@@ -69,12 +78,10 @@ def _odometry(path: Path, log: Dict[str, Any]) -> Trajectory:
     stamped = log["odometry_stamps_ns"] >= 0
     if not stamped.any():
         raise RecordingError(f"{path}: none of its {len(stamped)} odometry readings has a time")
-    return trajectory_from_samples(log["odometry_stamps_ns"][stamped].tolist(),
-                                   log["odometry"][stamped].tolist())
+    return trajectory_from_samples(log["odometry_stamps_ns"][stamped].tolist(), log["odometry"][stamped].tolist())
 
 
-def _ground_truth(path: Path, options: LogOptions, stamps_ns: np.ndarray,
-                  notes: List[str]) -> Optional[Trajectory]:
+def _ground_truth(path: Path, options: LogOptions, stamps_ns: np.ndarray, notes: List[str]) -> Optional[Trajectory]:
     if options.ground_truth == "none":
         return None
     beside = path.with_name(path.stem + "_GT.txt")
@@ -88,8 +95,13 @@ def _ground_truth(path: Path, options: LogOptions, stamps_ns: np.ndarray,
 class _Entries:
     """Iterates the scans of a rawlog that is in memory already."""
 
-    def __init__(self, log: Dict[str, Any], scans: np.ndarray, odometry: Optional[Trajectory],
-                 laser_pose: Optional[Tuple[float, float, float]]) -> None:
+    def __init__(
+        self,
+        log: Dict[str, Any],
+        scans: np.ndarray,
+        odometry: Optional[Trajectory],
+        laser_pose: Optional[Tuple[float, float, float]],
+    ) -> None:
         self._log, self._scans, self._odometry, self._laser_pose = log, scans, odometry, laser_pose
         self._ends = np.cumsum(log["beams"])
 
@@ -125,9 +137,15 @@ class _Entries:
         ranges_m = np.where(log["valid"][part] != 0, log["ranges_m"][part].astype(float), np.inf)
         try:
             scan = scan_from_fields(
-                stamp_ns, ranges_m, float(log["first_angle_rad"][index]), float(log["angle_step_rad"][index]),
-                0.0, float(log["range_max_m"][index]),
-                np.array((x, y, yaw) if self._laser_pose is None else self._laser_pose), upside_down=up < 0.0)
+                stamp_ns,
+                ranges_m,
+                float(log["first_angle_rad"][index]),
+                float(log["angle_step_rad"][index]),
+                0.0,
+                float(log["range_max_m"][index]),
+                np.array((x, y, yaw) if self._laser_pose is None else self._laser_pose),
+                upside_down=up < 0.0,
+            )
         except ScanError as err:
             return Refusal(stamp_ns, str(err).partition(": ")[2])
         return Step(scan, np.array(odom_from_base, float))

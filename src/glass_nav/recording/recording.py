@@ -18,6 +18,7 @@ class RecordingError(ValueError):
 @dataclass(frozen=True)
 class Step:
     """What the filter gets at once."""
+
     scan: Scan
     odom_from_base: np.ndarray  # (3,) at the stamp of the scan
 
@@ -25,6 +26,7 @@ class Step:
 @dataclass(frozen=True)
 class Refusal:
     """A scan of the log that cannot be used. Never dropped in silence: the replay counts them."""
+
     stamp_ns: int
     reason: str  # without the stamp, so that equal reasons can be counted
 
@@ -35,16 +37,18 @@ Entry = Union[Step, Refusal]
 @dataclass(frozen=True)
 class BeamTruth:
     """What each beam of one scan truly met, as a simulator knows it."""
+
     stamp_ns: int
-    case: np.ndarray                  # (B,) uint8: 0..4
+    case: np.ndarray  # (B,) uint8: 0..4
     crossing_m: Optional[np.ndarray]  # (B,) range of the first pane passed or mirrored at, NaN: none; None: not told
 
 
 @dataclass
 class Recording:
     """One log, opened. Iterating reads it from the start, every time the same."""
+
     name: str
-    scan_count: int           # entries to come: for a progress bar
+    scan_count: int  # entries to come: for a progress bar
     entries: Iterable[Entry]  # in the order of the log
     ground_truth: Optional[Trajectory] = None  # map_from_base
     notes: List[str] = field(default_factory=list)  # what was chosen or found odd, a line each
@@ -68,14 +72,15 @@ class Recording:
 @dataclass(frozen=True)
 class LogOptions:
     """What to take from a log; None: found by itself, and said in the notes."""
+
     scan_topic: Optional[str] = None
     odom_topic: Optional[str] = None
     base_frame: Optional[str] = None
     odom_frame: Optional[str] = None
     laser_pose: Optional[Tuple[float, float, float]] = None  # base_from_laser instead of tf's
     ground_truth: Optional[str] = None  # a topic, a file or "tf:FRAME"; "none": do not look for one
-    true_beams: Optional[str] = None    # a topic; "none": do not look for one
-    deskew: bool = True                 # make up for the robot's motion while the lidar turned, where the log tells
+    true_beams: Optional[str] = None  # a topic; "none": do not look for one
+    deskew: bool = True  # make up for the robot's motion while the lidar turned, where the log tells
 
 
 def trajectory_from_samples(stamps_ns: "List[int]", poses: "List[Tuple[float, float, float]]") -> Trajectory:

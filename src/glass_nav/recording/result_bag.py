@@ -25,6 +25,7 @@ _FLOAT32 = 7  # of sensor_msgs/PointField
 
 class ResultBag(MessageWriter):
     """Write in the order of time; `begin` once, first."""
+
     KINDS = {
         "/tf": TF_TYPE,
         "/tf_static": TF_TYPE,
@@ -43,10 +44,9 @@ class ResultBag(MessageWriter):
     OWN_TYPES = {"glass_nav/msg/LocalizationStatus": STATUS, "glass_nav/msg/BeamCases": BEAM_CASES}
 
     def __init__(self, path: Path, frames: "Tuple[str, str, str]") -> None:
-        """
-        Args:
-            path: of the bag.
-            frames: names of map, odom and base.
+        """Args:
+        path: of the bag.
+        frames: names of map, odom and base.
         """
         super().__init__(path)
         self._map, self._odom, self._base = frames
@@ -56,39 +56,81 @@ class ResultBag(MessageWriter):
         """The map."""
         self._grid("/map", stamp_ns, grid_map, grid_map.occupancy)
 
-    def scan(self, scan: Scan, surfaces_m: np.ndarray, cases: np.ndarray, expected_m: np.ndarray,
-             residual_m: np.ndarray, weight: np.ndarray) -> None:
+    def scan(
+        self,
+        scan: Scan,
+        surfaces_m: np.ndarray,
+        cases: np.ndarray,
+        expected_m: np.ndarray,
+        residual_m: np.ndarray,
+        weight: np.ndarray,
+    ) -> None:
         """One turn of a lidar, what its beams met (B,), and where each is cut (B,), as measured by the lidar."""
         frame = scan.lidar or "laser"
         if frame not in self._mounted:
             self._mounted.add(frame)
-            self._send("/tf_static", scan.stamp_ns, transforms=[
-                self._transform(scan.stamp_ns, self._base, frame, scan.base_from_laser)])
+            self._send(
+                "/tf_static",
+                scan.stamp_ns,
+                transforms=[self._transform(scan.stamp_ns, self._base, frame, scan.base_from_laser)],
+            )
         for topic, ranges_m in (("/scan", scan.ranges_m), ("/scan_surfaces", surfaces_m)):
             angles_rad = scan.angles_rad
-            self._send(topic, scan.stamp_ns, header=self._header(scan.stamp_ns, frame),
-                       angle_min=float(angles_rad[0]), angle_max=float(angles_rad[-1]),
-                       angle_increment=float(angles_rad[-1] - angles_rad[0]) / max(len(scan) - 1, 1),
-                       time_increment=0.0, scan_time=0.0, range_min=scan.range_min_m, range_max=scan.range_max_m,
-                       ranges=ranges_m.astype(np.float32), intensities=np.zeros(0, np.float32))
-        self._send(NODE + "/beam_cases", scan.stamp_ns, header=self._header(scan.stamp_ns, frame),
-                   cases=cases.astype(np.uint8), expected=expected_m.astype(np.float32),
-                   residual=residual_m.astype(np.float32), weight=weight.astype(np.float32))
+            self._send(
+                topic,
+                scan.stamp_ns,
+                header=self._header(scan.stamp_ns, frame),
+                angle_min=float(angles_rad[0]),
+                angle_max=float(angles_rad[-1]),
+                angle_increment=float(angles_rad[-1] - angles_rad[0]) / max(len(scan) - 1, 1),
+                time_increment=0.0,
+                scan_time=0.0,
+                range_min=scan.range_min_m,
+                range_max=scan.range_max_m,
+                ranges=ranges_m.astype(np.float32),
+                intensities=np.zeros(0, np.float32),
+            )
+        self._send(
+            NODE + "/beam_cases",
+            scan.stamp_ns,
+            header=self._header(scan.stamp_ns, frame),
+            cases=cases.astype(np.uint8),
+            expected=expected_m.astype(np.float32),
+            residual=residual_m.astype(np.float32),
+            weight=weight.astype(np.float32),
+        )
 
     def cloud(self, stamp_ns: int, fields: "Tuple[str, ...]", points: np.ndarray) -> None:
         """Points (N, F) of the robot's frame, float32, with a name for each column."""
         step = 4 * len(fields)
-        layout = [self._new("sensor_msgs/PointField", name=name, offset=4 * column, datatype=_FLOAT32, count=1)
-                  for column, name in enumerate(fields)]
-        self._send(NODE + "/beam_cloud", stamp_ns, header=self._header(stamp_ns, self._base), height=1,
-                   width=len(points), fields=layout, is_bigendian=False, point_step=step, row_step=step * len(points),
-                   data=np.frombuffer(points.astype("<f4").tobytes(), np.uint8), is_dense=True)
+        layout = [
+            self._new("sensor_msgs/PointField", name=name, offset=4 * column, datatype=_FLOAT32, count=1)
+            for column, name in enumerate(fields)
+        ]
+        self._send(
+            NODE + "/beam_cloud",
+            stamp_ns,
+            header=self._header(stamp_ns, self._base),
+            height=1,
+            width=len(points),
+            fields=layout,
+            is_bigendian=False,
+            point_step=step,
+            row_step=step * len(points),
+            data=np.frombuffer(points.astype("<f4").tobytes(), np.uint8),
+            is_dense=True,
+        )
 
     def transforms(self, stamp_ns: int, map_from_odom: np.ndarray, odom_from_base: np.ndarray) -> None:
         """tf of the robot: both (3,)."""
-        self._send("/tf", stamp_ns, transforms=[
-            self._transform(stamp_ns, self._map, self._odom, map_from_odom),
-            self._transform(stamp_ns, self._odom, self._base, odom_from_base)])
+        self._send(
+            "/tf",
+            stamp_ns,
+            transforms=[
+                self._transform(stamp_ns, self._map, self._odom, map_from_odom),
+                self._transform(stamp_ns, self._odom, self._base, odom_from_base),
+            ],
+        )
 
     def pose(self, stamp_ns: int, map_from_base: np.ndarray, covariance: np.ndarray, particles: np.ndarray) -> None:
         """The pose (3,) with its covariance (3, 3) of x, y, yaw, and the particles (P, 3), of which some are shown."""
@@ -96,14 +138,26 @@ class ResultBag(MessageWriter):
         spatial[np.ix_([0, 1, 5], [0, 1, 5])] = covariance
         pose = self._new("geometry_msgs/PoseWithCovariance", pose=self._pose(map_from_base), covariance=spatial.ravel())
         self._send("/amcl_pose", stamp_ns, header=self._header(stamp_ns, self._map), pose=pose)
-        shown = particles[::max(1, -(-len(particles) // SHOWN))]
-        self._send("/particlecloud", stamp_ns, header=self._header(stamp_ns, self._map),
-                   poses=[self._pose(each) for each in shown])
+        shown = particles[:: max(1, -(-len(particles) // SHOWN))]
+        self._send(
+            "/particlecloud",
+            stamp_ns,
+            header=self._header(stamp_ns, self._map),
+            poses=[self._pose(each) for each in shown],
+        )
 
     def status(self, stamp_ns: int, state: str, reason: str, used_share: float, reliability: float) -> None:
         """The state in words, and its figures."""
-        self._send(NODE + "/status", stamp_ns, header=self._header(stamp_ns, self._map), state=STATES.index(state),
-                   state_name=state, reason=reason, used_share=used_share, reliability=reliability)
+        self._send(
+            NODE + "/status",
+            stamp_ns,
+            header=self._header(stamp_ns, self._map),
+            state=STATES.index(state),
+            state_name=state,
+            reason=reason,
+            used_share=used_share,
+            reliability=reliability,
+        )
 
     def truth(self, stamp_ns: int, map_from_base: np.ndarray) -> None:
         """Where the robot truly was, (3,)."""
@@ -115,8 +169,18 @@ class ResultBag(MessageWriter):
 
     def _grid(self, topic: str, stamp_ns: int, grid_map: GridMap, cells: np.ndarray) -> None:
         height, width = cells.shape
-        info: Any = self._new("nav_msgs/MapMetaData", map_load_time=self._time(stamp_ns),
-                              resolution=grid_map.resolution_m, width=width, height=height,
-                              origin=self._pose(grid_map.map_from_grid))
-        self._send(topic, stamp_ns, header=self._header(stamp_ns, self._map), info=info,
-                   data=np.ascontiguousarray(cells, np.int8).ravel())
+        info: Any = self._new(
+            "nav_msgs/MapMetaData",
+            map_load_time=self._time(stamp_ns),
+            resolution=grid_map.resolution_m,
+            width=width,
+            height=height,
+            origin=self._pose(grid_map.map_from_grid),
+        )
+        self._send(
+            topic,
+            stamp_ns,
+            header=self._header(stamp_ns, self._map),
+            info=info,
+            data=np.ascontiguousarray(cells, np.int8).ravel(),
+        )

@@ -51,8 +51,15 @@ def _from_message(path: Path, text: str, laser: np.ndarray) -> Scan:
         raise RecordingError(f"{path}: must hold the fields of a LaserScan, with a list of ranges")
     fields = _numbers(path, message)
     ranges_m = [_number(path, f"range {index}", value) for index, value in enumerate(message["ranges"])]
-    return scan_from_fields(0, np.array(ranges_m, float), fields["angle_min"], fields["angle_increment"],
-                            fields["range_min"], fields["range_max"], laser)
+    return scan_from_fields(
+        0,
+        np.array(ranges_m, float),
+        fields["angle_min"],
+        fields["angle_increment"],
+        fields["range_min"],
+        fields["range_max"],
+        laser,
+    )
 
 
 def _numbers(path: Path, message: Dict[str, Any]) -> Dict[str, float]:

@@ -28,8 +28,10 @@ def load(path: Path, scan_stamps_ns: Optional[np.ndarray] = None) -> Trajectory:
         return _from_tum(path, rows)
     if columns == {4}:
         return _from_mrpt(path, rows, scan_stamps_ns)
-    raise RecordingError(f"{path}: a row of poses has 8 columns (TUM: stamp x y z qx qy qz qw) or 4 "
-                         f"(MRPT: index x y yaw), got {', '.join(str(count) for count in sorted(columns))}")
+    raise RecordingError(
+        f"{path}: a row of poses has 8 columns (TUM: stamp x y z qx qy qz qw) or 4 "
+        f"(MRPT: index x y yaw), got {', '.join(str(count) for count in sorted(columns))}"
+    )
 
 
 def save_tum(path: Path, trajectory: Trajectory) -> None:
@@ -47,8 +49,11 @@ def _rows(path: Path) -> "List[Tuple[int, List[str]]]":
     except (OSError, UnicodeDecodeError) as err:
         reason = err.strerror if isinstance(err, OSError) and err.strerror else str(err)
         raise RecordingError(f"{path}: cannot be read: {reason}") from err
-    rows = [(number, line.replace(",", " ").split()) for number, line in enumerate(lines, 1)
-            if line.strip() and not line.lstrip().startswith(("#", "%"))]
+    rows = [
+        (number, line.replace(",", " ").split())
+        for number, line in enumerate(lines, 1)
+        if line.strip() and not line.lstrip().startswith(("#", "%"))
+    ]
     if not rows:
         raise RecordingError(f"{path}: holds no poses")
     return rows
@@ -66,11 +71,9 @@ def _from_tum(path: Path, rows: "List[Tuple[int, List[str]]]") -> Trajectory:
     return trajectory_from_samples(stamps, poses)
 
 
-def _from_mrpt(path: Path, rows: "List[Tuple[int, List[str]]]",
-               scan_stamps_ns: Optional[np.ndarray]) -> Trajectory:
+def _from_mrpt(path: Path, rows: "List[Tuple[int, List[str]]]", scan_stamps_ns: Optional[np.ndarray]) -> Trajectory:
     if scan_stamps_ns is None:
-        raise RecordingError(f"{path}: its rows have an index and no stamp, which fits a rawlog only; "
-                             "give a TUM file")
+        raise RecordingError(f"{path}: its rows have an index and no stamp, which fits a rawlog only; give a TUM file")
     stamps: List[int] = []
     poses: List[Tuple[float, float, float]] = []
     for number, row in rows:

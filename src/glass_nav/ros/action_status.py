@@ -16,5 +16,6 @@ def start(server: Any) -> None:
     if timer is None:
         return
     timer.shutdown()
-    server.action_server.status_timer = rospy.Timer(rospy.Duration(PERIOD_S), server.action_server.publish_status_async,
-                                                    reset=True)
+    server.action_server.status_timer = rospy.Timer(
+        rospy.Duration(PERIOD_S), server.action_server.publish_status_async, reset=True
+    )

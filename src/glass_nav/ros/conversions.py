@@ -25,15 +25,16 @@ from nav_msgs.msg import MapMetaData, OccupancyGrid
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
 
-from glass_nav.localization.glass_mcl import BeamCases, Estimate
-from glass_nav.localization.surface_scan import SurfaceScan
+from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
+from glass_nav.localization.localizer import BeamCases, Estimate
 from glass_nav.msg import BeamCases as BeamCasesMsg
 from glass_nav.msg import LocalizationStatus
 from glass_nav.sensing.scan import Scan, ScanError, scan_from_fields
 from glass_nav.world.grid_map import GridMap
 
-STATES = {name: getattr(LocalizationStatus, name)
-          for name in ("UNKNOWN", "GLOBAL_SEARCH", "LOCALIZED", "UNCERTAIN", "LOST")}
+STATES = {
+    name: getattr(LocalizationStatus, name) for name in ("UNKNOWN", "GLOBAL_SEARCH", "LOCALIZED", "UNCERTAIN", "LOST")
+}
 
 MAX_TILT_RAD = np.radians(20.0)  # a plane tilted by 20 degrees shortens its ranges seen from above by 6 %
 _X_Y_YAW = np.ix_([0, 1, 5], [0, 1, 5])  # of the 6x6 covariances of ROS: x y z roll pitch yaw
@@ -69,9 +70,13 @@ def rotation_from_quaternion(quaternion: Quaternion) -> np.ndarray:
     if not np.isfinite(length) or length < 1e-6:
         raise ValueError(f"a quaternion x y z w must be finite and not zero, got {xyzw.tolist()}")
     x, y, z, w = xyzw / length
-    return np.array([[1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
-                     [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
-                     [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)]])
+    return np.array(
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+            [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+    )
 
 
 def quaternion_from_yaw(yaw_rad: float) -> Quaternion:
@@ -98,8 +103,7 @@ def planar_from_transform(transform: Transform) -> np.ndarray:
     return planar_from_pose(Pose(transform.translation, transform.rotation))
 
 
-def transform_stamped(stamp_ns: int, parent: str, child: str,
-                      parent_from_child: np.ndarray) -> TransformStamped:
+def transform_stamped(stamp_ns: int, parent: str, child: str, parent_from_child: np.ndarray) -> TransformStamped:
     pose = pose_from_planar(parent_from_child)
     return TransformStamped(header(stamp_ns, parent), child, Transform(pose.position, pose.orientation))
 
@@ -107,9 +111,10 @@ def transform_stamped(stamp_ns: int, parent: str, child: str,
 @dataclass(frozen=True)
 class PoseGuess:
     """Where somebody says that the robot was at some time."""
-    stamp_ns: int               # 0: now, whenever that is
-    map_from_base: np.ndarray   # (3,)
-    covariance: np.ndarray      # (3, 3) of x, y, yaw
+
+    stamp_ns: int  # 0: now, whenever that is
+    map_from_base: np.ndarray  # (3,)
+    covariance: np.ndarray  # (3, 3) of x, y, yaw
 
 
 def guess_from_msg(msg: PoseWithCovarianceStamped, map_frame: str) -> PoseGuess:
@@ -126,8 +131,7 @@ def guess_from_msg(msg: PoseWithCovarianceStamped, map_frame: str) -> PoseGuess:
         raise ValueError(f"the covariance must be symmetric, got {planar.tolist()} for x, y, yaw")
     if np.linalg.eigvalsh(planar).min() < -1e-9 * scale:
         raise ValueError(f"the covariance must not be negative, got {planar.tolist()} for x, y, yaw")
-    return PoseGuess(ns_from_stamp(msg.header.stamp), planar_from_pose(msg.pose.pose),
-                     0.5 * (planar + planar.T))
+    return PoseGuess(ns_from_stamp(msg.header.stamp), planar_from_pose(msg.pose.pose), 0.5 * (planar + planar.T))
 
 
 def pose_msg(estimate: Estimate, map_frame: str) -> PoseWithCovarianceStamped:
@@ -135,8 +139,9 @@ def pose_msg(estimate: Estimate, map_frame: str) -> PoseWithCovarianceStamped:
     return pose_with_covariance(estimate.stamp_ns, estimate.map_from_base, estimate.covariance, map_frame)
 
 
-def pose_with_covariance(stamp_ns: int, map_from_base: np.ndarray, covariance: np.ndarray,
-                         map_frame: str) -> PoseWithCovarianceStamped:
+def pose_with_covariance(
+    stamp_ns: int, map_from_base: np.ndarray, covariance: np.ndarray, map_frame: str
+) -> PoseWithCovarianceStamped:
     """A pose (3,) with its covariance (3, 3) of x, y, yaw; 0 elsewhere."""
     msg = PoseWithCovarianceStamped(header=header(stamp_ns, map_frame))
     msg.pose.pose = pose_from_planar(map_from_base)
@@ -173,6 +178,7 @@ def pose_array(stamp_ns: int, map_frame: str, poses: np.ndarray) -> PoseArray:
 @dataclass(frozen=True)
 class Mounting:
     """How a lidar sits on the robot."""
+
     base_from_laser: np.ndarray  # (3,) seen from above
     height_m: float
     upside_down: bool
@@ -187,8 +193,10 @@ def mounting_from_transform(base_from_laser: Transform) -> Mounting:
         raise ScanError(f"the laser's place on the robot: {err}") from err
     if abs(up) < np.cos(MAX_TILT_RAD):
         tilt_deg = np.degrees(np.arccos(abs(up)))
-        raise ScanError(f"the laser is tilted by {tilt_deg:.0f} degrees; level within "
-                        f"{np.degrees(MAX_TILT_RAD):.0f} degrees is needed, upright or upside down")
+        raise ScanError(
+            f"the laser is tilted by {tilt_deg:.0f} degrees; level within "
+            f"{np.degrees(MAX_TILT_RAD):.0f} degrees is needed, upright or upside down"
+        )
     return Mounting(planar, float(base_from_laser.translation.z), bool(up < 0.0))
 
 
@@ -199,9 +207,18 @@ def scan_from_msg(msg: LaserScan, mounting: Mounting) -> Scan:
         msg: as the driver sent it.
         mounting: of the lidar that took it.
     """
-    return scan_from_fields(ns_from_stamp(msg.header.stamp), np.array(msg.ranges, float), msg.angle_min,
-                            msg.angle_increment, msg.range_min, msg.range_max, mounting.base_from_laser,
-                            mounting.upside_down, frame_id(msg.header.frame_id), msg.time_increment)
+    return scan_from_fields(
+        ns_from_stamp(msg.header.stamp),
+        np.array(msg.ranges, float),
+        msg.angle_min,
+        msg.angle_increment,
+        msg.range_min,
+        msg.range_max,
+        mounting.base_from_laser,
+        mounting.upside_down,
+        frame_id(msg.header.frame_id),
+        msg.time_increment,
+    )
 
 
 # What the `intensities` of scan_surfaces say of a beam.
@@ -222,10 +239,18 @@ def surface_scan_msg(msg: LaserScan, scan: Scan, surface: SurfaceScan) -> LaserS
     ranges = np.array(msg.ranges, float)
     ranges[surface.cut] = scan.as_measured(surface.ranges_m)[surface.cut]
     flags = np.where(surface.cut, CUT, AS_MEASURED) if surface.trusted else np.full(len(ranges), NOT_JUDGED)
-    return LaserScan(header=Header(stamp=msg.header.stamp, frame_id=frame_id(msg.header.frame_id)),
-                     angle_min=msg.angle_min, angle_max=msg.angle_max, angle_increment=msg.angle_increment,
-                     time_increment=msg.time_increment, scan_time=msg.scan_time, range_min=msg.range_min,
-                     range_max=msg.range_max, ranges=ranges.tolist(), intensities=flags.tolist())
+    return LaserScan(
+        header=Header(stamp=msg.header.stamp, frame_id=frame_id(msg.header.frame_id)),
+        angle_min=msg.angle_min,
+        angle_max=msg.angle_max,
+        angle_increment=msg.angle_increment,
+        time_increment=msg.time_increment,
+        scan_time=msg.scan_time,
+        range_min=msg.range_min,
+        range_max=msg.range_max,
+        ranges=ranges.tolist(),
+        intensities=flags.tolist(),
+    )
 
 
 # -- maps
@@ -237,13 +262,13 @@ def map_from_msg(msg: OccupancyGrid) -> GridMap:
     if info.width == 0 or info.height == 0:
         raise ValueError(f"a map needs at least one cell, got {info.width} x {info.height}")
     if len(msg.data) != info.width * info.height:
-        raise ValueError(f"a map of {info.width} x {info.height} cells needs {info.width * info.height} "
-                         f"values, got {len(msg.data)}")
+        raise ValueError(
+            f"a map of {info.width} x {info.height} cells needs {info.width * info.height} values, got {len(msg.data)}"
+        )
     occupancy = np.array(msg.data, dtype=np.int8).reshape(info.height, info.width)
     if occupancy.min() < -1 or occupancy.max() > 100:
         wrong = occupancy[(occupancy < -1) | (occupancy > 100)]
-        raise ValueError(f"cells of a map must be 0 to 100 or -1 for unknown, got {wrong[0]} "
-                         f"in {len(wrong)} cell(s)")
+        raise ValueError(f"cells of a map must be 0 to 100 or -1 for unknown, got {wrong[0]} in {len(wrong)} cell(s)")
     try:
         map_from_grid = planar_from_pose(info.origin)
     except ValueError as err:
@@ -300,12 +325,16 @@ def grid_info(grid_map: GridMap) -> MapMetaData:
 
 def is_finite(estimate: Estimate) -> bool:
     """Whether the estimate may go out: no NaN on tf, ever."""
-    return bool(np.all(np.isfinite(estimate.map_from_base)) and np.all(np.isfinite(estimate.map_from_odom))
-                and np.all(np.isfinite(estimate.covariance)))
+    return bool(
+        np.all(np.isfinite(estimate.map_from_base))
+        and np.all(np.isfinite(estimate.map_from_odom))
+        and np.all(np.isfinite(estimate.covariance))
+    )
 
 
-def status_msg(stamp_ns: int, map_frame: str, state: str, reason: str, used_share: float,
-               reliability: float) -> LocalizationStatus:
+def status_msg(
+    stamp_ns: int, map_frame: str, state: str, reason: str, used_share: float, reliability: float
+) -> LocalizationStatus:
     return LocalizationStatus(header(stamp_ns, map_frame), STATES[state], state, reason, used_share, reliability)
 
 
@@ -327,4 +356,3 @@ def beam_cases_msg(scan_header: Header, scan: Scan, cases: BeamCases) -> BeamCas
     msg.expected, msg.residual = scan.as_measured(cases.expected_m).tolist(), cases.residual_m.tolist()
     msg.weight = cases.weight.tolist()
     return msg
-

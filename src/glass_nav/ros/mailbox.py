@@ -21,8 +21,9 @@ class Mailbox:
 
     def __init__(self, **capacities: int) -> None:
         """Lanes by name, and how many items each may hold."""
-        self._lanes: Dict[str, Deque[Any]] = {lane: collections.deque(maxlen=capacity)
-                                              for lane, capacity in capacities.items()}
+        self._lanes: Dict[str, Deque[Any]] = {
+            lane: collections.deque(maxlen=capacity) for lane, capacity in capacities.items()
+        }
         self._changed = threading.Condition()
 
     def put(self, lane: str, item: Any) -> None:
@@ -83,12 +84,13 @@ class ScanCounts:
 
     WaitingScans counts the last three, its user the first three; those of several lidars share one.
     """
+
     received: int = 0
     used: int = 0
-    refused: int = 0               # nonsense fields, or a stamp that is not after the last one used
-    superseded: int = 0            # a newer one was ready too: the lidar is faster than the node or tf
+    refused: int = 0  # nonsense fields, or a stamp that is not after the last one used
+    superseded: int = 0  # a newer one was ready too: the lidar is faster than the node or tf
     dropped_no_transform: int = 0  # no transform at its stamp within the limit
-    waiting: int = 0               # for their transform, now
+    waiting: int = 0  # for their transform, now
 
 
 class WaitingScans(Generic[T]):
@@ -99,11 +101,10 @@ class WaitingScans(Generic[T]):
     """
 
     def __init__(self, capacity: int, limit_s: float, counts: Optional[ScanCounts] = None) -> None:
-        """
-        Args:
-            capacity: scans that may wait; the oldest goes first.
-            limit_s: how long one may wait, by the clock that add() and take_ready() are given.
-            counts: to be kept with those of other lidars; its own when not given.
+        """Args:
+        capacity: scans that may wait; the oldest goes first.
+        limit_s: how long one may wait, by the clock that add() and take_ready() are given.
+        counts: to be kept with those of other lidars; its own when not given.
         """
         self._waiting: List[Tuple[float, int, T]] = []  # arrival [s], stamp [ns], scan
         self._capacity = capacity
@@ -121,7 +122,7 @@ class WaitingScans(Generic[T]):
         waiting = [*self._waiting, (now_s, stamp_ns, scan)]
         if len(waiting) > self._capacity:
             self.counts.dropped_no_transform += 1
-        self._keep(waiting[-self._capacity:])
+        self._keep(waiting[-self._capacity :])
         return True
 
     def take_ready(self, is_ready: Callable[[T], bool], now_s: float) -> "Tuple[Optional[T], List[T]]":

@@ -28,10 +28,10 @@ class PackedMarker(Marker):
         raw = BytesIO()
         super().serialize(raw)
         bare = raw.getvalue()
-        buff.write(bare[:-self._AFTER_POINTS - 4])  # 4: the count of points, none so far
+        buff.write(bare[: -self._AFTER_POINTS - 4])  # 4: the count of points, none so far
         buff.write(struct.pack("<I", len(self.packed)))
         buff.write(self.packed.astype("<f8").tobytes())
-        buff.write(bare[-self._AFTER_POINTS:])
+        buff.write(bare[-self._AFTER_POINTS :])
 
 
 class PackedMarkerArray(MarkerArray):
@@ -43,17 +43,32 @@ class PackedMarkerArray(MarkerArray):
             marker.serialize(buff)
 
 
-def points_marker(header: Header, namespace: str, number: int, kind: int, points: np.ndarray, height_m: float,
-                  width_m: float, marker_colour: ColorRGBA) -> PackedMarker:
+def points_marker(
+    header: Header,
+    namespace: str,
+    number: int,
+    kind: int,
+    points: np.ndarray,
+    height_m: float,
+    width_m: float,
+    marker_colour: ColorRGBA,
+) -> PackedMarker:
     """Squares (Marker.POINTS) at points (K, 2), or lines (LINE_LIST) between pairs of them; without points a removal.
 
     rviz complains about a marker without points, so the one that was shown before is deleted instead.
     """
     packed = np.column_stack([points, np.full(len(points), height_m)])
-    return PackedMarker(packed, header=header, ns=namespace, id=number, type=kind,
-                        action=Marker.ADD if len(points) else Marker.DELETE,
-                        pose=Pose(orientation=Quaternion(w=1.0)), scale=Vector3(width_m, width_m, 0.0),
-                        color=marker_colour)
+    return PackedMarker(
+        packed,
+        header=header,
+        ns=namespace,
+        id=number,
+        type=kind,
+        action=Marker.ADD if len(points) else Marker.DELETE,
+        pose=Pose(orientation=Quaternion(w=1.0)),
+        scale=Vector3(width_m, width_m, 0.0),
+        color=marker_colour,
+    )
 
 
 def colour(rgb: np.ndarray, alpha: float = 1.0) -> ColorRGBA:

@@ -17,22 +17,23 @@ from sensor_msgs.msg import LaserScan
 from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.ros import conversions
 from glass_nav.ros.conversions import Mounting
+from glass_nav.ros.localization.params import LocalizationNodeParams
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import ScanCounts, WaitingScans
-from glass_nav.ros.params import LocalizationNodeParams
 from glass_nav.sensing import deskew
 from glass_nav.sensing.deskew import Deskew
 from glass_nav.sensing.scan import Scan, ScanError
 
-STALE_SCANS = 20       # that many older scans of one lidar in a row: its clock was set back
-MOST_LIDARS = 16       # a driver that makes up a frame for every scan must not fill the memory
+STALE_SCANS = 20  # that many older scans of one lidar in a row: its clock was set back
+MAX_LIDARS = 16  # a driver that makes up a frame for every scan must not fill the memory
 LONGEST_PERIOD_S = 5.0  # scans farther apart are a pause
-WAITING = 100          # scans of one lidar that may wait
+WAITING = 100  # scans of one lidar that may wait
 
 
 @dataclass(frozen=True)
 class PlacedScan:
     """A scan with all that the filter needs."""
+
     scan: Scan
     odom_from_base: np.ndarray  # (3,) at its stamp
     mounting: Mounting
@@ -48,7 +49,7 @@ class ScanInput:
         self._stale: Dict[str, int] = {}  # older scans in a row
         self._last_ns: Dict[str, int] = {}
         self._period_s: Dict[str, float] = {}  # from scan to scan, a running mean
-        self._placed: Set[str] = set()         # lidars that had a scan with its transforms
+        self._placed: Set[str] = set()  # lidars that had a scan with its transforms
         self._subscribers: List[rospy.Subscriber] = []
         self.counts = ScanCounts()
         self.trouble = "no scan used yet"  # why the last scan that was not used was not
@@ -57,8 +58,9 @@ class ScanInput:
     def subscribe(self, put: Callable[[LaserScan], None]) -> None:
         """Listen; put is called by other threads."""
         self._subscribers = [  # Nagle's algorithm would hold small messages for 40 ms
-            rospy.Subscriber(topic, LaserScan, put, queue_size=100, buff_size=2 ** 22, tcp_nodelay=True)
-            for topic in self._topics]
+            rospy.Subscriber(topic, LaserScan, put, queue_size=100, buff_size=2**22, tcp_nodelay=True)
+            for topic in self._topics
+        ]
 
     @property
     def lidars(self) -> List[str]:
@@ -92,8 +94,9 @@ class ScanInput:
         elif not lidar:
             self.refuse("it has no frame_id")
         elif not self._has_room_for(lidar):
-            self.refuse(f"its frame {lidar!r} would be that of the lidar number {MOST_LIDARS + 1}, the most are "
-                        f"{MOST_LIDARS}")
+            self.refuse(
+                f"its frame {lidar!r} would be that of the lidar number {MAX_LIDARS + 1}, the most are {MAX_LIDARS}"
+            )
         elif self._waiting(lidar).add(msg, stamp_ns, now_s):
             self._stale[lidar] = 0
             self._learn_period(lidar, stamp_ns)
@@ -105,12 +108,12 @@ class ScanInput:
 
     def _has_room_for(self, lidar: str) -> bool:
         """Those that never had a scan with its transforms make room."""
-        if lidar not in self._lidars and len(self._lidars) >= MOST_LIDARS:
+        if lidar not in self._lidars and len(self._lidars) >= MAX_LIDARS:
             for name in set(self._lidars) - self._placed:
                 self._lidars.pop(name).restart()
                 for figures in (self._stale, self._last_ns, self._period_s):
                     figures.pop(name, None)
-        return lidar in self._lidars or len(self._lidars) < MOST_LIDARS
+        return lidar in self._lidars or len(self._lidars) < MAX_LIDARS
 
     @property
     def period_s(self) -> Optional[float]:
@@ -150,7 +153,8 @@ class ScanInput:
         (odom, base), (_, laser) = self._transform_pairs(msg)
         try:
             odom_from_base = conversions.planar_from_transform(
-                self._tf.lookup_transform(odom, base, msg.header.stamp).transform)
+                self._tf.lookup_transform(odom, base, msg.header.stamp).transform
+            )
             base_from_laser = self._tf.lookup_transform(base, laser, msg.header.stamp).transform
         except tf2_ros.TransformException as err:  # tf was cleared since it was asked
             raise ScanError(f"no transform: {err}") from err
@@ -166,9 +170,19 @@ class ScanInput:
         """Odometry from the first beam to the last one."""
         stamps_ns = deskew.knots_ns(stamp_ns, turn_ns)
         try:
-            return Trajectory(stamps_ns, np.array([conversions.planar_from_transform(self._tf.lookup_transform(
-                self._p.odom_frame_id, self._p.base_frame_id, conversions.stamp_from_ns(knot_ns)).transform)
-                for knot_ns in stamps_ns]))
+            return Trajectory(
+                stamps_ns,
+                np.array(
+                    [
+                        conversions.planar_from_transform(
+                            self._tf.lookup_transform(
+                                self._p.odom_frame_id, self._p.base_frame_id, conversions.stamp_from_ns(knot_ns)
+                            ).transform
+                        )
+                        for knot_ns in stamps_ns
+                    ]
+                ),
+            )
         except (tf2_ros.TransformException, ValueError) as err:
             raise ScanError(f"no odometry while the lidar turned: {err}") from err
 
@@ -193,8 +207,9 @@ class ScanInput:
         """The line on a lidar that is not heard."""
         topics = ", ".join(rospy.resolve_name(topic) for topic in self._topics)
         publishers = sum(subscriber.get_num_connections() for subscriber in self._subscribers)
-        return (f"no scan on {topics} for {now_s - self.last_arrival_s:.0f} s: "
-                + ("its publisher is silent" if publishers else "nobody publishes it"))
+        return f"no scan on {topics} for {now_s - self.last_arrival_s:.0f} s: " + (
+            "its publisher is silent" if publishers else "nobody publishes it"
+        )
 
     def restart(self, now_s: float) -> None:
         """Forget what waits and which stamps were used: time has jumped."""
@@ -209,8 +224,10 @@ class ScanInput:
         return self._lidars[lidar]
 
     def _transform_pairs(self, msg: LaserScan) -> "List[tuple[str, str]]":
-        return [(self._p.odom_frame_id, self._p.base_frame_id),
-                (self._p.base_frame_id, conversions.frame_id(msg.header.frame_id))]
+        return [
+            (self._p.odom_frame_id, self._p.base_frame_id),
+            (self._p.base_frame_id, conversions.frame_id(msg.header.frame_id)),
+        ]
 
     def _has_transforms(self, msg: LaserScan) -> bool:
         pairs = self._transform_pairs(msg)

@@ -15,14 +15,15 @@ from glass_nav.geometry import angles, se2
 from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.sensing.scan import Scan
 
-KNOT_S = 0.01          # odometry is looked up so often in a turn and interpolated in between
-LONGEST_TURN_S = 1.0   # no 2D lidar turns slower; drivers that write another unit do
-_SLACK = 1.5           # scan_time may be a rounded figure of a data sheet
+KNOT_S = 0.01  # odometry is looked up so often in a turn and interpolated in between
+LONGEST_TURN_S = 1.0  # no 2D lidar turns slower; drivers that write another unit do
+_SLACK = 1.5  # scan_time may be a rounded figure of a data sheet
 
 
 @dataclass(frozen=True)
 class Deskew:
     """Whether it is done."""
+
     deskew: bool = True
 
 
@@ -43,8 +44,10 @@ def fault(beams: int, time_increment_s: float, scan_time_s: float) -> Optional[s
     turn_s = time_increment_s * max(beams - 1, 0)
     most_s = min(_SLACK * scan_time_s, LONGEST_TURN_S) if scan_time_s > 0.0 else LONGEST_TURN_S
     if turn_s > most_s:
-        return (f"time_increment {time_increment_s:g} s times {beams} beams makes {turn_s:.3g} s, the most for one "
-                f"turn is {most_s:.3g} s")
+        return (
+            f"time_increment {time_increment_s:g} s times {beams} beams makes {turn_s:.3g} s, the most for one "
+            f"turn is {most_s:.3g} s"
+        )
     return None
 
 
@@ -62,13 +65,18 @@ def straightened(scan: Scan, odom_from_base: Trajectory) -> Scan:
         odom_from_base: odometry over the turn.
     """
     later_ns = np.rint(np.arange(len(scan)) * scan.time_increment_s * 1e9).astype(np.int64)
-    base_then = se2.compose(se2.inverse(odom_from_base.at(np.int64(scan.stamp_ns))),
-                            odom_from_base.at(scan.stamp_ns + later_ns))
+    base_then = se2.compose(
+        se2.inverse(odom_from_base.at(np.int64(scan.stamp_ns))), odom_from_base.at(scan.stamp_ns + later_ns)
+    )
     laser_then = se2.compose(se2.inverse(scan.base_from_laser), se2.compose(base_then, scan.base_from_laser))
     direction_rad = scan.angles_rad + laser_then[:, 2]
     ranges_m = np.where(scan.answered, scan.ranges_m, 0.0)
     ends = laser_then[:, :2] + ranges_m[:, None] * np.stack([np.cos(direction_rad), np.sin(direction_rad)], axis=-1)
     seen_rad = direction_rad + angles.wrap(np.arctan2(ends[:, 1], ends[:, 0]) - direction_rad)
-    return replace(scan, ranges_m=np.where(scan.answered, np.hypot(ends[:, 0], ends[:, 1]), scan.ranges_m),
-                   angles_rad=np.where(scan.answered, seen_rad, direction_rad), time_increment_s=0.0,
-                   origins_m=laser_then[:, :2])
+    return replace(
+        scan,
+        ranges_m=np.where(scan.answered, np.hypot(ends[:, 0], ends[:, 1]), scan.ranges_m),
+        angles_rad=np.where(scan.answered, seen_rad, direction_rad),
+        time_increment_s=0.0,
+        origins_m=laser_then[:, :2],
+    )

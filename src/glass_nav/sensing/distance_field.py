@@ -14,7 +14,6 @@ from scipy import ndimage
 
 from glass_nav.world.grid_map import GridMap
 
-
 _DEEPEST_M = 0.4  # a wall that a mapper blurred is rarely thicker
 
 
@@ -23,8 +22,8 @@ class DistanceField:
 
     def __init__(self, grid_map: GridMap, max_distance_m: float = 2.0) -> None:
         """Args:
-            grid_map: map without an occupied cell is allowed; all distances are max_distance_m then.
-            max_distance_m: distances beyond it are this one; the gradient is 0 there.
+        grid_map: map without an occupied cell is allowed; all distances are max_distance_m then.
+        max_distance_m: distances beyond it are this one; the gradient is 0 there.
         """
         occupied = grid_map.occupied
         if occupied.any():
@@ -56,9 +55,11 @@ class DistanceField:
         along_column = ((d01 - d00) * (1.0 - up_share) + (d11 - d10) * up_share) / self._resolution_m
         along_row = (upper - lower) / self._resolution_m
         distance = lower + (upper - lower) * up_share
-        return (distance if outside_m is None else np.minimum(distance + outside_m, self._most_m),
-                self._cos * along_column - self._sin * along_row,
-                self._sin * along_column + self._cos * along_row)
+        return (
+            distance if outside_m is None else np.minimum(distance + outside_m, self._most_m),
+            self._cos * along_column - self._sin * along_row,
+            self._sin * along_column + self._cos * along_row,
+        )
 
     def distance(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
         """The distance of at() alone (...) [m]."""
@@ -75,10 +76,12 @@ class DistanceField:
             lower = np.minimum(lower + outside_m, self._most_m)
         return lower
 
-    def _between(self, x_m: np.ndarray, y_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray,
-                                                                  Optional[np.ndarray]]:
+    def _between(
+        self, x_m: np.ndarray, y_m: np.ndarray
+    ) -> Tuple[np.ndarray, np.ndarray, np.ndarray, Optional[np.ndarray]]:
         """Of the four cells around points (...): flat index of the first, and shares of the next column and row; and
-        how far outside of the grid the points are, None if none is."""
+        how far outside of the grid the points are, None if none is.
+        """
         dx, dy = x_m - self._origin[0], y_m - self._origin[1]
         column = (self._cos * dx + self._sin * dy) / self._resolution_m + 0.5  # of the padded grid
         row = (self._cos * dy - self._sin * dx) / self._resolution_m + 0.5

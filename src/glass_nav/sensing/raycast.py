@@ -28,41 +28,43 @@ UNKNOWN_CELLS = ("pass", "stop")
 @dataclass(frozen=True)
 class FirstHits:
     """The first surface along each ray."""
+
     range_m: np.ndarray  # (P, B) inf: nothing within max_range
-    cell: np.ndarray     # (P, B) int32 flat index of the occupied cell met, -1: nothing
+    cell: np.ndarray  # (P, B) int32 flat index of the occupied cell met, -1: nothing
 
 
 @dataclass(frozen=True)
 class SurfaceHits:
     """Up to three surfaces along each ray, what was passed between them, and the mirrored path. All (P, B)."""
-    first_m: np.ndarray             # range to the surface, inf: none
+
+    first_m: np.ndarray  # range to the surface, inf: none
     second_m: np.ndarray
     third_m: np.ndarray
-    first_cell: np.ndarray          # int32 flat index of the cell met, -1: none
+    first_cell: np.ndarray  # int32 flat index of the cell met, -1: none
     second_cell: np.ndarray
     third_cell: np.ndarray
-    first_thickness_m: np.ndarray   # along the normal, along the ray where there is none; inf: not passed
+    first_thickness_m: np.ndarray  # along the normal, along the ray where there is none; inf: not passed
     second_thickness_m: np.ndarray
-    normal_rad: np.ndarray          # of the first surface in map, towards the ray's origin; NaN: none
-    linearity: np.ndarray           # of the first surface: 1 straight wall ... 0 no direction
-    mirrored_m: np.ndarray          # origin -> first surface -> next surface by reflection; inf: none
-    mirrored_cell: np.ndarray       # int32 flat index of the cell where that ends, -1: none
+    normal_rad: np.ndarray  # of the first surface in map, towards the ray's origin; NaN: none
+    linearity: np.ndarray  # of the first surface: 1 straight wall ... 0 no direction
+    mirrored_m: np.ndarray  # origin -> first surface -> next surface by reflection; inf: none
+    mirrored_cell: np.ndarray  # int32 flat index of the cell where that ends, -1: none
 
 
 @dataclass(frozen=True)
 class Paths:
     """The four ways along each ray, (4, P, B): to the first surface, mirrored there, to the second and the third."""
-    range_m: np.ndarray        # whole length, inf: none
+
+    range_m: np.ndarray  # whole length, inf: none
     cos_incidence: np.ndarray  # |u . n| where it ends, 1 where nothing or no normal is
-    cell: np.ndarray           # int32 flat index of the cell met, -1: none
+    cell: np.ndarray  # int32 flat index of the cell met, -1: none
 
 
 class RayCaster:
     """Casts rays on one map. Safe to share between threads."""
 
     def __init__(self, grid_map: GridMap, backend: str = "exact", threads: int = 1, unknown: str = "pass") -> None:
-        """
-        Args:
+        """Args:
             grid_map: cells of at least OCCUPIED_PERCENT end a ray.
             backend: "exact" leaps over free squares; "mrpt" is MRPT's simulateScanRay with its known faults
                 corrected, slower, for comparison.
@@ -81,8 +83,9 @@ class RayCaster:
         self._grid_map = grid_map
         self._threads = int(threads)
         self._grid_from_map = se2.inverse(grid_map.map_from_grid)
-        self._grid = _mrpt_grid.Grid(grid_map.occupancy, grid_map.resolution_m, OCCUPIED_PERCENT, backend,
-                                     unknown == "stop")
+        self._grid = _mrpt_grid.Grid(
+            grid_map.occupancy, grid_map.resolution_m, OCCUPIED_PERCENT, backend, unknown == "stop"
+        )
         self._normals: Optional[Tuple[np.ndarray, np.ndarray, np.ndarray]] = None
 
     @property
@@ -111,9 +114,15 @@ class RayCaster:
         poses, angles_rad = self._checked(poses, angles_rad, max_range_m)
         return FirstHits(*self._grid.cast_first(poses, angles_rad, max_range_m, self._threads))
 
-    def cast_surfaces(self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float,
-                      max_thickness_m: float = 0.3, min_linearity: float = 0.9,
-                      min_gap_m: float = 0.1) -> SurfaceHits:
+    def cast_surfaces(
+        self,
+        poses: np.ndarray,
+        angles_rad: np.ndarray,
+        max_range_m: float,
+        max_thickness_m: float = 0.3,
+        min_linearity: float = 0.9,
+        min_gap_m: float = 0.1,
+    ) -> SurfaceHits:
         """The first three surfaces along each ray and the path mirrored at the first.
 
         The thickness of a surface is the length of the ray in it times |cos incidence|. max_range_m bounds all paths,
@@ -133,13 +142,21 @@ class RayCaster:
         """
         _check_limits(max_thickness_m, min_linearity, min_gap_m)
         poses, angles_rad = self._checked(poses, angles_rad, max_range_m)
-        found = self._grid.cast_surfaces(poses, angles_rad, max_range_m, max_thickness_m, min_linearity, min_gap_m,
-                                         self._threads)
+        found = self._grid.cast_surfaces(
+            poses, angles_rad, max_range_m, max_thickness_m, min_linearity, min_gap_m, self._threads
+        )
         found["normal_rad"] = self._in_map(found["normal_rad"])
         return SurfaceHits(**found)
 
-    def cast_paths(self, poses: np.ndarray, angles_rad: np.ndarray, reach_m: np.ndarray, max_thickness_m: float = 0.3,
-                   min_linearity: float = 0.9, min_gap_m: float = 0.1) -> Paths:
+    def cast_paths(
+        self,
+        poses: np.ndarray,
+        angles_rad: np.ndarray,
+        reach_m: np.ndarray,
+        max_thickness_m: float = 0.3,
+        min_linearity: float = 0.9,
+        min_gap_m: float = 0.1,
+    ) -> Paths:
         """Where the paths of cast_surfaces() end, each beam followed only so far as it matters.
 
         Args:
@@ -152,13 +169,15 @@ class RayCaster:
         _check_limits(max_thickness_m, min_linearity, min_gap_m)
         reach_m = np.asarray(reach_m, float)
         if reach_m.shape != np.shape(angles_rad):
-            raise ValueError(f"ray caster: reach must have the shape of the angles {np.shape(angles_rad)}, "
-                             f"got {reach_m.shape}")
+            raise ValueError(
+                f"ray caster: reach must have the shape of the angles {np.shape(angles_rad)}, got {reach_m.shape}"
+            )
         if not (np.isfinite(reach_m) & (reach_m > 0.0)).all():
             raise ValueError(f"ray caster: reach must be finite and > 0 m, got {reach_m.min()} to {reach_m.max()}")
         poses, angles_rad = self._checked(poses, angles_rad, 1.0)
-        return Paths(*self._grid.cast_paths(poses, angles_rad, reach_m, max_thickness_m, min_linearity, min_gap_m,
-                                            self._threads))
+        return Paths(
+            *self._grid.cast_paths(poses, angles_rad, reach_m, max_thickness_m, min_linearity, min_gap_m, self._threads)
+        )
 
     def simulate_scan_ray_raw(self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float) -> np.ndarray:
         """As cast(), by MRPT's simulateScanRay as it is, faults included: to be compared with, not to be used."""
@@ -193,8 +212,9 @@ class RayCaster:
             return grid_angle_rad
         return angles.wrap(grid_angle_rad + grid_angle_rad.dtype.type(yaw))
 
-    def _checked(self, poses: np.ndarray, angles_rad: np.ndarray,
-                 max_range_m: float) -> "Tuple[np.ndarray, np.ndarray]":
+    def _checked(
+        self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float
+    ) -> "Tuple[np.ndarray, np.ndarray]":
         """Poses in the frame of the grid, and the angles; ValueError if a ray cannot be cast."""
         poses, angles_rad = np.asarray(poses, float), np.asarray(angles_rad, float)
         if poses.ndim != 2 or poses.shape[1] != 3:

@@ -18,13 +18,14 @@ class ScanError(ValueError):
 @dataclass(frozen=True)
 class Scan:
     """Ranges along the beams of one lidar, and where that lidar sits on the robot."""
-    stamp_ns: int                # time of the data [ns]
-    ranges_m: np.ndarray         # (B,) along each beam; REP 117 for what is no range
-    angles_rad: np.ndarray       # (B,) direction of each beam in the laser's frame
+
+    stamp_ns: int  # time of the data [ns]
+    ranges_m: np.ndarray  # (B,) along each beam; REP 117 for what is no range
+    angles_rad: np.ndarray  # (B,) direction of each beam in the laser's frame
     range_min_m: float
     range_max_m: float
     base_from_laser: np.ndarray  # (3,) planar pose of the laser on the robot
-    lidar: str = ""              # which one of several: by its frame
+    lidar: str = ""  # which one of several: by its frame
     time_increment_s: float = 0.0  # from each beam to the next; 0: all at the stamp
     origins_m: Optional[np.ndarray] = None  # (B, 2) where in the laser's frame each beam began; None: at (0, 0)
 
@@ -52,8 +53,14 @@ class Scan:
             return ranges_m
         there = np.isfinite(ranges_m)
         along_m = np.where(there, ranges_m, 0.0)
-        return np.where(there, np.hypot(along_m * np.cos(self.angles_rad) - self.origins_m[:, 0],
-                                        along_m * np.sin(self.angles_rad) - self.origins_m[:, 1]), ranges_m)
+        return np.where(
+            there,
+            np.hypot(
+                along_m * np.cos(self.angles_rad) - self.origins_m[:, 0],
+                along_m * np.sin(self.angles_rad) - self.origins_m[:, 1],
+            ),
+            ranges_m,
+        )
 
     def limited(self, min_range_m: float, max_range_m: float) -> "Scan":
         """The same turn without the ranges outside these limits; a negative limit is the scan's own.
@@ -66,8 +73,7 @@ class Scan:
         low = max(self.range_min_m, min_range_m)
         high = min(self.range_max_m, max_range_m) if max_range_m >= 0.0 else self.range_max_m
         if not low < high:
-            raise ScanError(f"scan at {self.stamp_ns * 1e-9:.3f} s: no range is left between "
-                            f"{low:g} m and {high:g} m")
+            raise ScanError(f"scan at {self.stamp_ns * 1e-9:.3f} s: no range is left between {low:g} m and {high:g} m")
         ranges_m = self.ranges_m.copy()
         with np.errstate(invalid="ignore"):
             ranges_m[ranges_m < low] = -np.inf
@@ -75,10 +81,18 @@ class Scan:
         return replace(self, ranges_m=ranges_m, range_min_m=low, range_max_m=high)
 
 
-def scan_from_fields(stamp_ns: int, ranges_m: np.ndarray, angle_min_rad: float,
-                     angle_increment_rad: float, range_min_m: float, range_max_m: float,
-                     base_from_laser: np.ndarray, upside_down: bool = False, lidar: str = "",
-                     time_increment_s: float = 0.0) -> Scan:
+def scan_from_fields(
+    stamp_ns: int,
+    ranges_m: np.ndarray,
+    angle_min_rad: float,
+    angle_increment_rad: float,
+    range_min_m: float,
+    range_max_m: float,
+    base_from_laser: np.ndarray,
+    upside_down: bool = False,
+    lidar: str = "",
+    time_increment_s: float = 0.0,
+) -> Scan:
     """The fields of a LaserScan as a Scan, by REP 117.
 
     A range at or beyond range_max is +inf (nothing met), one below range_min -inf (too near),
@@ -118,6 +132,21 @@ def scan_from_fields(stamp_ns: int, ranges_m: np.ndarray, angle_min_rad: float,
         failed = ranges_m == 0.0
         ranges_m[ranges_m < range_min_m] = -np.inf
         ranges_m[failed] = np.nan
-    return Scan(int(stamp_ns), ranges_m, -angles_rad if upside_down else angles_rad,
-                float(range_min_m), float(range_max_m), np.asarray(base_from_laser, float), lidar,
-                time_increment_s)
+    return Scan(
+        int(stamp_ns),
+        ranges_m,
+        -angles_rad if upside_down else angles_rad,
+        float(range_min_m),
+        float(range_max_m),
+        np.asarray(base_from_laser, float),
+        lidar,
+        time_increment_s,
+    )
+
+
+def spread_evenly(usable: np.ndarray, count: int) -> np.ndarray:
+    """Indices of at most count beams that are usable (> 0), spread evenly over those there are."""
+    beams = np.flatnonzero(usable > 0)
+    if len(beams) <= count:
+        return beams
+    return beams[np.linspace(0, len(beams) - 1, count).round().astype(int)]

@@ -22,10 +22,11 @@ _ALL_ROUND = 1.5  # steps between the last beam and the first
 @dataclass(frozen=True)
 class ScanSegmentParams:
     """What makes a segment."""
-    range_sigma_m: float = 0.02    # of a range
+
+    range_sigma_m: float = 0.02  # of a range
     bearing_sigma_rad: float = 0.004  # of a beam's direction: half a step of half a degree
-    tolerance_m: float = 0.06      # no point of a segment lies further from its line
-    gap_m: float = 0.5             # neighbours that are further apart are of two surfaces
+    tolerance_m: float = 0.06  # no point of a segment lies further from its line
+    gap_m: float = 0.5  # neighbours that are further apart are of two surfaces
     least_length_m: float = 0.3
     least_points: int = 6
 
@@ -42,16 +43,18 @@ class ScanSegmentParams:
 @dataclass(frozen=True)
 class ScanSegments:
     """Segments in the robot's frame; each has the lidar to its left."""
-    segments_m: np.ndarray    # (S, 4) x1 y1 x2 y2
-    covariance: np.ndarray    # (S, 2, 2) of heading [rad] and offset along the normal to the left [m] of their lines
+
+    segments_m: np.ndarray  # (S, 4) x1 y1 x2 y2
+    covariance: np.ndarray  # (S, 2, 2) of heading [rad] and offset along the normal to the left [m] of their lines
     beam_segment: np.ndarray  # (B,) int: the segment of each beam, segments.NO_SEGMENT for none
 
     def __len__(self) -> int:
         return len(self.segments_m)
 
 
-def extract(scan: Scan, params: ScanSegmentParams = ScanSegmentParams(),
-            used: Optional[np.ndarray] = None) -> ScanSegments:
+def extract(
+    scan: Scan, params: ScanSegmentParams = ScanSegmentParams(), used: Optional[np.ndarray] = None
+) -> ScanSegments:
     """All segments of a scan.
 
     Args:
@@ -97,8 +100,9 @@ def _chains(scan: Scan, points: np.ndarray, chosen: np.ndarray, gap_m: float) ->
     return np.split(np.roll(beams, -begin), np.mod(cuts[:-1] + 1 - begin, len(beams)))
 
 
-def _fitted(points: np.ndarray, segment: np.ndarray, laser_m: np.ndarray,
-            params: ScanSegmentParams) -> "tuple[np.ndarray, np.ndarray]":
+def _fitted(
+    points: np.ndarray, segment: np.ndarray, laser_m: np.ndarray, params: ScanSegmentParams
+) -> "tuple[np.ndarray, np.ndarray]":
     """The segment (4,) once more by the weights that its first line gives, and its covariance (2, 2)."""
     along = (segment[2:] - segment[:2]) / np.hypot(*(segment[2:] - segment[:2]))
     beam = points - laser_m

@@ -17,16 +17,17 @@ from glass_nav.world import landmark_map
 from glass_nav.world.landmark_map import LandmarkMap
 
 MATERIALS = {"plaster": 0.7, "wood": 0.5, "metal": 0.4, "cloth": 0.3, "plant": 0.4, "black": 0.06}
-LARGEST_GAP_M = 0.1     # panes nearer than this to each other are one glazing, drawn as one surface
+LARGEST_GAP_M = 0.1  # panes nearer than this to each other are one glazing, drawn as one surface
 OPAQUE, PANE, MIRROR = 0, 1, 2
-TRIES = 60              # places tried for a thing that is moved
-MOVED_M = (0.5, 3.0)    # how far
+TRIES = 60  # places tried for a thing that is moved
+MOVED_M = (0.5, 3.0)  # how far
 PATH_CLEARANCE_M = 0.55  # of a moved thing from the paths
 
 
 @dataclass(frozen=True)
 class Wall:
     """A wall of corners joined by straight lines, as thick to either side of them."""
+
     line_m: np.ndarray  # (N, 2)
     thickness_m: float = 0.2
     reflectance: float = MATERIALS["plaster"]
@@ -40,13 +41,14 @@ class Wall:
 @dataclass(frozen=True)
 class Pane:
     """A sheet of glass, or two of them with a gap."""
-    line_m: np.ndarray         # (2, 2)
+
+    line_m: np.ndarray  # (2, 2)
     thickness_m: float = 0.008  # of one sheet
-    coating: float = 1.0       # factor on its reflectance
-    glazing: str = "single"    # or "double"
-    gap_m: float = 0.016       # between the sheets of a double glazing
-    dirt: float = 0.004        # share of the light that dust and prints scatter, rho_d
-    film: bool = False         # pasted over: beams see a wall
+    coating: float = 1.0  # factor on its reflectance
+    glazing: str = "single"  # or "double"
+    gap_m: float = 0.016  # between the sheets of a double glazing
+    dirt: float = 0.004  # share of the light that dust and prints scatter, rho_d
+    film: bool = False  # pasted over: beams see a wall
 
     def __post_init__(self) -> None:
         check_line("pane", self.line_m, most=2)
@@ -55,8 +57,9 @@ class Pane:
         if self.glazing not in ("single", "double"):
             raise ValueError(f"pane glazing must be single or double, got {self.glazing!r}")
         if not 0.0 < self.gap_m < LARGEST_GAP_M:
-            raise ValueError(f"pane gap must be > 0 and < {LARGEST_GAP_M:g} m (else they are two panes), "
-                             f"got {self.gap_m}")
+            raise ValueError(
+                f"pane gap must be > 0 and < {LARGEST_GAP_M:g} m (else they are two panes), got {self.gap_m}"
+            )
         if not 0.0 <= self.dirt <= 0.1:
             raise ValueError(f"pane dirt must be 0 to 0.1, got {self.dirt}")
 
@@ -64,6 +67,7 @@ class Pane:
 @dataclass(frozen=True)
 class Mirror:
     """A mirror; a beam sees it as glass that lets nothing through."""
+
     line_m: np.ndarray  # (2, 2)
     reflectance: float = 0.9
 
@@ -75,9 +79,10 @@ class Mirror:
 @dataclass(frozen=True)
 class Door:
     """A door leaf; open, there is nothing."""
+
     line_m: np.ndarray  # (2, 2)
     mapped: str = "closed"  # or "open": when the map was drawn
-    now: str = "closed"     # or "open"
+    now: str = "closed"  # or "open"
     thickness_m: float = 0.05
     reflectance: float = MATERIALS["wood"]
 
@@ -93,6 +98,7 @@ class Door:
 @dataclass(frozen=True)
 class Thing:
     """Furniture, a post, a tree: an outline with something opaque inside."""
+
     outline_m: np.ndarray  # (N, 2) corners in order
     reflectance: float = MATERIALS["wood"]
     mapped: bool = True
@@ -110,6 +116,7 @@ class Thing:
 @dataclass(frozen=True)
 class Person:
     """Somebody who walks along the waypoints and back; on no map."""
+
     waypoints_m: np.ndarray  # (N, 2)
     speed_m_s: float = 1.0
     radius_m: float = 0.25
@@ -123,22 +130,24 @@ class Person:
 @dataclass(frozen=True)
 class Surfaces:
     """The straight pieces of a building, each a line from one end to the other."""
-    from_m: np.ndarray       # (S, 2)
-    to_m: np.ndarray         # (S, 2)
-    kind: np.ndarray         # (S,) uint8: OPAQUE, PANE, MIRROR
-    mapped: np.ndarray       # (S,) bool
-    present: np.ndarray      # (S,) bool
+
+    from_m: np.ndarray  # (S, 2)
+    to_m: np.ndarray  # (S, 2)
+    kind: np.ndarray  # (S,) uint8: OPAQUE, PANE, MIRROR
+    mapped: np.ndarray  # (S,) bool
+    present: np.ndarray  # (S,) bool
     reflectance: np.ndarray  # (S,) diffuse of OPAQUE, specular of MIRROR; of a PANE not used
     thickness_m: np.ndarray  # (S,) of PANE
-    coating: np.ndarray      # (S,) of PANE
-    dirt: np.ndarray         # (S,) of PANE and MIRROR
-    glazing: np.ndarray      # (S,) int: panes of the same number count as one surface; -1: OPAQUE
-    sheets: np.ndarray       # (S,) int: how many of that number there are
+    coating: np.ndarray  # (S,) of PANE
+    dirt: np.ndarray  # (S,) of PANE and MIRROR
+    glazing: np.ndarray  # (S,) int: panes of the same number count as one surface; -1: OPAQUE
+    sheets: np.ndarray  # (S,) int: how many of that number there are
 
 
 @dataclass(frozen=True, eq=False)
 class Building:
     """What a robot drives in and what its map knows of it."""
+
     walls: Tuple[Wall, ...]
     panes: Tuple[Pane, ...] = ()
     mirrors: Tuple[Mirror, ...] = ()
@@ -160,8 +169,12 @@ class Building:
                 along = (b - a) / np.hypot(*(b - a)) * wall.thickness_m / 2.0  # into the corner, so that none is open
                 rows += outline_rows(_strip(a - along, b + along, wall.thickness_m), True, True, wall.reflectance)
         for door in self.doors:
-            rows += outline_rows(_strip(door.line_m[0], door.line_m[1], door.thickness_m), door.mapped == "closed",
-                             door.now == "closed", door.reflectance)
+            rows += outline_rows(
+                _strip(door.line_m[0], door.line_m[1], door.thickness_m),
+                door.mapped == "closed",
+                door.now == "closed",
+                door.reflectance,
+            )
         for thing in self.things:
             rows += outline_rows(thing.outline_m, thing.mapped, thing.present, thing.reflectance)
         for number, pane in enumerate(self.panes):
@@ -172,11 +185,37 @@ class Building:
             normal = np.array([a[1] - b[1], b[0] - a[0]]) / np.hypot(*(b - a))
             offsets = [0.0] if pane.glazing == "single" else [-pane.gap_m / 2.0, pane.gap_m / 2.0]
             for offset in offsets:
-                rows.append((*(a + offset * normal), *(b + offset * normal), PANE, True, True, 0.0, pane.thickness_m,
-                             pane.coating, pane.dirt, number, len(offsets)))
+                rows.append(
+                    (
+                        *(a + offset * normal),
+                        *(b + offset * normal),
+                        PANE,
+                        True,
+                        True,
+                        0.0,
+                        pane.thickness_m,
+                        pane.coating,
+                        pane.dirt,
+                        number,
+                        len(offsets),
+                    )
+                )
         for number, mirror in enumerate(self.mirrors):
-            rows.append((*mirror.line_m[0], *mirror.line_m[1], MIRROR, True, True, mirror.reflectance, 0.0, 1.0, 0.004,
-                         len(self.panes) + number, 1))
+            rows.append(
+                (
+                    *mirror.line_m[0],
+                    *mirror.line_m[1],
+                    MIRROR,
+                    True,
+                    True,
+                    mirror.reflectance,
+                    0.0,
+                    1.0,
+                    0.004,
+                    len(self.panes) + number,
+                    1,
+                )
+            )
         return surfaces_from_rows(rows)
 
     def opaque(self) -> "Building":
@@ -194,9 +233,8 @@ class Building:
         """
         if not 0.0 <= share <= 1.0:
             raise ValueError(f"changed share must be 0 to 1, got {share}")
-        movable = [index for index, thing in enumerate(self.things)
-                   if thing.movable and thing.mapped and thing.present]
-        moved = rng.permutation(len(movable))[:int(round(share * len(movable)))]
+        movable = [index for index, thing in enumerate(self.things) if thing.movable and thing.mapped and thing.present]
+        moved = rng.permutation(len(movable))[: int(round(share * len(movable)))]
         building = self
         for index in sorted(movable[number] for number in moved):
             thing = self.things[index]
@@ -221,10 +259,12 @@ class Building:
             outline = (outline_m - middle) @ np.array([[cos, sin], [-sin, cos]]) + there
             edges = np.roll(outline, -1, axis=0)
             spokes = np.tile(there, (len(outline), 1))
-            if (not crosses(outline, edges, from_m, to_m).any()  # touches nothing
-                    and not crosses(spokes, outline, from_m, to_m).any()  # nor has a small thing inside
-                    and not crosses(middle[None], there[None], from_m, to_m).any()  # nor leaves the room
-                    and self._path_clearance(outline) > PATH_CLEARANCE_M):
+            if (
+                not crosses(outline, edges, from_m, to_m).any()  # touches nothing
+                and not crosses(spokes, outline, from_m, to_m).any()  # nor has a small thing inside
+                and not crosses(middle[None], there[None], from_m, to_m).any()  # nor leaves the room
+                and self._path_clearance(outline) > PATH_CLEARANCE_M
+            ):
                 return outline
         return None
 
@@ -233,22 +273,37 @@ class Building:
         edges = np.roll(outline_m, -1, axis=0)
         shares = np.linspace(0.0, 1.0, 9)[:, None, None]
         points = (outline_m + shares * (edges - outline_m)).reshape(-1, 2)
-        return min((float(distances(points, path[:-1], path[1:]).min()) for path in self.paths.values()),
-                   default=np.inf)
+        return min(
+            (float(distances(points, path[:-1], path[1:]).min()) for path in self.paths.values()), default=np.inf
+        )
 
 
 def surfaces_from_rows(rows: Sequence[Tuple[float, ...]]) -> Surfaces:
     """Surfaces from (x0, y0, x1, y1, kind, mapped, present, reflectance, thickness, coating, dirt, glazing, sheets)."""
     table = np.array(rows, float).reshape(-1, 13)
-    return Surfaces(table[:, 0:2].copy(), table[:, 2:4].copy(), table[:, 4].astype(np.uint8), table[:, 5] > 0,
-                    table[:, 6] > 0, table[:, 7].copy(), table[:, 8].copy(), table[:, 9].copy(), table[:, 10].copy(),
-                    table[:, 11].astype(int), table[:, 12].astype(int))
+    return Surfaces(
+        table[:, 0:2].copy(),
+        table[:, 2:4].copy(),
+        table[:, 4].astype(np.uint8),
+        table[:, 5] > 0,
+        table[:, 6] > 0,
+        table[:, 7].copy(),
+        table[:, 8].copy(),
+        table[:, 9].copy(),
+        table[:, 10].copy(),
+        table[:, 11].astype(int),
+        table[:, 12].astype(int),
+    )
 
 
 def joined(first: Surfaces, second: Surfaces) -> Surfaces:
     """Both; the glazings of the second keep their numbers."""
-    return Surfaces(**{name: np.concatenate([getattr(first, name), getattr(second, name)])
-                       for name in Surfaces.__dataclass_fields__})
+    return Surfaces(
+        **{
+            name: np.concatenate([getattr(first, name), getattr(second, name)])
+            for name in Surfaces.__dataclass_fields__
+        }
+    )
 
 
 def box(x_m: float, y_m: float, length_m: float, width_m: float, yaw_rad: float = 0.0) -> np.ndarray:
@@ -273,7 +328,7 @@ def distances(points_m: np.ndarray, from_m: np.ndarray, to_m: np.ndarray) -> np.
     """(N, M) distances [m] of points (N, 2) from segments (M, 2)."""
     way = to_m - from_m
     to_point = points_m[:, None] - from_m
-    share = np.clip((to_point * way).sum(-1) / np.maximum((way ** 2).sum(-1), 1e-12), 0.0, 1.0)
+    share = np.clip((to_point * way).sum(-1) / np.maximum((way**2).sum(-1), 1e-12), 0.0, 1.0)
     return np.hypot(*np.moveaxis(to_point - share[..., None] * way, -1, 0))
 
 
@@ -300,8 +355,9 @@ def check_line(noun: str, line_m: np.ndarray, least: int = 2, most: int = 0) -> 
         raise ValueError(f"{noun} must have points of [x, y], got shape {line_m.shape}")
     if len(line_m) < least or most and len(line_m) > most:
         needs = f"{least}" if most else f"at least {least}"
-        raise ValueError(f"{noun} has {len(line_m)} point{'s' if len(line_m) != 1 else ''}, {article} {noun} "
-                         f"needs {needs}")
+        raise ValueError(
+            f"{noun} has {len(line_m)} point{'s' if len(line_m) != 1 else ''}, {article} {noun} needs {needs}"
+        )
     if not np.isfinite(line_m).all():
         number = int(np.argmin(np.isfinite(line_m).all(axis=1)))
         raise ValueError(f"{noun} has the point {line_m[number].tolist()}, coordinates must be finite")

@@ -12,23 +12,33 @@ from typing import Any, Callable, Dict, List, Sequence, TypeVar, Union
 import numpy as np
 
 from glass_nav.geometry import angles, se2
-from glass_nav.simulation.building import (MATERIALS, Building, Door, Mirror, Pane, Person, Thing, Wall, box,
-                                           check_line)
+from glass_nav.simulation.building import MATERIALS, Building, Door, Mirror, Pane, Person, Thing, Wall, box, check_line
 from glass_nav.world import landmark_file
 from glass_nav.world.landmark_map import LandmarkMap
 
 FILE_NAME = "building.yaml"
-NOUNS = {"walls": "wall", "panes": "pane", "mirrors": "mirror", "doors": "door", "mullions": "mullion",
-         "furniture": "furniture", "unmapped": "unmapped", "gone": "gone", "people": "person"}
-KEYS = {"walls": ("line", "thickness", "reflectance"),
-        "panes": ("line", "thickness", "coating", "glazing", "gap", "dirt"),
-        "mirrors": ("line", "reflectance"),
-        "doors": ("line", "mapped", "now", "thickness", "reflectance"),
-        "mullions": ("line", "every", "points", "size", "yaw_deg", "reflectance"),
-        "furniture": ("box", "yaw_deg", "outline", "reflectance", "movable"),
-        "unmapped": ("box", "yaw_deg", "outline", "reflectance"),
-        "gone": ("box", "yaw_deg", "outline", "reflectance"),
-        "people": ("waypoints", "speed", "radius")}
+NOUNS = {
+    "walls": "wall",
+    "panes": "pane",
+    "mirrors": "mirror",
+    "doors": "door",
+    "mullions": "mullion",
+    "furniture": "furniture",
+    "unmapped": "unmapped",
+    "gone": "gone",
+    "people": "person",
+}
+KEYS = {
+    "walls": ("line", "thickness", "reflectance"),
+    "panes": ("line", "thickness", "coating", "glazing", "gap", "dirt"),
+    "mirrors": ("line", "reflectance"),
+    "doors": ("line", "mapped", "now", "thickness", "reflectance"),
+    "mullions": ("line", "every", "points", "size", "yaw_deg", "reflectance"),
+    "furniture": ("box", "yaw_deg", "outline", "reflectance", "movable"),
+    "unmapped": ("box", "yaw_deg", "outline", "reflectance"),
+    "gone": ("box", "yaw_deg", "outline", "reflectance"),
+    "people": ("waypoints", "speed", "radius"),
+}
 SECTIONS = ("placed", *KEYS, "tags", "seen", "paths", "start")
 UNITS = {"thickness": "thickness_m", "gap": "gap_m", "speed": "speed_m_s", "radius": "radius_m"}  # keys of numbers
 MULLION_M = 0.06
@@ -88,23 +98,39 @@ def _building(document: Item, name: str) -> Building:
     def each(section: str, make: Callable[[str, Item], T]) -> List[T]:
         return [_made(NOUNS[section], number, item, make) for number, item in enumerate(items[section], start=1)]
 
-    walls = each("walls", lambda noun, item: Wall(lines(item, noun),
-                                                  **_numbers(noun, item, "thickness", "reflectance")))
-    panes = each("panes", lambda noun, item: Pane(
-        lines(item, noun), **_numbers(noun, item, "thickness", "coating", "gap", "dirt"), **_words(item, "glazing")))
+    walls = each(
+        "walls", lambda noun, item: Wall(lines(item, noun), **_numbers(noun, item, "thickness", "reflectance"))
+    )
+    panes = each(
+        "panes",
+        lambda noun, item: Pane(
+            lines(item, noun), **_numbers(noun, item, "thickness", "coating", "gap", "dirt"), **_words(item, "glazing")
+        ),
+    )
     mirrors = each("mirrors", lambda noun, item: Mirror(lines(item, noun), **_numbers(noun, item, "reflectance")))
-    doors = each("doors", lambda noun, item: Door(lines(item, noun), **_words(item, "mapped", "now"),
-                                                  **_numbers(noun, item, "thickness", "reflectance")))
-    people = each("people", lambda noun, item: Person(lines(item, noun, "waypoints"),
-                                                      **_numbers(noun, item, "speed", "radius")))
+    doors = each(
+        "doors",
+        lambda noun, item: Door(
+            lines(item, noun), **_words(item, "mapped", "now"), **_numbers(noun, item, "thickness", "reflectance")
+        ),
+    )
+    people = each(
+        "people", lambda noun, item: Person(lines(item, noun, "waypoints"), **_numbers(noun, item, "speed", "radius"))
+    )
     things: List[Thing] = []
     for section, mapped, present in (("furniture", True, True), ("unmapped", False, True), ("gone", True, False)):
+
         def thing(noun: str, item: Item, mapped: bool = mapped, present: bool = present) -> Thing:
             movable = item.get("movable", mapped and present)
             if not isinstance(movable, bool):
                 raise BuildingError(f"{noun} movable must be true or false, got {movable!r}")
-            return Thing(se2.transform_points(placed, _outline(noun, item)), mapped=mapped, present=present,
-                         movable=movable, **_numbers(noun, item, "reflectance"))
+            return Thing(
+                se2.transform_points(placed, _outline(noun, item)),
+                mapped=mapped,
+                present=present,
+                movable=movable,
+                **_numbers(noun, item, "reflectance"),
+            )
 
         things += each(section, thing)
     for posts in each("mullions", lambda noun, item: _mullions(noun, item, placed)):
@@ -120,8 +146,19 @@ def _building(document: Item, name: str) -> Building:
     seen = np.zeros((0, 2))
     if "seen" in document:
         seen = se2.transform_points(placed, _points("seen", document, "seen"))
-    return Building(tuple(walls), tuple(panes), tuple(mirrors), tuple(doors), tuple(things), tuple(people), paths,
-                    start, seen, name, _tags(document, placed))
+    return Building(
+        tuple(walls),
+        tuple(panes),
+        tuple(mirrors),
+        tuple(doors),
+        tuple(things),
+        tuple(people),
+        paths,
+        start,
+        seen,
+        name,
+        _tags(document, placed),
+    )
 
 
 def _tags(document: Item, placed: np.ndarray) -> LandmarkMap:
@@ -133,8 +170,11 @@ def _tags(document: Item, placed: np.ndarray) -> LandmarkMap:
         tags = landmark_file.from_items(items)
     except ValueError as err:
         raise BuildingError(f"tags: {err}") from err
-    return replace(tags, positions_m=se2.transform_points(placed, tags.positions_m),
-                   facing_rad=angles.wrap(tags.facing_rad + placed[2]))
+    return replace(
+        tags,
+        positions_m=se2.transform_points(placed, tags.positions_m),
+        facing_rad=angles.wrap(tags.facing_rad + placed[2]),
+    )
 
 
 def _made(noun: str, number: int, item: Item, make: Callable[[str, Item], T]) -> T:
@@ -187,8 +227,9 @@ def _numbers(noun: str, item: Item, *keys: str) -> Dict[str, Any]:
         value = item[key]
         if key == "reflectance" and isinstance(value, str):
             if value not in MATERIALS:
-                raise BuildingError(f"{noun} reflectance must be a number or one of {', '.join(MATERIALS)}, "
-                                    f"got {value!r}")
+                raise BuildingError(
+                    f"{noun} reflectance must be a number or one of {', '.join(MATERIALS)}, got {value!r}"
+                )
             value = MATERIALS[value]
         given[UNITS.get(key, key)] = _number(f"{noun} {key}", value)
     return given
@@ -262,8 +303,13 @@ def _mullions(noun: str, item: Item, placed: np.ndarray) -> List[Thing]:
         fields = max(int(round(float(np.hypot(*way)) / every)), 1)
         middles = line[0] + np.linspace(0.0, 1.0, fields + 1)[:, None] * way
         yaw_rad = np.arctan2(way[1], way[0])
-    return [Thing(se2.transform_points(placed, box(x, y, size, size, yaw_rad)),
-                  **{"reflectance": MATERIALS["metal"], **_numbers(noun, item, "reflectance")}) for x, y in middles]
+    return [
+        Thing(
+            se2.transform_points(placed, box(x, y, size, size, yaw_rad)),
+            **{"reflectance": MATERIALS["metal"], **_numbers(noun, item, "reflectance")},
+        )
+        for x, y in middles
+    ]
 
 
 def _paths(document: Item) -> Dict[str, np.ndarray]:

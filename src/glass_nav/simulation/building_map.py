@@ -21,10 +21,10 @@ from glass_nav.world import landmark_file, map_file
 from glass_nav.world.grid_map import UNKNOWN, GridMap
 
 LANDMARKS_NAME = "landmarks.yaml"
-MARGIN_M = 1.0     # of unknown cells around the building
+MARGIN_M = 1.0  # of unknown cells around the building
 RESOLUTION_M = 0.05
 STEPS_PER_CELL = 10
-LEAST_SHARE = 0.35  # of a cell that a surface runs through: where it cuts a corner, more beams pass than end
+MIN_SHARE = 0.35  # of a cell that a surface runs through: where it cuts a corner, more beams pass than end
 
 
 def draw(building: Building, resolution_m: float = RESOLUTION_M) -> GridMap:
@@ -37,15 +37,20 @@ def draw(building: Building, resolution_m: float = RESOLUTION_M) -> GridMap:
     if not (np.isfinite(resolution_m) and resolution_m > 0.0):
         raise ValueError(f"a map needs resolution > 0 m, got {resolution_m}")
     from_m, to_m = _mapped_lines(building)
-    seeds = np.concatenate([building.start[None, :2], building.seen_m, *(
-        _points(path[:-1], path[1:], resolution_m) for path in building.paths.values())])
+    seeds = np.concatenate(
+        [
+            building.start[None, :2],
+            building.seen_m,
+            *(_points(path[:-1], path[1:], resolution_m) for path in building.paths.values()),
+        ]
+    )
     ends = np.concatenate([from_m, to_m, seeds])
     low = np.floor((ends.min(axis=0) - MARGIN_M) / resolution_m).astype(int)
     columns, rows = np.ceil((ends.max(axis=0) + MARGIN_M) / resolution_m).astype(int) - low
     grid = GridMap(np.full((rows, columns), UNKNOWN, np.int8), resolution_m, np.append(low * resolution_m, 0.0))
     row, column = grid.cells(_points(from_m, to_m, resolution_m / STEPS_PER_CELL))
     points = np.bincount(row * columns + column, minlength=rows * columns).reshape(rows, columns)
-    surface = points >= LEAST_SHARE * STEPS_PER_CELL
+    surface = points >= MIN_SHARE * STEPS_PER_CELL
     regions, _ = ndimage.label(~surface)  # of cells that share an edge
     reached = np.unique(regions[grid.cells(seeds)])
     free = np.isin(regions, reached[reached > 0])
@@ -84,8 +89,10 @@ def _mapped_lines(building: Building) -> Tuple[np.ndarray, np.ndarray]:
     lines: List[np.ndarray] = [pane.line_m for pane in building.panes if not pane.film]
     lines += [mirror.line_m for mirror in building.mirrors]
     glass = np.array(lines, float).reshape(-1, 2, 2)
-    return (np.concatenate([surfaces.from_m[opaque], glass[:, 0]]),
-            np.concatenate([surfaces.to_m[opaque], glass[:, 1]]))
+    return (
+        np.concatenate([surfaces.from_m[opaque], glass[:, 0]]),
+        np.concatenate([surfaces.to_m[opaque], glass[:, 1]]),
+    )
 
 
 def _points(from_m: np.ndarray, to_m: np.ndarray, step_m: float) -> np.ndarray:

@@ -10,22 +10,22 @@ from typing import Tuple
 
 import numpy as np
 
-INDEX = 1.51                 # refractive index of float glass
-ABSORPTION_PER_M = 4.0       # clear float glass near 0.9 um: 3 percent in 8 mm
-LARGEST_REFLECTANCE = 0.85   # of a coated pane, however flat the beam
+INDEX = 1.51  # refractive index of float glass
+ABSORPTION_PER_M = 4.0  # clear float glass near 0.9 um: 3 percent in 8 mm
+LARGEST_REFLECTANCE = 0.85  # of a coated pane, however flat the beam
 
 
 def reflectance(cos_incidence: np.ndarray, coating: np.ndarray, sheets: np.ndarray) -> np.ndarray:
     """R of a glazing of one or two sheets; a coating multiplies R of the sheet, up to LARGEST_REFLECTANCE."""
     one = np.minimum(coating * _clear(cos_incidence), np.maximum(LARGEST_REFLECTANCE, _clear(cos_incidence)))
-    return np.where(sheets > 1, one + (1.0 - one) ** 2 * one / (1.0 - one ** 2 + 1e-12), one)
+    return np.where(sheets > 1, one + (1.0 - one) ** 2 * one / (1.0 - one**2 + 1e-12), one)
 
 
 def sheet(cos_incidence: np.ndarray, coating: np.ndarray, thickness_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """R and T = 1 - R - A of one sheet; A is of the way through it."""
     reflected = reflectance(cos_incidence, coating, np.ones(()))
-    sin_inside = np.sqrt(np.maximum(1.0 - cos_incidence ** 2, 0.0)) / INDEX
-    absorbed = 1.0 - np.exp(-ABSORPTION_PER_M * thickness_m / np.sqrt(1.0 - sin_inside ** 2))
+    sin_inside = np.sqrt(np.maximum(1.0 - cos_incidence**2, 0.0)) / INDEX
+    absorbed = 1.0 - np.exp(-ABSORPTION_PER_M * thickness_m / np.sqrt(1.0 - sin_inside**2))
     return reflected, np.maximum((1.0 - reflected) * (1.0 - absorbed), 0.0)
 
 
@@ -37,7 +37,7 @@ def visibility(incidence_rad: np.ndarray, half_rad: float, width_rad: float) -> 
 def _clear(cos_incidence: np.ndarray) -> np.ndarray:
     """R of a clear sheet: 2 r / (1 + r) with r of one surface, the mean of both polarisations."""
     cos_outside = np.clip(cos_incidence, 0.0, 1.0)
-    cos_inside = np.sqrt(1.0 - (1.0 - cos_outside ** 2) / INDEX ** 2)
+    cos_inside = np.sqrt(1.0 - (1.0 - cos_outside**2) / INDEX**2)
     across = ((cos_outside - INDEX * cos_inside) / (cos_outside + INDEX * cos_inside)) ** 2
     along = ((INDEX * cos_outside - cos_inside) / (INDEX * cos_outside + cos_inside)) ** 2
     return across / (1.0 + across) + along / (1.0 + along)

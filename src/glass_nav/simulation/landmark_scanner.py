@@ -26,24 +26,30 @@ from glass_nav.sensing.bearings import LandmarkBearing
 from glass_nav.simulation import glass, people
 from glass_nav.simulation.building import PANE, Building, Surfaces, crosses, joined
 
-OFF_WALL_M = 0.03    # the detector sticks out of the wall that its tag hangs on
-PASSING_RAD = 0.5    # a tag that was so near the beam before and after has been passed, if it changed sides
+OFF_WALL_M = 0.03  # the detector sticks out of the wall that its tag hangs on
+PASSING_RAD = 0.5  # a tag that was so near the beam before and after has been passed, if it changed sides
 
 
 @dataclass(frozen=True)
 class ScannerModel:
     """The turning emitter. The defaults are the document's."""
-    reading_rad: float = float(np.radians(1.0))      # of a fine move: bearings are read in these steps
+
+    reading_rad: float = float(np.radians(1.0))  # of a fine move: bearings are read in these steps
     motor_step_rad: float = float(np.radians(0.18))  # where a move can end
-    coarse_rad: float = float(np.radians(10.0))      # of a coarse move
+    coarse_rad: float = float(np.radians(10.0))  # of a coarse move
     span_rad: float = float(np.radians(300.0))
-    move_s: float = 0.8                              # a move, coarse or fine: four tags take about 60 s
+    move_s: float = 0.8  # a move, coarse or fine: four tags take about 60 s
 
     def __post_init__(self) -> None:
         if not 0.0 < self.motor_step_rad <= self.reading_rad <= self.coarse_rad <= self.span_rad <= 2.0 * np.pi:
-            raise ValueError("a landmark scanner needs 0 < motor step <= reading step <= coarse move <= span <= 360 "
-                             "degrees, got " + ", ".join(f"{np.degrees(value):g}" for value in (
-                                 self.motor_step_rad, self.reading_rad, self.coarse_rad, self.span_rad)))
+            raise ValueError(
+                "a landmark scanner needs 0 < motor step <= reading step <= coarse move <= span <= 360 "
+                "degrees, got "
+                + ", ".join(
+                    f"{np.degrees(value):g}"
+                    for value in (self.motor_step_rad, self.reading_rad, self.coarse_rad, self.span_rad)
+                )
+            )
         if not 0.0 < self.move_s < np.inf:
             raise ValueError(f"a move of a landmark scanner must take > 0 s, got {self.move_s}")
 
@@ -56,13 +62,15 @@ class ScannerModel:
 @dataclass(frozen=True)
 class Turn:
     """One sweep over the span."""
-    stamp_ns: int                           # of its end
-    bearings: Tuple[LandmarkBearing, ...]   # in the order in which they were taken
+
+    stamp_ns: int  # of its end
+    bearings: Tuple[LandmarkBearing, ...]  # in the order in which they were taken
 
 
 @dataclass(frozen=True)
 class _Move:
     """From one angle to another [rad], as it is meant to be; the motor goes to the nearest of its steps."""
+
     start_rad: float
     end_rad: float
     fine: bool
@@ -74,9 +82,9 @@ class LandmarkScanner:
 
     def __init__(self, model: ScannerModel, building: Building, start_ns: int = 0) -> None:
         """Args:
-            model: of the emitter.
-            building: with its tags.
-            start_ns: time of the first move.
+        model: of the emitter.
+        building: with its tags.
+        start_ns: time of the first move.
         """
         self._model, self._building = model, building
         self._move_ns = round(model.move_s * 1e9)

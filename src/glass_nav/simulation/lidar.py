@@ -24,30 +24,31 @@ ECHOES = ("first", "strongest", "last")
 VISIBILITIES = ("logistic", "lobe")
 UNCERTAIN, DIFFUSE, MIRRORED, BEHIND_ONE, BEHIND_TWO = 0, 1, 2, 3, 4  # true cases
 FLOOR_REFLECTANCE = 0.1  # what a lidar still sees at its largest range, face on
-USUAL_DIRT = 0.004       # of a pane; dirty_share is the model's for this
-LARGEST_PANES = 8        # of one way that are looked at, two for each double glazing
-RESOLVED_M = 0.05        # echoes closer than this are one, named after the stronger
-NEAR_M = 1e-6            # a mirrored way does not meet its mirror
-ENDS = 1e-9              # share by which a surface is longer than it is: no beam slips through a corner
+USUAL_DIRT = 0.004  # of a pane; dirty_share is the model's for this
+LARGEST_PANES = 8  # of one way that are looked at, two for each double glazing
+RESOLVED_M = 0.05  # echoes closer than this are one, named after the stronger
+NEAR_M = 1e-6  # a mirrored way does not meet its mirror
+ENDS = 1e-9  # share by which a surface is longer than it is: no beam slips through a corner
 
 
 @dataclass(frozen=True)
 class LidarModel:
     """A 2D lidar and how it sees glass."""
+
     beams: int = 541
     field_of_view_rad: float = 1.5 * np.pi
     range_min_m: float = 0.1
     range_max_m: float = 25.0
-    noise_m: float = 0.015        # sigma of a range
-    dropout: float = 0.005        # share of the beams that come back and are lost
-    echo: str = "strongest"       # which one is reported: one of ECHOES
+    noise_m: float = 0.015  # sigma of a range
+    dropout: float = 0.005  # share of the beams that come back and are lost
+    echo: str = "strongest"  # which one is reported: one of ECHOES
     visibility: str = "logistic"  # of panes: "logistic" share of beams by incidence, or "lobe" power by incidence
-    half_rad: float = np.deg2rad(15.5)   # logistic: half of the beams return from a clean pane
-    width_rad: float = np.deg2rad(2.2)   # logistic: 12 to 88 percent within two widths to either side
-    dirty_share: float = 0.16     # logistic: of a usual pane, the share of spots that return a beam at any incidence
-    specular: float = 1.0         # A: power of a pane face on at 1 m; a white wall has 1
-    lobe_rad: float = np.deg2rad(5.0)    # lobe: theta_s
-    coating: float = 1.0          # factor on that of every pane of the building
+    half_rad: float = np.deg2rad(15.5)  # logistic: half of the beams return from a clean pane
+    width_rad: float = np.deg2rad(2.2)  # logistic: 12 to 88 percent within two widths to either side
+    dirty_share: float = 0.16  # logistic: of a usual pane, the share of spots that return a beam at any incidence
+    specular: float = 1.0  # A: power of a pane face on at 1 m; a white wall has 1
+    lobe_rad: float = np.deg2rad(5.0)  # lobe: theta_s
+    coating: float = 1.0  # factor on that of every pane of the building
 
     def __post_init__(self) -> None:
         if isinstance(self.beams, bool) or not isinstance(self.beams, (int, np.integer)) or self.beams < 2:
@@ -58,8 +59,10 @@ class LidarModel:
         if not 0.0 < self.field_of_view_rad <= 2.0 * np.pi:
             raise ValueError(f"lidar field_of_view_rad must be > 0 and <= 2 pi, got {self.field_of_view_rad}")
         if not 0.0 <= self.range_min_m < self.range_max_m < np.inf:
-            raise ValueError("lidar ranges must be 0 <= range_min_m < range_max_m, finite, got "
-                             f"{self.range_min_m} and {self.range_max_m}")
+            raise ValueError(
+                "lidar ranges must be 0 <= range_min_m < range_max_m, finite, got "
+                f"{self.range_min_m} and {self.range_max_m}"
+            )
         for name in ("dropout", "dirty_share"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"lidar {name} must be 0 to 1, got {getattr(self, name)}")
@@ -107,9 +110,10 @@ class TrueScan:
     the mirrored way; 0 all else. What is nearer than LARGEST_GAP_M to a pane, along the beam, is one surface with it,
     as in the map; so are the sheets of a double glazing.
     """
-    ranges_m: np.ndarray    # (B,) REP 117: inf no answer, -inf nearer than range_min
-    case: np.ndarray        # (B,) uint8
-    exact_m: np.ndarray     # (B,) length of the way without noise, NaN: no answer
+
+    ranges_m: np.ndarray  # (B,) REP 117: inf no answer, -inf nearer than range_min
+    case: np.ndarray  # (B,) uint8
+    exact_m: np.ndarray  # (B,) length of the way without noise, NaN: no answer
     crossing_m: np.ndarray  # (B,) where it passed or was mirrored at the first mapped pane, NaN: neither
 
 
@@ -119,15 +123,16 @@ class _Fans:
 
     The ray of beam b in fan f has the direction first_rad[f] + b * step_rad[f].
     """
-    centre_m: np.ndarray   # (F, 2)
+
+    centre_m: np.ndarray  # (F, 2)
     first_rad: np.ndarray  # (F,) direction of beam 0 in map
-    step_rad: np.ndarray   # (F,) from one beam to the next, negative in a mirror
-    ray_of: np.ndarray     # (F, B) index of the ray, -1: the beam is none of this fan
-    lowest: np.ndarray     # (F,) first and last beam of the fan
+    step_rad: np.ndarray  # (F,) from one beam to the next, negative in a mirror
+    ray_of: np.ndarray  # (F, B) index of the ray, -1: the beam is none of this fan
+    lowest: np.ndarray  # (F,) first and last beam of the fan
     highest: np.ndarray
-    fan: np.ndarray        # (R,) of each ray
-    ray: np.ndarray        # (R, 2) directions of length 1
-    start_m: np.ndarray    # (R,) range at which the ray begins: 0, or that of the mirror
+    fan: np.ndarray  # (R,) of each ray
+    ray: np.ndarray  # (R, 2) directions of length 1
+    start_m: np.ndarray  # (R,) range at which the ray begins: 0, or that of the mirror
 
     def points(self, rays: np.ndarray, range_m: np.ndarray) -> np.ndarray:
         """(N, 2) at ranges (N,) on rays (N,)."""
@@ -137,30 +142,33 @@ class _Fans:
 @dataclass(frozen=True)
 class _Ways:
     """What R rays meet up to the first opaque surface. Panes by ascending range, inf where there is none."""
-    pane_m: np.ndarray        # (R, K)
-    pane: np.ndarray          # (R, K) index of the surface
-    cos: np.ndarray           # (R, K) of the incidence
-    met: np.ndarray           # (R, K) bool: there is this pane
-    pane_mapped: np.ndarray   # (R, K) bool
-    passed: np.ndarray        # (R, K) int: mapped glazings on the way to this pane
-    end_m: np.ndarray         # (R,)
-    end_power: np.ndarray     # (R,) of the opaque surface at 1 m, panes not counted: rho cos
-    end_mapped: np.ndarray    # (R,) bool
-    end_passed: np.ndarray    # (R,) int: mapped glazings on the way to it
-    missing_m: np.ndarray     # (R,) where something mapped is no longer
+
+    pane_m: np.ndarray  # (R, K)
+    pane: np.ndarray  # (R, K) index of the surface
+    cos: np.ndarray  # (R, K) of the incidence
+    met: np.ndarray  # (R, K) bool: there is this pane
+    pane_mapped: np.ndarray  # (R, K) bool
+    passed: np.ndarray  # (R, K) int: mapped glazings on the way to this pane
+    end_m: np.ndarray  # (R,)
+    end_power: np.ndarray  # (R,) of the opaque surface at 1 m, panes not counted: rho cos
+    end_mapped: np.ndarray  # (R,) bool
+    end_passed: np.ndarray  # (R,) int: mapped glazings on the way to it
+    missing_m: np.ndarray  # (R,) where something mapped is no longer
 
 
 @dataclass(frozen=True)
 class _Echoes:
     """One way back for each beam."""
-    power: np.ndarray       # (B,) 0: none
-    range_m: np.ndarray     # (B,)
-    case: np.ndarray        # (B,)
+
+    power: np.ndarray  # (B,) 0: none
+    range_m: np.ndarray  # (B,)
+    case: np.ndarray  # (B,)
     crossing_m: np.ndarray  # (B,) NaN: none
 
 
-def scan(model: LidarModel, building: Building, map_from_laser: np.ndarray, time_s: float,
-         rng: np.random.Generator) -> TrueScan:
+def scan(
+    model: LidarModel, building: Building, map_from_laser: np.ndarray, time_s: float, rng: np.random.Generator
+) -> TrueScan:
     """One turn of the lidar, all beams at one moment.
 
     Args:
@@ -182,9 +190,10 @@ def scan(model: LidarModel, building: Building, map_from_laser: np.ndarray, time
 
 
 def _reported(model: LidarModel, echoes: List[_Echoes], first_m: np.ndarray, rng: np.random.Generator) -> TrueScan:
-    power, range_m, case, crossing_m = (np.stack([getattr(echo, field.name) for echo in echoes], axis=1)
-                                        for field in fields(_Echoes))  # (B, ways)
-    heard = (power > FLOOR_REFLECTANCE / model.range_max_m ** 2) & (range_m <= model.range_max_m)
+    power, range_m, case, crossing_m = (
+        np.stack([getattr(echo, field.name) for echo in echoes], axis=1) for field in fields(_Echoes)
+    )  # (B, ways)
+    heard = (power > FLOOR_REFLECTANCE / model.range_max_m**2) & (range_m <= model.range_max_m)
     rank = {"first": -range_m, "last": range_m, "strongest": power}[model.echo]
     best = np.argmax(np.where(heard, rank, -np.inf), axis=1)
     beams = np.arange(len(best))
@@ -199,14 +208,22 @@ def _reported(model: LidarModel, echoes: List[_Echoes], first_m: np.ndarray, rng
     near = heard[beams, best] & ~lost & (measured_m < model.range_min_m)
     answered = heard[beams, best] & ~lost & ~near & (measured_m <= model.range_max_m)
     passed_m = np.where(first_m <= model.range_max_m, first_m, np.nan)  # by what did not come back
-    return TrueScan(np.where(answered, measured_m, np.where(near, -np.inf, np.inf)),
-                    np.where(answered, case[beams, best], UNCERTAIN).astype(np.uint8),
-                    np.where(answered, exact_m, np.nan),
-                    np.where(answered, crossing_m[beams, best], passed_m))
+    return TrueScan(
+        np.where(answered, measured_m, np.where(near, -np.inf, np.inf)),
+        np.where(answered, case[beams, best], UNCERTAIN).astype(np.uint8),
+        np.where(answered, exact_m, np.nan),
+        np.where(answered, crossing_m[beams, best], passed_m),
+    )
 
 
-def _direct_echoes(model: LidarModel, surfaces: Surfaces, direct: _Ways, passing: np.ndarray, first_m: np.ndarray,
-                   rng: np.random.Generator) -> List[_Echoes]:
+def _direct_echoes(
+    model: LidarModel,
+    surfaces: Surfaces,
+    direct: _Ways,
+    passing: np.ndarray,
+    first_m: np.ndarray,
+    rng: np.random.Generator,
+) -> List[_Echoes]:
     """From every pane on the way and from the end of it; passing (B, K + 1) is the light that comes so far."""
     behind = np.array([DIFFUSE, BEHIND_ONE, BEHIND_TWO, UNCERTAIN])
     pane_power = _pane_power(model, surfaces, direct, rng)
@@ -216,10 +233,16 @@ def _direct_echoes(model: LidarModel, surfaces: Surfaces, direct: _Ways, passing
         range_m = direct.end_m if at_end else direct.pane_m[:, k]
         mapped = direct.end_mapped if at_end else direct.pane_mapped[:, k]
         passed = direct.end_passed if at_end else direct.passed[:, k]
-        power = (direct.end_power if at_end else pane_power[:, k]) * passing[:, k] ** 2 / range_m ** 2
+        power = (direct.end_power if at_end else pane_power[:, k]) * passing[:, k] ** 2 / range_m**2
         known = mapped & (direct.missing_m >= range_m)
-        echoes.append(_Echoes(power, range_m, np.where(known, behind[np.minimum(passed, 3)], UNCERTAIN),
-                              np.where(passed > 0, first_m, np.nan)))
+        echoes.append(
+            _Echoes(
+                power,
+                range_m,
+                np.where(known, behind[np.minimum(passed, 3)], UNCERTAIN),
+                np.where(passed > 0, first_m, np.nan),
+            )
+        )
     return echoes
 
 
@@ -228,9 +251,17 @@ def _fan(model: LidarModel, map_from_laser: np.ndarray) -> _Fans:
     angles_rad = map_from_laser[2] + model.angles_rad
     cos, sin = angles.cos_sin(angles_rad)
     beams = len(angles_rad)
-    return _Fans(map_from_laser[None, :2], angles_rad[:1], angles_rad[1:2] - angles_rad[:1], np.arange(beams)[None],
-                 np.zeros(1, int), np.full(1, beams - 1), np.zeros(beams, int), np.stack([cos, sin], axis=-1),
-                 np.zeros(beams))
+    return _Fans(
+        map_from_laser[None, :2],
+        angles_rad[:1],
+        angles_rad[1:2] - angles_rad[:1],
+        np.arange(beams)[None],
+        np.zeros(1, int),
+        np.full(1, beams - 1),
+        np.zeros(beams, int),
+        np.stack([cos, sin], axis=-1),
+        np.zeros(beams),
+    )
 
 
 def _mirrored(fan: _Fans, surfaces: Surfaces, beams: np.ndarray, mirror: np.ndarray, start_m: np.ndarray) -> _Fans:
@@ -246,14 +277,30 @@ def _mirrored(fan: _Fans, surfaces: Surfaces, beams: np.ndarray, mirror: np.ndar
     ray_of = np.full((len(panes), len(fan.ray)), -1)
     ray_of[image, beams] = np.arange(len(beams))
     ours = ray_of >= 0
-    return _Fans(centre_m, 2.0 * np.arctan2(line[:, 1], line[:, 0]) - fan.first_rad,
-                 np.repeat(-fan.step_rad, len(panes)), ray_of, np.argmax(ours, axis=1),
-                 ours.shape[1] - 1 - np.argmax(ours[:, ::-1], axis=1), image, ray, start_m)
+    return _Fans(
+        centre_m,
+        2.0 * np.arctan2(line[:, 1], line[:, 0]) - fan.first_rad,
+        np.repeat(-fan.step_rad, len(panes)),
+        ray_of,
+        np.argmax(ours, axis=1),
+        ours.shape[1] - 1 - np.argmax(ours[:, ::-1], axis=1),
+        image,
+        ray,
+        start_m,
+    )
 
 
-def _mirrored_echoes(model: LidarModel, building: Building, surfaces: Surfaces, fan: _Fans, direct: _Ways,
-                     reflected: np.ndarray, passing: np.ndarray, first_m: np.ndarray,
-                     rng: np.random.Generator) -> List[_Echoes]:
+def _mirrored_echoes(
+    model: LidarModel,
+    building: Building,
+    surfaces: Surfaces,
+    fan: _Fans,
+    direct: _Ways,
+    reflected: np.ndarray,
+    passing: np.ndarray,
+    first_m: np.ndarray,
+    rng: np.random.Generator,
+) -> List[_Echoes]:
     """By the mirror image in the first and in the second glazing."""
     glazing = np.where(direct.met, surfaces.glazing[direct.pane], -1)
     beams = len(glazing)
@@ -279,14 +326,23 @@ def _mirrored_echoes(model: LidarModel, building: Building, surfaces: Surfaces, 
             range_m = ways.end_m if at_end else ways.pane_m[:, k]
             mapped = ways.end_mapped if at_end else ways.pane_mapped[:, k]
             passed = ways.end_passed if at_end else ways.passed[:, k]
-            power = (ways.end_power if at_end else pane_power[:, k]) * (light * on_way[:, k]) ** 2 / range_m ** 2
+            power = (ways.end_power if at_end else pane_power[:, k]) * (light * on_way[:, k]) ** 2 / range_m**2
             one = range_m - to_mirror_m < LARGEST_GAP_M  # it ended at what it was mirrored at, for the map
-            case = np.where(known & mapped & (passed == 0) & (ways.missing_m >= range_m),
-                            np.where(one, DIFFUSE, MIRRORED), UNCERTAIN)
+            case = np.where(
+                known & mapped & (passed == 0) & (ways.missing_m >= range_m),
+                np.where(one, DIFFUSE, MIRRORED),
+                UNCERTAIN,
+            )
             crossing_m = np.where(np.isnan(crossed_m) & (passed > 0), later_m, crossed_m)
             crossing_m = np.where(case == DIFFUSE, np.nan, crossing_m)
-            echoes.append(_Echoes(*(_spread(values, rows, beams, rest) for values, rest in (
-                (power, 0.0), (range_m, np.inf), (case, UNCERTAIN), (crossing_m, np.nan)))))
+            echoes.append(
+                _Echoes(
+                    *(
+                        _spread(values, rows, beams, rest)
+                        for values, rest in ((power, 0.0), (range_m, np.inf), (case, UNCERTAIN), (crossing_m, np.nan))
+                    )
+                )
+            )
     return echoes
 
 
@@ -296,15 +352,15 @@ def _ways(building: Building, surfaces: Surfaces, fans: _Fans) -> _Ways:
     ray, surface, range_m, cos = _crossings(surfaces, there, fans)
     rays = len(fans.ray)
     is_opaque = surfaces.kind[surface] == OPAQUE
-    end_m, end, end_cos = _nearest(rays, *(column[is_opaque & surfaces.present[surface]]
-                                           for column in (ray, surface, range_m, cos)))
+    end_m, end, end_cos = _nearest(
+        rays, *(column[is_opaque & surfaces.present[surface]] for column in (ray, surface, range_m, cos))
+    )
     missing_m, _, _ = _nearest(rays, *(column[~surfaces.present[surface]] for column in (ray, surface, range_m, cos)))
     gone = np.flatnonzero(np.isfinite(missing_m))
     missing_m[gone[~building_map.is_drawn(building, fans.points(gone, missing_m[gone]))]] = np.inf
     ended = np.flatnonzero(np.isfinite(end_m))
     end_mapped = np.zeros(rays, bool)
-    end_mapped[ended] = (surfaces.mapped[end[ended]]
-                         & building_map.is_drawn(building, fans.points(ended, end_m[ended])))
+    end_mapped[ended] = surfaces.mapped[end[ended]] & building_map.is_drawn(building, fans.points(ended, end_m[ended]))
 
     keep = np.flatnonzero(~is_opaque & (range_m < end_m[ray]))
     ray, surface, range_m, cos = ray[keep], surface[keep], range_m[keep], cos[keep]
@@ -317,8 +373,7 @@ def _ways(building: Building, surfaces: Surfaces, fans: _Fans) -> _Ways:
     pane_m, pane_cos = np.full((rays, most), np.inf), np.ones((rays, most))
     pane, mapped = np.zeros((rays, most), int), np.zeros((rays, most), bool)
     pane_m[at], pane_cos[at], pane[at] = range_m[few], cos[few], surface[few]
-    mapped[at] = (surfaces.mapped[surface[few]]
-                  & building_map.is_drawn(building, fans.points(ray[few], range_m[few])))
+    mapped[at] = surfaces.mapped[surface[few]] & building_map.is_drawn(building, fans.points(ray[few], range_m[few]))
     glazing = surfaces.glazing[pane]
     opens = np.ones(mapped.shape, bool)  # the first sheet of its glazing on this way
     with np.errstate(invalid="ignore"):
@@ -329,13 +384,24 @@ def _ways(building: Building, surfaces: Surfaces, fans: _Fans) -> _Ways:
         last_m = np.where(np.isfinite(pane_m), pane_m, -np.inf).max(axis=1)
         behind = end_m - last_m >= LARGEST_GAP_M  # else what ends the way is one surface with the last pane
         end_passed = np.where(behind, count[:, -1], np.maximum(count[:, -1] - 1, 0))
-    return _Ways(pane_m, pane, pane_cos, np.isfinite(pane_m), mapped, np.maximum(count - mapped, 0),
-                 end_m, np.where(np.isfinite(end_m), surfaces.reflectance[end] * end_cos, 0.0), end_mapped,
-                 end_passed, missing_m)
+    return _Ways(
+        pane_m,
+        pane,
+        pane_cos,
+        np.isfinite(pane_m),
+        mapped,
+        np.maximum(count - mapped, 0),
+        end_m,
+        np.where(np.isfinite(end_m), surfaces.reflectance[end] * end_cos, 0.0),
+        end_mapped,
+        end_passed,
+        missing_m,
+    )
 
 
-def _nearest(rays: int, ray: np.ndarray, surface: np.ndarray, range_m: np.ndarray,
-             cos: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _nearest(
+    rays: int, ray: np.ndarray, surface: np.ndarray, range_m: np.ndarray, cos: np.ndarray
+) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of crossings (C,) the nearest of each ray: range, inf without one, index of the surface, cos; all (rays,)."""
     order = np.lexsort((range_m, ray))
     first = order[np.flatnonzero(np.diff(ray[order], prepend=-1))]
@@ -344,16 +410,20 @@ def _nearest(rays: int, ray: np.ndarray, surface: np.ndarray, range_m: np.ndarra
     return nearest_m, index, at_cos
 
 
-def _crossings(surfaces: Surfaces, chosen: np.ndarray,
-               fans: _Fans) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _crossings(
+    surfaces: Surfaces, chosen: np.ndarray, fans: _Fans
+) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Where rays cross the chosen surfaces: ray and surface by index, range [m], cos of the incidence; all (C,).
 
     Seen from the centre of a fan a surface covers an interval of its beams: only those are worked out.
     """
     from_m, to_m = surfaces.from_m[chosen], surfaces.to_m[chosen]
     sign = np.sign(fans.step_rad)[:, None]
-    from_at, to_at = (sign * (np.arctan2(ends[:, 1] - fans.centre_m[:, 1:], ends[:, 0] - fans.centre_m[:, :1])
-                              - fans.first_rad[:, None]) for ends in (from_m, to_m))  # (F, S)
+    from_at, to_at = (
+        sign
+        * (np.arctan2(ends[:, 1] - fans.centre_m[:, 1:], ends[:, 0] - fans.centre_m[:, :1]) - fans.first_rad[:, None])
+        for ends in (from_m, to_m)
+    )  # (F, S)
     span = angles.wrap(to_at - from_at)
     start = np.mod(np.where(span < 0.0, to_at, from_at), 2.0 * np.pi)
     start = np.concatenate([start, start - 2.0 * np.pi], axis=1)  # what begins behind the last beam may reach the first
@@ -382,13 +452,15 @@ def _crossings(surfaces: Surfaces, chosen: np.ndarray,
 
 def _pane_light(model: LidarModel, surfaces: Surfaces, ways: _Ways) -> Tuple[np.ndarray, np.ndarray]:
     """Share of the light that each pane (B, K) mirrors, of a glazing all its sheets; and the share that comes as far as
-    pane k, or for k = K through them all (B, K + 1)."""
+    pane k, or for k = K through them all (B, K + 1).
+    """
     coating = surfaces.coating[ways.pane] * model.coating
     is_mirror = surfaces.kind[ways.pane] == MIRROR
     _, through = glass.sheet(ways.cos, coating, surfaces.thickness_m[ways.pane])
     through = np.where(ways.met, np.where(is_mirror, 0.0, through), 1.0)
-    reflected = np.where(is_mirror, surfaces.reflectance[ways.pane],
-                         glass.reflectance(ways.cos, coating, surfaces.sheets[ways.pane]))
+    reflected = np.where(
+        is_mirror, surfaces.reflectance[ways.pane], glass.reflectance(ways.cos, coating, surfaces.sheets[ways.pane])
+    )
     start = np.ones((len(through), 1))
     return reflected, np.cumprod(np.concatenate([start, through], axis=1), axis=1)
 
@@ -399,7 +471,7 @@ def _pane_power(model: LidarModel, surfaces: Surfaces, ways: _Ways, rng: np.rand
     dirt = surfaces.dirt[ways.pane]
     if model.visibility == "lobe":
         speckle = rng.exponential(size=ways.cos.shape)  # of coherent light on dust: the power is exponential
-        power = model.specular * np.exp(-(incidence_rad / model.lobe_rad) ** 2) + dirt * ways.cos * speckle
+        power = model.specular * np.exp(-((incidence_rad / model.lobe_rad) ** 2)) + dirt * ways.cos * speckle
     else:
         seen = glass.visibility(incidence_rad, model.half_rad, model.width_rad)
         dirty = np.minimum(model.dirty_share * dirt / USUAL_DIRT * ways.cos, 1.0)

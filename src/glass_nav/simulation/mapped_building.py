@@ -20,7 +20,7 @@ from glass_nav.world.grid_map import GridMap
 from glass_nav.world.wall_segments import outlines
 
 STRAIGHTENED_CELLS = 0.75  # the middles of the faces of any straight wall are nearer than this to a line
-SPECK_M = 0.25             # smaller things that are unknown through and through
+SPECK_M = 0.25  # smaller things that are unknown through and through
 
 
 def build(grid_map: GridMap, name: str) -> Building:
@@ -41,8 +41,10 @@ def build(grid_map: GridMap, name: str) -> Building:
     largest = int(np.bincount(parts[parts > 0]).argmax())
     row, column = np.divmod(np.argmax(np.where(parts == largest, room_m, 0.0)), floor.shape[1])
     pieces, _ = ndimage.label(floor)
-    things = tuple(Thing(se2.transform_points(grid_map.map_from_grid, line * grid_map.resolution_m))
-                   for line in map(_straightened, outlines(pieces == pieces[row, column])))
+    things = tuple(
+        Thing(se2.transform_points(grid_map.map_from_grid, line * grid_map.resolution_m))
+        for line in map(_straightened, outlines(pieces == pieces[row, column]))
+    )
     start = np.append(grid_map.centres(np.array(row), np.array(column)), 0.0)
     return Building((), things=things, start=start, name=name)
 
@@ -62,6 +64,6 @@ def _straightened(outline: np.ndarray) -> np.ndarray:
     """(k, 2) the corners of a closed line (n, 2) that matter, at least three."""
     middles = 0.5 * (outline + np.roll(outline, -1, axis=0))
     begin = int(np.argmax(np.hypot(*(middles - middles.mean(axis=0)).T)))
-    closed = np.concatenate([middles[begin:], middles[:begin + 1]])
+    closed = np.concatenate([middles[begin:], middles[: begin + 1]])
     kept: List[int] = segments.corners(closed, STRAIGHTENED_CELLS)[:-1].tolist()
     return closed[kept] if len(kept) > 2 else closed[:-1]

@@ -21,16 +21,18 @@ DRAWS = 7  # random numbers of a step, used or not: what one step meets does not
 @dataclass(frozen=True)
 class OdometryParams:
     """How wrong the wheels are, as standard deviations. With the defaults a drive of some 30 m ends 1 to 3 % of its
-    length beside the truth, which is ordinary for a calibrated indoor robot."""
+    length beside the truth, which is ordinary for a calibrated indoor robot.
+    """
+
     wheel_base_m: float = 0.4
-    wheel_radius_sigma: float = 0.008              # share, both wheels together: a floor's length, worn tyres
-    wheel_mismatch_sigma: float = 0.0003           # share, one wheel against the other: bends what is straight
-    wheel_base_sigma: float = 0.008                # share: turns are told too wide or too narrow
-    slip_m_per_sqrt_m: float = 0.008               # along the way, also sideways of an omnidirectional base
+    wheel_radius_sigma: float = 0.008  # share, both wheels together: a floor's length, worn tyres
+    wheel_mismatch_sigma: float = 0.0003  # share, one wheel against the other: bends what is straight
+    wheel_base_sigma: float = 0.008  # share: turns are told too wide or too narrow
+    slip_m_per_sqrt_m: float = 0.008  # along the way, also sideways of an omnidirectional base
     slip_rad_per_sqrt_m: float = 0.005
     slip_rad_per_sqrt_rad: float = 0.015
-    slip_event_per_m: float = 0.01                 # how often a wheel spins on its spot
-    slip_event_max_m: float = 0.04                 # how far at most
+    slip_event_per_m: float = 0.01  # how often a wheel spins on its spot
+    slip_event_max_m: float = 0.04  # how far at most
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -48,24 +50,24 @@ class Odometry:
     """Sums up what the wheels of one robot say; the frame odom begins where it begins."""
 
     def __init__(self, p: OdometryParams, kind: str, rng: np.random.Generator) -> None:
-        """
-        Args:
-            kind: of the base, "diff" or "omni".
-            rng: this robot's wheels and all that happens to them.
+        """Args:
+        kind: of the base, "diff" or "omni".
+        rng: this robot's wheels and all that happens to them.
         """
         self._p, self._kind, self._rng = p, kind, rng
-        radius, mismatch, base = rng.normal(size=3) * [p.wheel_radius_sigma, p.wheel_mismatch_sigma,
-                                                       p.wheel_base_sigma]
+        radius, mismatch, base = rng.normal(size=3) * [p.wheel_radius_sigma, p.wheel_mismatch_sigma, p.wheel_base_sigma]
         forward, turn = 1.0 + radius, (1.0 + radius) / (1.0 + base)
         # (3, 3) twist told by twist made. Diff: each wheel tells its own radius; omni: three wheels, whose mismatch
         # skews forward motion to the left and back.
         half_m = 0.5 * p.wheel_base_m
         if kind == "diff":
-            self._told_by_made = np.array([[forward, 0.0, mismatch * half_m], [0.0, 0.0, 0.0],
-                                           [mismatch / half_m, 0.0, turn]])
+            self._told_by_made = np.array(
+                [[forward, 0.0, mismatch * half_m], [0.0, 0.0, 0.0], [mismatch / half_m, 0.0, turn]]
+            )
         else:
-            self._told_by_made = np.array([[forward, mismatch, 0.0], [-mismatch, forward, 0.0],
-                                           [mismatch / half_m, 0.0, turn]])
+            self._told_by_made = np.array(
+                [[forward, mismatch, 0.0], [-mismatch, forward, 0.0], [mismatch / half_m, 0.0, turn]]
+            )
         self.odom_from_base = np.zeros(3)
         self.velocity = np.zeros(3)  # as told: forward, left [m/s], turn [rad/s]
         self._spin, self._spin_left_s = np.zeros(3), 0.0  # velocity told by a wheel that spins, and until when
@@ -80,8 +82,10 @@ class Odometry:
         told[0] += p.slip_m_per_sqrt_m * math.sqrt(way_m) * normals[0]
         if self._kind == "omni":
             told[1] += p.slip_m_per_sqrt_m * math.sqrt(way_m) * normals[1]
-        told[2] += (p.slip_rad_per_sqrt_m * math.sqrt(way_m) * normals[2]
-                    + p.slip_rad_per_sqrt_rad * math.sqrt(turn_rad) * normals[3])
+        told[2] += (
+            p.slip_rad_per_sqrt_m * math.sqrt(way_m) * normals[2]
+            + p.slip_rad_per_sqrt_rad * math.sqrt(turn_rad) * normals[3]
+        )
         if draws[4] < p.slip_event_per_m * way_m:
             self._spin, self._spin_left_s = self._spinning(draws[5], draws[6]) / SPIN_S, SPIN_S
         spun_s = min(dt_s, self._spin_left_s)

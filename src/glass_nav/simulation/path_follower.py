@@ -21,8 +21,8 @@ from glass_nav.simulation.building import Building
 from glass_nav.simulation.robot import RobotParams
 
 TURN_ON_THE_SPOT_RAD = 1.0  # a point farther off to the side is turned to first
-FIRST = "first"             # the name that stands for a building's first path
-CREEP_M_S = 0.02            # so that braking arrives
+FIRST = "first"  # the name that stands for a building's first path
+CREEP_M_S = 0.02  # so that braking arrives
 
 
 class PathError(ValueError):
@@ -32,23 +32,24 @@ class PathError(ValueError):
 @dataclass(frozen=True)
 class FollowerParams:
     """How a path is driven."""
+
     speed_m_s: float = 0.6
-    lookahead_m: float = 0.5               # corners are cut by about a quarter of it
+    lookahead_m: float = 0.5  # corners are cut by about a quarter of it
     lateral_acceleration_m_s2: float = 0.4  # slower in bends
 
     def __post_init__(self) -> None:
         for name, unit in (("speed_m_s", "m/s"), ("lookahead_m", "m"), ("lateral_acceleration_m_s2", "m/s^2")):
             if not 0.0 < getattr(self, name) < math.inf:
-                raise ValueError(f"{name} of the path follower must be > 0 {unit} and finite, "
-                                 f"got {getattr(self, name)}")
+                raise ValueError(
+                    f"{name} of the path follower must be > 0 {unit} and finite, got {getattr(self, name)}"
+                )
 
 
 class PathFollower:
     """Commands a base along a path, from its start to its end, and then to stand."""
 
     def __init__(self, waypoints_m: np.ndarray, robot: RobotParams, p: FollowerParams = FollowerParams()) -> None:
-        """
-        Args:
+        """Args:
             waypoints_m: (W, 2) in the frame map; points that repeat the one before are left out.
 
         Raises:
@@ -72,8 +73,9 @@ class PathFollower:
 
     def command(self, map_from_base: np.ndarray) -> np.ndarray:
         """(3,) velocity that brings a base at that pose on along the path; zero at its end."""
-        self.progress_m = self._line.nearest(np.asarray(map_from_base[:2], float), self.progress_m,
-                                             2.0 * self._p.lookahead_m)
+        self.progress_m = self._line.nearest(
+            np.asarray(map_from_base[:2], float), self.progress_m, 2.0 * self._p.lookahead_m
+        )
         remaining_m = self.length_m - self.progress_m
         self.done = self.done or remaining_m < 0.01
         if self.done:
@@ -93,8 +95,7 @@ class PathFollower:
             return np.array([0.0, 0.0, self._turn(bearing)])
         curvature = 2.0 * math.sin(bearing) / distance_m
         bend = max(abs(curvature), 1e-6)
-        speed = min(speed, self._robot.max_turn_rad_s / bend,
-                    math.sqrt(self._p.lateral_acceleration_m_s2 / bend))
+        speed = min(speed, self._robot.max_turn_rad_s / bend, math.sqrt(self._p.lateral_acceleration_m_s2 / bend))
         return np.array([speed, 0.0, speed * curvature])
 
     def _sliding(self, bearing: float, speed: float) -> np.ndarray:

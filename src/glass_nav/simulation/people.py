@@ -8,9 +8,9 @@ import numpy as np
 
 from glass_nav.simulation.building import Person, Surfaces, outline_rows, surfaces_from_rows
 
-CORNERS = 12           # a person is a polygon
-REFLECTANCE = 0.4      # of trousers
-STEP_ASIDE_M = 0.45    # from the middle of the robot to the edge of a person: nearer than this nobody comes
+CORNERS = 12  # a person is a polygon
+REFLECTANCE = 0.4  # of trousers
+STEP_ASIDE_M = 0.45  # from the middle of the robot to the edge of a person: nearer than this nobody comes
 
 
 def position(person: Person, time_s: float) -> np.ndarray:

@@ -17,24 +17,25 @@ import numpy as np
 from glass_nav.geometry import se2
 from glass_nav.simulation.building import MATERIALS, Building, Door, Pane, Thing, Wall, box
 
-CORRIDOR_M = (1.4, 3.0)     # width
-BLOCK_M = (4.5, 11.0)       # edge of what lies between corridors
-ROOM_M = (2.8, 6.5)         # width of a room along its corridor
-TWO_ROWS_M = 8.0            # deeper blocks have rooms on both sides
-DOOR_M = (0.85, 1.2)        # width
+CORRIDOR_M = (1.4, 3.0)  # width
+BLOCK_M = (4.5, 11.0)  # edge of what lies between corridors
+ROOM_M = (2.8, 6.5)  # width of a room along its corridor
+TWO_ROWS_M = 8.0  # deeper blocks have rooms on both sides
+DOOR_M = (0.85, 1.2)  # width
 THIN_M, THICK_M = 0.12, 0.25  # walls within and around the floor
-BEND = 0.06                 # walls lean by up to so much
-DOOR_ROOM_M = 1.1           # kept free behind a door
-_CLOSED = 0.15              # share of the doors
-_WALLED_OFF = 0.15          # share of the pieces of corridor
-_HALL, _UNSEEN = 0.2, 0.1   # share of the blocks
+BEND = 0.06  # walls lean by up to so much
+DOOR_ROOM_M = 1.1  # kept free behind a door
+_CLOSED = 0.15  # share of the doors
+_WALLED_OFF = 0.15  # share of the pieces of corridor
+_HALL, _UNSEEN = 0.2, 0.1  # share of the blocks
 
 
 @dataclass(frozen=True)
 class FloorParams:
     """What is built."""
+
     blocks: Tuple[int, int] = (3, 3)  # across and along: with one corridor less between them
-    glass: float = 0.4                # share of the rooms whose wall to the corridor is of glass
+    glass: float = 0.4  # share of the rooms whose wall to the corridor is of glass
 
     def __post_init__(self) -> None:
         if min(self.blocks) < 2:
@@ -83,7 +84,7 @@ class _Floor:
     def _outside(self) -> None:
         (left, right), (low, high) = self._x[[0, -1]], self._y[[0, -1]]
         corners = np.array([[left, low], [right, low], [right, high], [left, high], [left, low]])
-        self._walls += [(corners[side:side + 2], THICK_M) for side in range(4)]
+        self._walls += [(corners[side : side + 2], THICK_M) for side in range(4)]
 
     def _corridors(self) -> None:
         """Wall off some pieces at one end: outer ones, and between crossings those of one axis only, of which one
@@ -99,14 +100,18 @@ class _Floor:
                     if self._rng.random() >= _WALLED_OFF or inner and (turned != cut or corridor == whole):
                         continue
                     at = along[2 * piece] if piece == pieces - 1 else along[2 * piece + 1]
-                    wall = np.column_stack([across[2 * corridor + 1:2 * corridor + 3], [at, at]])
+                    wall = np.column_stack([across[2 * corridor + 1 : 2 * corridor + 3], [at, at]])
                     self._walls.append((wall[:, ::-1] if turned else wall, THIN_M))
 
     def _block(self, column: int, row: int) -> None:
         x0, x1 = self._x[[2 * column, 2 * column + 1]]
         y0, y1 = self._y[[2 * row, 2 * row + 1]]
-        sides = {"left": column > 0, "right": column < self._p.blocks[0] - 1,
-                 "low": row > 0, "high": row < self._p.blocks[1] - 1}  # along which a corridor runs
+        sides = {
+            "left": column > 0,
+            "right": column < self._p.blocks[0] - 1,
+            "low": row > 0,
+            "high": row < self._p.blocks[1] - 1,
+        }  # along which a corridor runs
         kind = self._rng.random()
         if kind < _HALL:
             self._hall(x0, x1, y0, y1)
@@ -125,8 +130,15 @@ class _Floor:
             place = self._rng.uniform([x0 + 1.2, y0 + 1.2], [x1 - 1.2, y1 - 1.2])
             self._things.append((box(float(place[0]), float(place[1]), size, size), "plaster"))
 
-    def _rooms(self, along: Sequence[float], deep: Sequence[float], facing: Tuple[bool, bool],
-               ends: Tuple[bool, bool], doors: bool, turned: bool) -> None:
+    def _rooms(
+        self,
+        along: Sequence[float],
+        deep: Sequence[float],
+        facing: Tuple[bool, bool],
+        ends: Tuple[bool, bool],
+        doors: bool,
+        turned: bool,
+    ) -> None:
         """Rooms in one row or two along a corridor on either side.
 
         Args:
@@ -135,6 +147,7 @@ class _Floor:
             ends: there is one beyond the first, the last of along.
             doors: the rooms have some.
         """
+
         def line(a: Tuple[float, float], b: Tuple[float, float]) -> np.ndarray:
             points = np.array([a, b])
             return points[:, ::-1] if turned else points
@@ -193,8 +206,12 @@ class _Floor:
             yaw = float(self._rng.choice([0.0, self._rng.uniform(-0.6, 0.6)]))
             if (high > low).all() and np.hypot(*(place - door)) > DOOR_ROOM_M + reach:
                 outline = box(float(place[0]), float(place[1]), length, width, yaw)
-                self._things.append((outline[:, ::-1] if turned else outline,
-                                     str(self._rng.choice(["wood", "metal", "cloth", "plant"]))))
+                self._things.append(
+                    (
+                        outline[:, ::-1] if turned else outline,
+                        str(self._rng.choice(["wood", "metal", "cloth", "plant"])),
+                    )
+                )
 
     def built(self, name: str) -> Building:
         """The building, skewed and turned."""
@@ -210,6 +227,10 @@ class _Floor:
         crossing = np.array([self._x[1:3].mean(), self._y[1:3].mean()])
         return Building(
             tuple(Wall(at(line), thickness) for line, thickness in self._walls),
-            tuple(Pane(at(line)) for line in self._panes), (), tuple(Door(at(line)) for line in self._doors),
+            tuple(Pane(at(line)) for line in self._panes),
+            (),
+            tuple(Door(at(line)) for line in self._doors),
             tuple(Thing(at(outline), MATERIALS[kind], movable=True) for outline, kind in self._things),
-            start=np.array([*at(crossing), 0.0]), name=name)
+            start=np.array([*at(crossing), 0.0]),
+            name=name,
+        )

@@ -20,19 +20,26 @@ BISECTIONS = 20  # of the way to a contact: below a micrometre
 @dataclass(frozen=True)
 class RobotParams:
     """What the base can do. The defaults are those of a slow indoor robot of 50 kg."""
-    kind: str = "diff"                           # "diff": two driven wheels, never sideways; "omni": any direction
-    radius_m: float = 0.22                       # of the round outline that stops at obstacles
+
+    kind: str = "diff"  # "diff": two driven wheels, never sideways; "omni": any direction
+    radius_m: float = 0.22  # of the round outline that stops at obstacles
     max_speed_m_s: float = 1.0
     max_turn_rad_s: float = 1.5
     max_acceleration_m_s2: float = 0.8
     max_turn_acceleration_rad_s2: float = 3.0
-    braking_factor: float = 1.0                  # it slows down so many times as hard as it accelerates
+    braking_factor: float = 1.0  # it slows down so many times as hard as it accelerates
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise ValueError(f"robot must be {' or '.join(KINDS)}, got {self.kind!r}")
-        for name in ("radius_m", "max_speed_m_s", "max_turn_rad_s", "max_acceleration_m_s2",
-                     "max_turn_acceleration_rad_s2", "braking_factor"):
+        for name in (
+            "radius_m",
+            "max_speed_m_s",
+            "max_turn_rad_s",
+            "max_acceleration_m_s2",
+            "max_turn_acceleration_rad_s2",
+            "braking_factor",
+        ):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ValueError(f"{name} of the robot must be > 0 and finite, got {getattr(self, name)}")
 
@@ -41,14 +48,13 @@ class Obstacles:
     """What stands on the floor, as segments: how near is the nearest?"""
 
     def __init__(self, segments_m: np.ndarray) -> None:
-        """
-        Args:
-            segments_m: (S, 2, 2) both ends of each segment, in the frame map; S may be 0.
+        """Args:
+        segments_m: (S, 2, 2) both ends of each segment, in the frame map; S may be 0.
         """
         segments_m = np.asarray(segments_m, float).reshape(-1, 2, 2)
         self._start_m = segments_m[:, 0]
         self._along_m = segments_m[:, 1] - segments_m[:, 0]
-        self._length2 = np.maximum((self._along_m ** 2).sum(axis=1), 1e-12)  # a point is a short segment
+        self._length2 = np.maximum((self._along_m**2).sum(axis=1), 1e-12)  # a point is a short segment
 
     def clearance(self, point_m: np.ndarray) -> float:
         """Distance [m] from a point (2,) to the nearest segment, inf where there is none."""
@@ -79,8 +85,13 @@ def moved(pose: np.ndarray, twist: np.ndarray) -> np.ndarray:
     x, y, yaw = pose.tolist()
     ahead, aside, turn = arc(twist).tolist()
     cos, sin = math.cos(yaw), math.sin(yaw)
-    return np.array([x + cos * ahead - sin * aside, y + sin * ahead + cos * aside,
-                     (yaw + turn + math.pi) % (2.0 * math.pi) - math.pi])
+    return np.array(
+        [
+            x + cos * ahead - sin * aside,
+            y + sin * ahead + cos * aside,
+            (yaw + turn + math.pi) % (2.0 * math.pi) - math.pi,
+        ]
+    )
 
 
 class Robot:
@@ -137,11 +148,15 @@ class Robot:
         wanted[:2] *= min(1.0, p.max_speed_m_s / max(math.hypot(wanted[0], wanted[1]), 1e-12))
         wanted[2] = min(max(wanted[2], -p.max_turn_rad_s), p.max_turn_rad_s)
         change = wanted - self.velocity
-        slower = (math.hypot(wanted[0], wanted[1]) < math.hypot(self.velocity[0], self.velocity[1]),
-                  abs(wanted[2]) < abs(self.velocity[2]))
+        slower = (
+            math.hypot(wanted[0], wanted[1]) < math.hypot(self.velocity[0], self.velocity[1]),
+            abs(wanted[2]) < abs(self.velocity[2]),
+        )
         brakes = [p.braking_factor if each else 1.0 for each in slower]
-        ramps_s = np.array([math.hypot(change[0], change[1]) / (brakes[0] * p.max_acceleration_m_s2)] * 2
-                           + [abs(change[2]) / (brakes[1] * p.max_turn_acceleration_rad_s2)])
+        ramps_s = np.array(
+            [math.hypot(change[0], change[1]) / (brakes[0] * p.max_acceleration_m_s2)] * 2
+            + [abs(change[2]) / (brakes[1] * p.max_turn_acceleration_rad_s2)]
+        )
         share = np.minimum(dt_s / np.maximum(ramps_s, 1e-12), 1.0)  # of the change that is reached
         end = np.where(share < 1.0, self.velocity + share * change, wanted)
         mean = end - 0.5 * share * change * np.minimum(ramps_s / dt_s, 1.0)

@@ -30,8 +30,9 @@ def find(building: str) -> Path:
         raise BuildingError(f"{path}: a folder without {FILE_NAME}")
     near = difflib.get_close_matches(building, list(known), n=1)
     hint = f"; did you mean {near[0]}?" if near else ""
-    raise BuildingError(f"{building}: no such file, nor a building of the package, which are "
-                        f"{', '.join(known) or 'none'}{hint}")
+    raise BuildingError(
+        f"{building}: no such file, nor a building of the package, which are {', '.join(known) or 'none'}{hint}"
+    )
 
 
 def shipped() -> Dict[str, Path]:

@@ -24,10 +24,10 @@ from glass_nav.simulation.path_follower import FollowerParams, PathFollower
 from glass_nav.simulation.robot import Obstacles, Robot, RobotParams
 
 START_NS = 1_600_000_000 * 10**9  # of every run: a stamp that looks like one and says nothing about when it was made
-CONTROL_S = 0.02                  # the base gets a command, and the wheels are read, at least so often
-STUCK_S = 5.0                     # a follower that makes no way for so long gives up; a turn on the spot takes 3 s
-LASER = (0.12, 0.0, 0.0)          # in front of the middle
-EMITTER = (0.0, 0.0, 0.0)         # of the landmark scanner
+CONTROL_S = 0.02  # the base gets a command, and the wheels are read, at least so often
+STUCK_S = 5.0  # a follower that makes no way for so long gives up; a turn on the spot takes 3 s
+LASER = (0.12, 0.0, 0.0)  # in front of the middle
+EMITTER = (0.0, 0.0, 0.0)  # of the landmark scanner
 
 
 class SimulationError(ValueError):
@@ -37,42 +37,53 @@ class SimulationError(ValueError):
 @dataclass(frozen=True)
 class OdometrySample:
     """One reading of the wheels."""
+
     stamp_ns: int
     odom_from_base: np.ndarray  # (3,)
-    velocity: np.ndarray        # (3,) forward, left [m/s], turn [rad/s]
+    velocity: np.ndarray  # (3,) forward, left [m/s], turn [rad/s]
 
 
 @dataclass(frozen=True)
 class Frame:
     """One turn of the lidar, and where the robot truly was."""
-    stamp_ns: int               # of the first beam
-    map_from_base: np.ndarray   # (3,) truth, then
+
+    stamp_ns: int  # of the first beam
+    map_from_base: np.ndarray  # (3,) truth, then
     odom_from_base: np.ndarray  # (3,) then
     scan: Scan
     truth: TrueScan
     odometry: Tuple[OdometrySample, ...]  # all readings since the frame before, the last one at the last beam
-    blocked: bool               # an obstacle stopped the robot since then
+    blocked: bool  # an obstacle stopped the robot since then
 
 
 @dataclass(frozen=True)
 class _Moment:
     """Where the robot was, and what odometry said."""
+
     stamp_ns: int
-    map_from_base: np.ndarray   # (3,)
+    map_from_base: np.ndarray  # (3,)
     odom_from_base: np.ndarray  # (3,)
 
 
 class Simulation:
     """A robot in a building: give it commands, or let it follow a path."""
 
-    def __init__(self, building: Building, lidar_model: LidarModel, robot: RobotParams = RobotParams(),
-                 odometry: OdometryParams = OdometryParams(),
-                 base_from_laser: "Union[Tuple[float, float, float], np.ndarray]" = LASER, seed: int = 0,
-                 scan_rate_hz: float = 10.0, changed_share: float = 0.0, start: Optional[np.ndarray] = None,
-                 turn_time_s: float = 0.0, scanner: Optional[ScannerModel] = None,
-                 base_from_emitter: "Union[Tuple[float, float, float], np.ndarray]" = EMITTER) -> None:
-        """
-        Args:
+    def __init__(
+        self,
+        building: Building,
+        lidar_model: LidarModel,
+        robot: RobotParams = RobotParams(),
+        odometry: OdometryParams = OdometryParams(),
+        base_from_laser: "Union[Tuple[float, float, float], np.ndarray]" = LASER,
+        seed: int = 0,
+        scan_rate_hz: float = 10.0,
+        changed_share: float = 0.0,
+        start: Optional[np.ndarray] = None,
+        turn_time_s: float = 0.0,
+        scanner: Optional[ScannerModel] = None,
+        base_from_emitter: "Union[Tuple[float, float, float], np.ndarray]" = EMITTER,
+    ) -> None:
+        """Args:
             base_from_laser: (3,) where the laser sits.
             seed: >= 0.
             changed_share: of the movable things that somebody moved since the map was drawn.
@@ -89,8 +100,10 @@ class Simulation:
         if not 0.1 <= scan_rate_hz <= 1000.0:
             raise ValueError(f"scan rate must be 0.1 to 1000 Hz, got {scan_rate_hz}")
         if not 0.0 <= turn_time_s * scan_rate_hz <= 1.0:
-            raise ValueError(f"a turn of the lidar must take >= 0 s and no longer than the scan period of "
-                             f"{1.0 / scan_rate_hz:g} s, got {turn_time_s}")
+            raise ValueError(
+                f"a turn of the lidar must take >= 0 s and no longer than the scan period of "
+                f"{1.0 / scan_rate_hz:g} s, got {turn_time_s}"
+            )
         if np.shape(base_from_laser) != (3,) or not np.all(np.isfinite(base_from_laser)):
             raise ValueError(f"the laser's pose on the robot must be finite x, y, yaw, got {base_from_laser}")
         if np.shape(base_from_emitter) != (3,) or not np.all(np.isfinite(base_from_emitter)):
@@ -154,32 +167,51 @@ class Simulation:
         """Sweeps of the landmark scanner that ended since the last call."""
         if self._scanner is None:
             return []
-        return [Turn(START_NS + turn.stamp_ns, tuple(replace(bearing, stamp_ns=START_NS + bearing.stamp_ns)
-                                                     for bearing in turn.bearings))
-                for turn in self._scanner.take_turns()]
+        return [
+            Turn(
+                START_NS + turn.stamp_ns,
+                tuple(replace(bearing, stamp_ns=START_NS + bearing.stamp_ns) for bearing in turn.bearings),
+            )
+            for turn in self._scanner.take_turns()
+        ]
 
     def look(self) -> Frame:
         """One turn of the lidar, which ends now. Before there was time for one it is of one moment."""
         model = self.lidar_model
         turn_ns = self._turn_ns if self._turn_ns <= self._time_ns else 0
         stamp_ns = self.stamp_ns - turn_ns
-        track = Trajectory(np.array([moment.stamp_ns for moment in self._track], np.int64),
-                           np.array([moment.map_from_base for moment in self._track]))
+        track = Trajectory(
+            np.array([moment.stamp_ns for moment in self._track], np.int64),
+            np.array([moment.map_from_base for moment in self._track]),
+        )
         map_from_base = track.at(np.int64(stamp_ns))
         if turn_ns:
             knots_ns = np.append(stamp_ns, track.stamps_ns[track.stamps_ns > stamp_ns])
             map_from_laser = Trajectory(knots_ns, se2.compose(track.at(knots_ns), self.base_from_laser))
             truth = turning.scan(model, self.building, map_from_laser, turn_ns, START_NS, self._lidar_rng)
         else:
-            truth = lidar.scan(model, self.building, se2.compose(map_from_base, self.base_from_laser),
-                               self._time_ns * 1e-9, self._lidar_rng)
+            truth = lidar.scan(
+                model,
+                self.building,
+                se2.compose(map_from_base, self.base_from_laser),
+                self._time_ns * 1e-9,
+                self._lidar_rng,
+            )
         angles_rad = model.angles_rad
         ranges_m = truth.ranges_m.astype(np.float32)  # all that a LaserScan holds
-        scan = scan_from_fields(stamp_ns, ranges_m, float(angles_rad[0]), float(angles_rad[1] - angles_rad[0]),
-                                model.range_min_m, model.range_max_m, self.base_from_laser,
-                                time_increment_s=turn_ns * 1e-9 / (model.beams - 1))
-        odom_from_base = Trajectory(track.stamps_ns, np.array([moment.odom_from_base for moment in self._track])
-                                    ).at(np.int64(stamp_ns))
+        scan = scan_from_fields(
+            stamp_ns,
+            ranges_m,
+            float(angles_rad[0]),
+            float(angles_rad[1] - angles_rad[0]),
+            model.range_min_m,
+            model.range_max_m,
+            self.base_from_laser,
+            time_increment_s=turn_ns * 1e-9 / (model.beams - 1),
+        )
+        odom_from_base = Trajectory(track.stamps_ns, np.array([moment.odom_from_base for moment in self._track])).at(
+            np.int64(stamp_ns)
+        )
         readings, self._readings = tuple(self._readings), []
         blocked, self._blocked = self._blocked, False
         return Frame(stamp_ns, map_from_base, odom_from_base, scan, truth, readings or (self.reading,), blocked)
@@ -215,9 +247,11 @@ class Simulation:
             best_m = max(best_m, follower.progress_m)
             if still_s > STUCK_S:
                 x, y, _ = self.map_from_base
-                raise SimulationError(f"{self.building.name}: the robot is stuck at x {x:.2f} m, y {y:.2f} m after "
-                                      f"{follower.progress_m:.1f} of {follower.length_m:.1f} m: something stands in "
-                                      "the way of the path")
+                raise SimulationError(
+                    f"{self.building.name}: the robot is stuck at x {x:.2f} m, y {y:.2f} m after "
+                    f"{follower.progress_m:.1f} of {follower.length_m:.1f} m: something stands in "
+                    "the way of the path"
+                )
 
     def follow(self, follower: PathFollower) -> Frame:
         """Along the path until the next turn of the lidar."""
@@ -253,6 +287,8 @@ class Simulation:
         gap_m, radius_m = self._obstacles.clearance(map_from_base[:2]), self._robot_params.radius_m
         if gap_m < radius_m:
             x, y, _ = map_from_base
-            raise SimulationError(f"{self.building.name}: no room for the robot at x {x:.2f} m, y {y:.2f} m: its "
-                                  f"radius is {radius_m:g} m, the nearest obstacle {gap_m:.2f} m away")
+            raise SimulationError(
+                f"{self.building.name}: no room for the robot at x {x:.2f} m, y {y:.2f} m: its "
+                f"radius is {radius_m:g} m, the nearest obstacle {gap_m:.2f} m away"
+            )
         return Robot(self._robot_params, map_from_base, self._obstacles)

@@ -12,8 +12,8 @@ from glass_nav.simulation import building_map
 from glass_nav.simulation.building import Building, distances
 
 RANDOM = "random"
-ROOM_M = 0.45      # to the nearest surface: it can turn, and drive off in any direction
-PASSAGE_M = 0.3    # from its middle to a wall, where it gets through
+ROOM_M = 0.45  # to the nearest surface: it can turn, and drive off in any direction
+PASSAGE_M = 0.3  # from its middle to a wall, where it gets through
 _STREAM = 0x57A27  # of the seed: no other part of a simulation draws from it
 _TRIES = 1000
 

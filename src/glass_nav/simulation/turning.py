@@ -13,11 +13,17 @@ from glass_nav.simulation.building import Building
 from glass_nav.simulation.lidar import LidarModel, TrueScan
 
 SECTOR_S = 0.002  # the robot turns by 0.1 degrees in it at 1 rad/s
-LEAST_BEAMS = 2   # of a sector
+MIN_BEAMS = 2  # of a sector
 
 
-def scan(model: LidarModel, building: Building, map_from_laser: Trajectory, turn_ns: int, start_ns: int,
-         rng: np.random.Generator) -> TrueScan:
+def scan(
+    model: LidarModel,
+    building: Building,
+    map_from_laser: Trajectory,
+    turn_ns: int,
+    start_ns: int,
+    rng: np.random.Generator,
+) -> TrueScan:
     """One turn of the lidar, its first beam at the first pose and its last beam at the last one.
 
     Args:
@@ -28,7 +34,7 @@ def scan(model: LidarModel, building: Building, map_from_laser: Trajectory, turn
         start_ns: of the building's clock, in the stamps of map_from_laser.
         rng: as of lidar.scan().
     """
-    sectors = int(np.clip(round(turn_ns * 1e-9 / SECTOR_S), 1, model.beams // LEAST_BEAMS))
+    sectors = int(np.clip(round(turn_ns * 1e-9 / SECTOR_S), 1, model.beams // MIN_BEAMS))
     parts = []
     for beams in np.array_split(np.arange(model.beams), sectors):
         angles_rad = model.angles_rad[beams]

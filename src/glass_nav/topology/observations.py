@@ -27,8 +27,9 @@ class ObservationError(ValueError):
 @dataclass(frozen=True)
 class Meetpoint:
     """A place where the robot found so many edges to leave by."""
-    degree: int        # number of edges, the one that the robot came along included
-    r_m: float         # equidistance: mean distance of the nearest obstacles from the meetpoint
+
+    degree: int  # number of edges, the one that the robot came along included
+    r_m: float  # equidistance: mean distance of the nearest obstacles from the meetpoint
     sigma_r_m: float = 0.0  # 0: as the tolerances say
     bearings_rad: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (degree,) or (0,) not measured: directions
     # of the edges in the robot's frame, by rank
@@ -45,14 +46,17 @@ class Meetpoint:
         if not (math.isfinite(self.sigma_r_m) and self.sigma_r_m >= 0.0):
             raise ObservationError(f"meetpoint: sigma_r must be finite and >= 0 m, got {self.sigma_r_m}")
         if self.bearings_rad.shape not in ((0,), (self.degree,)):
-            raise ObservationError(f"meetpoint: {self.degree} edges need {self.degree} bearings or none, got "
-                                   f"{len(self.bearings_rad)}")
+            raise ObservationError(
+                f"meetpoint: {self.degree} edges need {self.degree} bearings or none, got {len(self.bearings_rad)}"
+            )
         if not np.isfinite(self.bearings_rad).all():
             raise ObservationError(f"meetpoint: bearings must be finite, got {self.bearings_rad.tolist()}")
         turn = float(self.gaps_rad[-1]) if self.degree > 1 and len(self.bearings_rad) else 0.0
         if np.any(np.diff(self.gaps_rad) < 0.0) or turn >= 2.0 * math.pi:
-            raise ObservationError(f"meetpoint: bearings must run clockwise from the first, got "
-                                   f"{np.round(self.bearings_rad, 3).tolist()} rad")
+            raise ObservationError(
+                f"meetpoint: bearings must run clockwise from the first, got "
+                f"{np.round(self.bearings_rad, 3).tolist()} rad"
+            )
         if self.centre_m.shape != (2,) or not np.isfinite(self.centre_m).all():
             raise ObservationError(f"meetpoint: its place needs finite x and y, got {self.centre_m.tolist()}")
         odom = self.odom_from_base
@@ -70,9 +74,10 @@ class Meetpoint:
 @dataclass(frozen=True)
 class Traversal:
     """An edge that the robot followed from one meetpoint to the next; by dead reckoning. NaN: not measured."""
-    rank: int                # of the edge at the meetpoint that it left
-    length_m: float          # travelled
-    chord_m: float           # in a straight line
+
+    rank: int  # of the edge at the meetpoint that it left
+    length_m: float  # travelled
+    chord_m: float  # in a straight line
     sigma_length_m: float = 0.0  # 0: as the tolerances say
     sigma_chord_m: float = 0.0
     chord_bearing_rad: float = UNKNOWN  # direction of the chord, counterclockwise from that in which the edge left
@@ -93,11 +98,13 @@ class Traversal:
                 raise ObservationError(f"edge traversal: {name} must be finite and >= 0 m, got {value}")
         for name in ("chord_bearing", "turn"):
             if math.isinf(getattr(self, f"{name}_rad")):
-                raise ObservationError(f"edge traversal: {name} must be finite, or NaN, got "
-                                       f"{getattr(self, name + '_rad')}")
+                raise ObservationError(
+                    f"edge traversal: {name} must be finite, or NaN, got {getattr(self, name + '_rad')}"
+                )
         if self.segments_m.ndim != 2 or self.segments_m.shape[1:] != (4,) or not np.isfinite(self.segments_m).all():
-            raise ObservationError(f"edge traversal: segments must be finite rows of x1 y1 x2 y2, got shape "
-                                   f"{self.segments_m.shape}")
+            raise ObservationError(
+                f"edge traversal: segments must be finite rows of x1 y1 x2 y2, got shape {self.segments_m.shape}"
+            )
 
 
 def turn_name(rank: int, degree: int) -> str:
@@ -114,5 +121,6 @@ def turn_name(rank: int, degree: int) -> str:
 def refuse_rank(rank: int, degree: int) -> None:
     """Raises ObservationError if a meetpoint of that degree has no such edge."""
     if not 0 <= rank < degree:
-        raise ObservationError(f"turn of rank {rank}: the meetpoint it left has degree {degree}, allowed 0 to "
-                               f"{degree - 1}")
+        raise ObservationError(
+            f"turn of rank {rank}: the meetpoint it left has degree {degree}, allowed 0 to {degree - 1}"
+        )

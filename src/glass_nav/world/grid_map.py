@@ -22,8 +22,9 @@ FREE_PERCENT = 25
 @dataclass(frozen=True)
 class GridMap:
     """Cells of one floor. Glass is occupied like any wall."""
-    occupancy: np.ndarray      # (H, W) int8: 0 free ... 100 occupied [percent], -1 unknown
-    resolution_m: float        # edge of a cell
+
+    occupancy: np.ndarray  # (H, W) int8: 0 free ... 100 occupied [percent], -1 unknown
+    resolution_m: float  # edge of a cell
     map_from_grid: np.ndarray  # (3,) pose of the outer corner of cell [0, 0] in the frame map
 
     def __post_init__(self) -> None:
@@ -43,8 +44,9 @@ class GridMap:
 
         The resolution counts to a micrometre (messages carry it as float32), the origin to a millimetre.
         """
-        place = (f"{self.occupancy.shape[0]} {self.occupancy.shape[1]} {self.resolution_m:.6f} "
-                 + " ".join(f"{round(float(value), 3) + 0.0:.3f}" for value in self.map_from_grid))
+        place = f"{self.occupancy.shape[0]} {self.occupancy.shape[1]} {self.resolution_m:.6f} " + " ".join(
+            f"{round(float(value), 3) + 0.0:.3f}" for value in self.map_from_grid
+        )
         digest = hashlib.sha256(place.encode())
         digest.update(np.ascontiguousarray(self.occupancy).tobytes())
         return digest.hexdigest()
@@ -77,8 +79,7 @@ class GridMap:
 
     def contains(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """(...) bool: the cell exists."""
-        return ((rows >= 0) & (rows < self.occupancy.shape[0])
-                & (columns >= 0) & (columns < self.occupancy.shape[1]))
+        return (rows >= 0) & (rows < self.occupancy.shape[0]) & (columns >= 0) & (columns < self.occupancy.shape[1])
 
     def is_free(self, points_m: np.ndarray) -> np.ndarray:
         """(...) bool: points (..., 2) [m] of the frame map lie in a free cell."""

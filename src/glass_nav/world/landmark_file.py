@@ -24,7 +24,7 @@ from glass_nav.world.landmark_map import RANGE_M, VIEW_RAD, LandmarkMap
 
 KEYS = ("id", "position", "facing_deg", "view_deg", "range")
 DEFAULTS = ("view_deg", "range")
-LEAST_DISTANCE_M = 0.01  # of two landmarks
+MIN_DISTANCE_M = 0.01  # of two landmarks
 SECTIONS = ("sigma", *DEFAULTS, "landmarks")
 
 
@@ -48,21 +48,27 @@ def load(path: "Union[str, os.PathLike[str]]") -> LandmarkMap:
 def save(landmarks: LandmarkMap, path: "Union[str, os.PathLike[str]]", remark: str = "") -> None:
     """Write a file that load() reads as an equal map; a remark becomes its first line."""
     lines = [f"# {remark}"] if remark else []
-    lines += ["# Lengths in m, angles in degrees, in the frame map.", f"sigma: {float(landmarks.sigma_m)!r}",
-              "landmarks:" if len(landmarks) else "landmarks: []"]
+    lines += [
+        "# Lengths in m, angles in degrees, in the frame map.",
+        f"sigma: {float(landmarks.sigma_m)!r}",
+        "landmarks:" if len(landmarks) else "landmarks: []",
+    ]
     for number, name in enumerate(landmarks.ids):
         x, y = (_number_text(value) for value in landmarks.positions_m[number])
         item = f"id: {_id_text(name)}, position: [{x}, {y}]"
         if not np.isnan(landmarks.facing_rad[number]):
-            item += (f", facing_deg: {_number_text(np.degrees(landmarks.facing_rad[number]))}"
-                     f", view_deg: {_number_text(np.degrees(landmarks.view_rad[number]))}")
+            item += (
+                f", facing_deg: {_number_text(np.degrees(landmarks.facing_rad[number]))}"
+                f", view_deg: {_number_text(np.degrees(landmarks.view_rad[number]))}"
+            )
         reach = float(landmarks.range_m[number])
         lines.append(f"  - {{{item}, range: {_number_text(reach) if math.isfinite(reach) else '.inf'}}}")
     Path(path).write_text("\n".join(lines) + "\n")
 
 
-def from_items(items: Sequence[Any], view_deg: float = float(np.degrees(VIEW_RAD)), range_m: float = RANGE_M,
-               sigma_m: float = 0.01) -> LandmarkMap:
+def from_items(
+    items: Sequence[Any], view_deg: float = float(np.degrees(VIEW_RAD)), range_m: float = RANGE_M, sigma_m: float = 0.01
+) -> LandmarkMap:
     """Landmarks from parsed yaml, one mapping each.
 
     Raises:
@@ -84,8 +90,9 @@ def from_items(items: Sequence[Any], view_deg: float = float(np.degrees(VIEW_RAD
         rows.append([*_position(who, item), facing_deg, view, _range(f"{who} range", item.get("range", range_m))])
     table = np.array(rows, float).reshape(-1, 5)
     _check_places(ids, table[:, :2])
-    return LandmarkMap(tuple(ids), table[:, :2].copy(), np.radians(table[:, 2]), np.radians(table[:, 3]),
-                       table[:, 4].copy(), sigma_m)
+    return LandmarkMap(
+        tuple(ids), table[:, :2].copy(), np.radians(table[:, 2]), np.radians(table[:, 3]), table[:, 4].copy(), sigma_m
+    )
 
 
 def _document(path: Path) -> Dict[str, Any]:
@@ -113,8 +120,12 @@ def _landmark_map(document: Dict[str, Any]) -> LandmarkMap:
     sigma_m = _number("sigma", document.get("sigma", 0.01))
     if sigma_m < 0.0:
         raise ValueError(f"sigma must be >= 0 m, got {sigma_m:g}")
-    return from_items(items, _number("view_deg", document.get("view_deg", float(np.degrees(VIEW_RAD)))),
-                      _range("range", document.get("range", RANGE_M)), sigma_m)
+    return from_items(
+        items,
+        _number("view_deg", document.get("view_deg", float(np.degrees(VIEW_RAD)))),
+        _range("range", document.get("range", RANGE_M)),
+        sigma_m,
+    )
 
 
 def _check_keys(who: str, item: Mapping[Any, Any], known: Sequence[str]) -> None:
@@ -128,10 +139,12 @@ def _check_keys(who: str, item: Mapping[Any, Any], known: Sequence[str]) -> None
 def _check_places(ids: Sequence[str], positions_m: np.ndarray) -> None:
     """Two tags back to back are apart by their cases; nearer is a line copied and not changed."""
     for number, name in enumerate(ids):
-        near = np.hypot(*(positions_m[number + 1:] - positions_m[number]).T) < LEAST_DISTANCE_M
+        near = np.hypot(*(positions_m[number + 1 :] - positions_m[number]).T) < MIN_DISTANCE_M
         if near.any():
-            raise ValueError(f"landmarks {name!r} and {ids[number + 1 + int(np.argmax(near))]!r} are in the same "
-                             f"place, {positions_m[number].tolist()}")
+            raise ValueError(
+                f"landmarks {name!r} and {ids[number + 1 + int(np.argmax(near))]!r} are in the same "
+                f"place, {positions_m[number].tolist()}"
+            )
 
 
 def _id(who: str, item: Dict[str, Any]) -> str:

@@ -26,29 +26,35 @@ class UnknownLandmark(ValueError):
 @dataclass(frozen=True, eq=False)
 class LandmarkMap:
     """Where the landmarks are and from where they can be seen, walls not counted."""
+
     ids: Tuple[str, ...]
     positions_m: np.ndarray  # (N, 2) in map
-    facing_rad: np.ndarray   # (N,) direction in map that the detector looks in, NaN: to all sides
-    view_rad: np.ndarray     # (N,) whole angle that it sees beams from
-    range_m: np.ndarray      # (N,)
-    sigma_m: float = 0.01    # standard deviation of x and of y of the positions
+    facing_rad: np.ndarray  # (N,) direction in map that the detector looks in, NaN: to all sides
+    view_rad: np.ndarray  # (N,) whole angle that it sees beams from
+    range_m: np.ndarray  # (N,)
+    sigma_m: float = 0.01  # standard deviation of x and of y of the positions
 
     def __post_init__(self) -> None:
         count = len(self.ids)
         shapes = [np.shape(value) for value in (self.positions_m, self.facing_rad, self.view_rad, self.range_m)]
         if shapes != [(count, 2), (count,), (count,), (count,)]:
-            raise ValueError(f"expected {count} landmarks with positions (N, 2), facing (N,), view (N,) and range "
-                             f"(N,), got {', '.join(map(str, shapes))}")
+            raise ValueError(
+                f"expected {count} landmarks with positions (N, 2), facing (N,), view (N,) and range "
+                f"(N,), got {', '.join(map(str, shapes))}"
+            )
         if len(set(self.ids)) < count:
             twice = next(name for name in self.ids if self.ids.count(name) > 1)
             raise ValueError(f"landmark id {twice!r} is given twice")
         if not np.isfinite(self.positions_m).all():
             number = int(np.argmin(np.isfinite(self.positions_m).all(axis=1)))
-            raise ValueError(f"landmark {self.ids[number]!r}: position must be finite, got "
-                             f"{self.positions_m[number].tolist()}")
-        for what, values, good in (("facing", self.facing_rad, ~np.isinf(self.facing_rad)),
-                                   ("view", self.view_rad, (self.view_rad > 0.0) & (self.view_rad <= 2.0 * np.pi)),
-                                   ("range", self.range_m, self.range_m > 0.0)):
+            raise ValueError(
+                f"landmark {self.ids[number]!r}: position must be finite, got {self.positions_m[number].tolist()}"
+            )
+        for what, values, good in (
+            ("facing", self.facing_rad, ~np.isinf(self.facing_rad)),
+            ("view", self.view_rad, (self.view_rad > 0.0) & (self.view_rad <= 2.0 * np.pi)),
+            ("range", self.range_m, self.range_m > 0.0),
+        ):
             if not good.all():
                 number = int(np.argmin(good))
                 allowed = {"facing": "finite", "view": "> 0 and <= 360 degrees", "range": "> 0 m"}[what]
@@ -93,11 +99,13 @@ class LandmarkMap:
         Returns:
             (..., N) bool.
         """
-        return self.reaches(np.asarray(points_m, float)[..., None, :] - self.positions_m, slice(None), range_share,
-                            slack_rad)
+        return self.reaches(
+            np.asarray(points_m, float)[..., None, :] - self.positions_m, slice(None), range_share, slack_rad
+        )
 
-    def reaches(self, way_m: np.ndarray, which: "Union[slice, np.ndarray]", range_share: float = 1.0,
-                slack_rad: float = 0.0) -> np.ndarray:
+    def reaches(
+        self, way_m: np.ndarray, which: "Union[slice, np.ndarray]", range_share: float = 1.0, slack_rad: float = 0.0
+    ) -> np.ndarray:
         """(..., M) as in_view(), for ways (..., M, 2) from M of the landmarks, chosen by `which`, to a point each."""
         near = np.hypot(way_m[..., 0], way_m[..., 1]) <= self.range_m[which] * range_share
         off = np.abs(angles.wrap(np.arctan2(way_m[..., 1], way_m[..., 0]) - self.facing_rad[which]))
@@ -106,18 +114,29 @@ class LandmarkMap:
 
     def joined(self, other: "LandmarkMap") -> "LandmarkMap":
         """Both; sigma is that of this map."""
-        return LandmarkMap(self.ids + other.ids, np.concatenate([self.positions_m, other.positions_m]),
-                           np.concatenate([self.facing_rad, other.facing_rad]),
-                           np.concatenate([self.view_rad, other.view_rad]),
-                           np.concatenate([self.range_m, other.range_m]), self.sigma_m)
+        return LandmarkMap(
+            self.ids + other.ids,
+            np.concatenate([self.positions_m, other.positions_m]),
+            np.concatenate([self.facing_rad, other.facing_rad]),
+            np.concatenate([self.view_rad, other.view_rad]),
+            np.concatenate([self.range_m, other.range_m]),
+            self.sigma_m,
+        )
 
 
-def seen_from_all_sides(ids: Sequence[str], positions_m: np.ndarray, range_m: float = np.inf,
-                        sigma_m: float = 0.0) -> LandmarkMap:
+def seen_from_all_sides(
+    ids: Sequence[str], positions_m: np.ndarray, range_m: float = np.inf, sigma_m: float = 0.0
+) -> LandmarkMap:
     """Landmarks (N, 2) without a direction."""
     count = len(ids)
-    return LandmarkMap(tuple(ids), np.asarray(positions_m, float).reshape(-1, 2), np.full(count, np.nan),
-                       np.full(count, 2.0 * np.pi), np.full(count, float(range_m)), sigma_m)
+    return LandmarkMap(
+        tuple(ids),
+        np.asarray(positions_m, float).reshape(-1, 2),
+        np.full(count, np.nan),
+        np.full(count, 2.0 * np.pi),
+        np.full(count, float(range_m)),
+        sigma_m,
+    )
 
 
 NONE = seen_from_all_sides((), np.zeros((0, 2)))

@@ -54,8 +54,9 @@ def save(grid_map: GridMap, path_yaml: "Union[str, os.PathLike[str]]", image_suf
     if graded:
         path_image = path_yaml.with_suffix(".png")
         step = (occupied - free) / 98.0  # mode scale has 98 of them for 1..98, and two greys or more in each
-        probability = np.select([occupancy <= 0, occupancy == 100], [0.0, 1.0],
-                                free + step * (np.minimum(occupancy, 98) - 0.5))
+        probability = np.select(
+            [occupancy <= 0, occupancy == 100], [0.0, 1.0], free + step * (np.minimum(occupancy, 98) - 0.5)
+        )
         grey = np.where(occupancy == UNKNOWN, 128, np.rint(255.0 * (1.0 - probability)))
         alpha = np.where(occupancy == UNKNOWN, 0, 255)
         image = np.stack([grey, grey, grey, alpha], axis=-1).astype(np.uint8)
@@ -66,7 +67,8 @@ def save(grid_map: GridMap, path_yaml: "Union[str, os.PathLike[str]]", image_suf
     path_yaml.write_text(
         f"image: {path_image.name}\nmode: {'scale' if graded else 'trinary'}\n"
         f"resolution: {float(grid_map.resolution_m)!r}\norigin: [{x!r}, {y!r}, {yaw!r}]\n"
-        f"negate: 0\noccupied_thresh: {occupied}\nfree_thresh: {free}\n")
+        f"negate: 0\noccupied_thresh: {occupied}\nfree_thresh: {free}\n"
+    )
 
 
 def _load_yaml(path: Path) -> GridMap:
@@ -85,8 +87,10 @@ def _load_yaml(path: Path) -> GridMap:
         raise MapError(f"{path}: mode must be trinary, scale or raw, got {mode!r}")
     occupied, free = _number(path, fields, "occupied_thresh"), _number(path, fields, "free_thresh")
     if not 0.0 <= free < occupied <= 1.0:
-        raise MapError(f"{path}: thresholds must be 0 <= free_thresh < occupied_thresh <= 1, "
-                       f"got free_thresh {free} and occupied_thresh {occupied}")
+        raise MapError(
+            f"{path}: thresholds must be 0 <= free_thresh < occupied_thresh <= 1, "
+            f"got free_thresh {free} and occupied_thresh {occupied}"
+        )
     image = fields["image"]
     if not (isinstance(image, str) and image):
         raise MapError(f"{path}: image must be the name of a file, got {image!r}")
@@ -144,8 +148,10 @@ def _channels(path: Path, path_image: Path) -> np.ndarray:
         try:
             image.load()
         except (OSError, ValueError, SyntaxError, IndexError) as err:
-            raise MapError(f"{path}: the data of its image {path_image} do not fit its {image.width} x "
-                           f"{image.height} pixels: the file is cut short or damaged") from err
+            raise MapError(
+                f"{path}: the data of its image {path_image} do not fit its {image.width} x "
+                f"{image.height} pixels: the file is cut short or damaged"
+            ) from err
     if image.mode.startswith("I"):  # 16 bit: the high byte, as SDL shows it to map_server
         grey = np.asarray(image).astype(np.int64) >> 8
         return np.clip(grey, 0, 255).astype(np.uint8)[..., None]
@@ -188,8 +194,7 @@ def _load_mrpt(path: Path) -> GridMap:
         raise MapError(f"{path}: does not exist")
     try:
         grid = _mrpt_io.read_grid_map(str(path))
-        return GridMap(grid["occupancy"], grid["resolution_m"],
-                       np.array([grid["x_min_m"], grid["y_min_m"], 0.0]))
+        return GridMap(grid["occupancy"], grid["resolution_m"], np.array([grid["x_min_m"], grid["y_min_m"], 0.0]))
     except ValueError as err:
         raise MapError(f"{path}: {err}") from err
 
@@ -198,3 +203,9 @@ def _reason(err: Exception) -> str:
     if isinstance(err, OSError) and err.strerror:
         return str(err.strerror)
     return str(err).splitlines()[0] if str(err) else type(err).__name__
+
+
+def name_of(path: Path) -> str:
+    """What people and atlases call a map: the file's stem, or its folder's name where all maps are called map.yaml."""
+    stem = path.name.partition(".")[0]
+    return path.resolve().parent.name if stem == "map" else stem

@@ -17,11 +17,11 @@ from scipy import ndimage
 from glass_nav.geometry import se2, segments
 from glass_nav.world.grid_map import GridMap
 
-TOLERANCE_CELLS = 1.5   # a wall that a mapper left rough is still one
+TOLERANCE_CELLS = 1.5  # a wall that a mapper left rough is still one
 FINE_TOLERANCE_CELLS = 1.0  # to place a scan on: what stands out of a wall shall not tilt it
-CLOSE_CELLS = 2         # of an occupied cell, an unknown one is wall
-LEAST_LENGTH_M = 0.3
-GAP_M = 0.3             # of unknown cells, within one wall
+CLOSE_CELLS = 2  # of an occupied cell, an unknown one is wall
+MIN_LENGTH_M = 0.3
+GAP_M = 0.3  # of unknown cells, within one wall
 
 _STEP = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])  # along a face: east, north, west, south; free to the left
 _BEHIND = np.array([[0, -1], [1, 0], [0, 1], [-1, 0]])  # from the free cell to the one behind the face
@@ -31,8 +31,9 @@ _START = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])  # corner of the free cell w
 @dataclass(frozen=True)
 class WallSegments:
     """Segments in the frame map, and which face of the outline belongs to which."""
-    segments_m: np.ndarray    # (S, 4) x1 y1 x2 y2, with the free space to the left
-    faces_m: np.ndarray       # (F, 2) middles of the faces of occupied cells
+
+    segments_m: np.ndarray  # (S, 4) x1 y1 x2 y2, with the free space to the left
+    faces_m: np.ndarray  # (F, 2) middles of the faces of occupied cells
     face_segment: np.ndarray  # (F,) int: its segment, segments.NO_SEGMENT for none
 
 
@@ -58,7 +59,7 @@ def extract(grid_map: GridMap, tolerance_cells: float = TOLERANCE_CELLS) -> Wall
     count = 0
     for loop in _loops(cell, side):
         for chain in _without_gaps(loop, wall, gap):
-            found, its = segments.split_and_merge(behind[chain] + 0.5, tolerance_cells, LEAST_LENGTH_M / resolution_m)
+            found, its = segments.split_and_merge(behind[chain] + 0.5, tolerance_cells, MIN_LENGTH_M / resolution_m)
             label[chain] = np.where(its >= 0, its + count, its)
             count += len(found)
             rows.append(found)
@@ -84,7 +85,7 @@ def _faces(free: np.ndarray) -> "tuple[np.ndarray, np.ndarray]":
     padded = np.pad(free, 1)
     cells, sides = [], []
     for side, (right, up) in enumerate(_BEHIND):
-        beyond = padded[1 + up:padded.shape[0] - 1 + up, 1 + right:padded.shape[1] - 1 + right]
+        beyond = padded[1 + up : padded.shape[0] - 1 + up, 1 + right : padded.shape[1] - 1 + right]
         rows, columns = np.nonzero(free & ~beyond)
         cells.append(np.column_stack([columns, rows]))
         sides.append(np.full(len(rows), side))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from glass_nav.geometry import angles, se2
-from glass_nav.localization.glass_mcl_params import GlassMclParams
+from glass_nav.localization.localizer_params import GlassMclParams
 from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import GridMap
 
@@ -41,7 +41,7 @@ def room_map(yaw=0.0):
     cells = np.rint(CORNERS_M / CELL_M).astype(int) + 10
     occupancy = np.zeros((101, 141), np.int8)
     for (x0, y0), (x1, y1) in zip(cells, np.roll(cells, -1, axis=0)):
-        occupancy[min(y0, y1):max(y0, y1) + 1, min(x0, x1):max(x0, x1) + 1] = 100
+        occupancy[min(y0, y1) : max(y0, y1) + 1, min(x0, x1) : max(x0, x1) + 1] = 100
     return GridMap(occupancy, CELL_M, se2.compose([0.0, 0.0, yaw], [-10.5 * CELL_M, -10.5 * CELL_M, 0.0]))
 
 
@@ -66,8 +66,13 @@ def test_the_likelihood_field_is_the_distance_to_the_lines_of_the_walls(yaw):
     pose, turned = np.array([2.3, 1.4, 0.4]), np.array([0.0, 0.0, yaw])
     poses = pose + np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, -0.2, 0.2]])
     scan = scan_at(pose)
-    expected = [np.log(0.9 * np.exp(-0.5 * (distance_to_lines(se2.transform_points(each, scan.points_in_base()))
-                                            / 0.2) ** 2) + 0.1 / 12.0).sum() for each in poses]
+    expected = [
+        np.log(
+            0.9 * np.exp(-0.5 * (distance_to_lines(se2.transform_points(each, scan.points_in_base())) / 0.2) ** 2)
+            + 0.1 / 12.0
+        ).sum()
+        for each in poses
+    ]
     found = LikelihoodField(room_map(yaw), settings).log_weights(se2.compose(turned, poses), scan)
     np.testing.assert_allclose(found, expected, rtol=0.02, atol=1.5)  # tabulated on quarters of cells; 90 beams
     assert found.argmax() == 0
@@ -78,7 +83,7 @@ def test_the_beam_model_is_the_mixture_of_the_book():
     pose = np.array([2.3, 1.4, 0.4])
     scan = scan_at(pose, beams=30)
     scan.ranges_m[3:6] = [np.inf, np.nan, -np.inf]  # no answers: the same for all particles
-    scan.ranges_m[8] = 0.4                          # somebody stands there
+    scan.ranges_m[8] = 0.4  # somebody stands there
     poses = np.array([pose, pose + [0.2, 0.1, 0.0]])
     expected = []
     for each in poses:
@@ -101,8 +106,10 @@ def test_many_beams_count_as_independent_ones():
     scan, pose = scan_at(np.array([2.3, 1.4, 0.4])), np.array([[2.4, 1.4, 0.4]])
     whole = Settings(0.1, 0.95, 0.05, max_beams=None)
     thinned = whole._replace(independent_beams=30.0)
-    np.testing.assert_allclose(LikelihoodField(room_map(), thinned).log_weights(pose, scan),
-                               LikelihoodField(room_map(), whole).log_weights(pose, scan) / 3.0)
+    np.testing.assert_allclose(
+        LikelihoodField(room_map(), thinned).log_weights(pose, scan),
+        LikelihoodField(room_map(), whole).log_weights(pose, scan) / 3.0,
+    )
     assert len(baselines.chosen_beams(scan, whole._replace(max_beams=7))) == 7
 
 
@@ -111,8 +118,9 @@ def test_many_beams_count_as_independent_ones():
 def test_every_localizer_follows_a_robot_through_a_room_and_repeats_itself(name):
     rng = np.random.default_rng(3)
     at = 0.16 * np.arange(14)
-    true = np.stack([2.6 + 1.2 * np.cos(at), 1.6 + 0.7 * np.sin(at), np.arctan2(0.7 * np.cos(at),
-                                                                                -1.2 * np.sin(at))], -1)
+    true = np.stack(
+        [2.6 + 1.2 * np.cos(at), 1.6 + 0.7 * np.sin(at), np.arctan2(0.7 * np.cos(at), -1.2 * np.sin(at))], -1
+    )
     scans = [scan_at(pose, 180, 0.01, rng, 10**9 * index) for index, pose in enumerate(true)]
     ways = []
     for _ in range(2):

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from glass_nav.evaluation import case_scores, replay_result
-from glass_nav.evaluation.case_scores import SurfaceScores
-from glass_nav.localization.glass_mcl_params import GlassMclParams
+from glass_nav.evaluation.metrics import case_scores, replay_result
+from glass_nav.evaluation.metrics.case_scores import SurfaceScores
+from glass_nav.localization.localizer_params import GlassMclParams
 
 REPO = Path(__file__).resolve().parents[3]
 sys.path.append(str(REPO / "test" / "benchmark"))
@@ -25,13 +25,25 @@ def a_run(localizer="ours", building="hall", rmse_m=0.01, yaw_deg=0.1, told=(1, 
     """Four beams: one diffuse, three behind a pane; all but what is told wrongly cut at it."""
     cases = case_scores.of_cases(np.array([1, 3, 3, 3]), np.array(told), np.ones(4, bool))
     pose = {"position_rmse_m": rmse_m, "position_median_m": rmse_m, "yaw_mean_deg": yaw_deg, "lost_share": lost}
-    return Run(building, "weak", 100, localizer, pose, cases if localizer.startswith("ours") else None,
-               SurfaceScores(3, 3, 3, 1, 0, 1, 1) if localizer == "ours" else None, 5, 4, 0.2)
+    return Run(
+        building,
+        "weak",
+        100,
+        localizer,
+        pose,
+        cases if localizer.startswith("ours") else None,
+        SurfaceScores(3, 3, 3, 1, 0, 1, 1) if localizer == "ours" else None,
+        5,
+        4,
+        0.2,
+    )
 
 
 def test_a_drive_is_the_same_for_the_same_seed_and_another_for_another():
-    ways = [np.array([frame.scan.ranges_m for frame in drives.drive("opaque_office", "weak", seed, 0.0, 2).frames])
-            for seed in (1, 1, 2)]
+    ways = [
+        np.array([frame.scan.ranges_m for frame in drives.drive("opaque_office", "weak", seed, 0.0, 2).frames])
+        for seed in (1, 1, 2)
+    ]
     assert ways[0].shape == (2, 541)
     np.testing.assert_array_equal(ways[0], ways[1])
     assert np.any(ways[0] != ways[2])
@@ -61,8 +73,14 @@ def test_the_results_are_strict_json(tmp_path):
 
 
 def test_the_ratio_is_to_the_best_baseline_of_the_building_and_never_to_the_oracle():
-    runs = [a_run(rmse_m=0.01), a_run(rmse_m=0.03), a_run("ours_oracle", rmse_m=0.001),
-            a_run("amcl_field60", rmse_m=0.04), a_run("amcl_beam60", rmse_m=0.08), a_run("amcl_beam60", "yard", 0.001)]
+    runs = [
+        a_run(rmse_m=0.01),
+        a_run(rmse_m=0.03),
+        a_run("ours_oracle", rmse_m=0.001),
+        a_run("amcl_field60", rmse_m=0.04),
+        a_run("amcl_beam60", rmse_m=0.08),
+        a_run("amcl_beam60", "yard", 0.001),
+    ]
     assert glass_buildings.to_best_baseline(runs, "hall", "position_rmse_m") == (pytest.approx(0.5), "amcl_field60")
     assert glass_buildings.to(runs, "hall", "position_rmse_m", "ours_oracle") == pytest.approx(20.0)
 
@@ -77,9 +95,15 @@ def test_baselines_of_an_earlier_benchmark_count_where_they_drove_the_same(tmp_p
     assert glass_buildings.baselines_from(tmp_path / "x.json", [job._replace(seed=101)]) == []
 
 
-@pytest.mark.parametrize("changes, missed", [
-    ({}, []), ({"rmse_m": 0.016}, ["hall: position_rmse_m / best baseline"]), ({"lost": 0.1}, ["largest lost share"]),
-    ({"told": (1, 3, 3, 1)}, ["case accuracy", "macro F1", "precision of case 1"])])
+@pytest.mark.parametrize(
+    "changes, missed",
+    [
+        ({}, []),
+        ({"rmse_m": 0.016}, ["hall: position_rmse_m / best baseline"]),
+        ({"lost": 0.1}, ["largest lost share"]),
+        ({"told": (1, 3, 3, 1)}, ["case accuracy", "macro F1", "precision of case 1"]),
+    ],
+)
 def test_bars_are_kept_or_missed(capsys, changes, missed):
     runs = [a_run(**changes), a_run("amcl_field60", rmse_m=0.02, yaw_deg=0.2)]
     assert glass_buildings.print_bars(runs) == (not missed)
@@ -109,8 +133,15 @@ def test_the_tables_have_a_line_for_each(capsys):
     assert "| diffuse | 0.0 % | 100.0 % |" in out
 
 
-@pytest.mark.parametrize("bar, kept", [(Bar("x", 0.95, 0.95), True), (Bar("x", 0.94, 0.95), False),
-                                       (Bar("x", 0.01, most=0.01), True), (Bar("x", 0.02, most=0.01), False),
-                                       (Bar("x", None, 0.95), True)])
+@pytest.mark.parametrize(
+    "bar, kept",
+    [
+        (Bar("x", 0.95, 0.95), True),
+        (Bar("x", 0.94, 0.95), False),
+        (Bar("x", 0.01, most=0.01), True),
+        (Bar("x", 0.02, most=0.01), False),
+        (Bar("x", None, 0.95), True),
+    ],
+)
 def test_a_bar_includes_its_edge(bar, kept):
     assert bar.kept is kept

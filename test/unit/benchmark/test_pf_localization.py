@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from glass_nav.geometry import se2
-from glass_nav.localization.glass_mcl_params import GlassMclParams
+from glass_nav.localization.localizer_params import GlassMclParams
 from glass_nav.recording.log_file import open_log
 from glass_nav.recording.recording import LogOptions, Refusal
 from glass_nav.sensing.scan import Scan
@@ -39,8 +39,11 @@ def a_scan(ranges_m, angles_rad, second=0.0, lidar=""):
 def a_track(odom_x_m, lidars=("",)):
     """A robot that drives ahead, a scan of each lidar at each place."""
     poses = [np.array([x, 0.0, 0.0]) for x in odom_x_m]
-    moments = [Moment(a_scan([1.0, 2.0], [0.0, 0.1], second, lidar), pose, pose)
-               for second, pose in enumerate(poses) for lidar in lidars]
+    moments = [
+        Moment(a_scan([1.0, 2.0], [0.0, 0.1], second, lidar), pose, pose)
+        for second, pose in enumerate(poses)
+        for lidar in lidars
+    ]
     return Track("ahead", a_map(), moments)
 
 
@@ -59,11 +62,12 @@ def test_a_place_that_is_right_for_less_than_three_metres_is_found_only_if_the_t
 
 
 def test_the_means_are_read_from_what_the_program_prints():
-    log = ("[17:50:22.1453|INFO |App] Odometry estimation: (8.978,8.988,54.86deg)\n"
-           "[17:50:22.1453|INFO |App] PDF estimation: (0.347,-10.295,-90.00deg), ESS (B.R.)= 0 tr(cov): 5.86461\n"
-           "[17:50:22.1453|INFO |App] PDF estimation: (-nan,1e-3,nandeg), ESS (B.R.)= 0 tr(cov): nan\n")
-    np.testing.assert_allclose(pf_localization.means_in(log),
-                               [[0.347, -10.295, -np.pi / 2.0], [np.nan, 0.001, np.nan]])
+    log = (
+        "[17:50:22.1453|INFO |App] Odometry estimation: (8.978,8.988,54.86deg)\n"
+        "[17:50:22.1453|INFO |App] PDF estimation: (0.347,-10.295,-90.00deg), ESS (B.R.)= 0 tr(cov): 5.86461\n"
+        "[17:50:22.1453|INFO |App] PDF estimation: (-nan,1e-3,nandeg), ESS (B.R.)= 0 tr(cov): nan\n"
+    )
+    np.testing.assert_allclose(pf_localization.means_in(log), [[0.347, -10.295, -np.pi / 2.0], [np.nan, 0.001, np.nan]])
     assert pf_localization.means_in("").shape == (0, 3)
 
 
@@ -72,8 +76,9 @@ def test_the_config_puts_particles_anywhere_on_the_map_and_opens_no_window(tmp_p
     config = configparser.ConfigParser()
     config.read_string(pf_localization.config_text(tmp_path, a_map(), settings))
     experiment = config["LocalizationExperiment"]
-    assert [float(experiment[f"init_PDF_{name}"]) for name in ("mode", "min_x", "max_x", "min_y", "max_y")] == \
-        pytest.approx([0.0, 0.0, 0.15, 0.0, 0.1])
+    assert [
+        float(experiment[f"init_PDF_{name}"]) for name in ("mode", "min_x", "max_x", "min_y", "max_y")
+    ] == pytest.approx([0.0, 0.0, 0.15, 0.0, 0.1])
     assert experiment["map_file"] == str(tmp_path / "map.gridmap.gz")
     assert experiment["rawlog_file"] == str(tmp_path / "track.rawlog")
     assert (experiment["SHOW_PROGRESS_3D_REAL_TIME"], experiment["3DSceneFrequency"]) == ("0", "-1")

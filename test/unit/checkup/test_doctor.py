@@ -28,8 +28,23 @@ DEG = np.pi / 180.0
 def simulated(tmp_path_factory):
     """Records and map of a robot that drives around half an atrium of glass."""
     folder = tmp_path_factory.mktemp("simulated")
-    assert cli.main(["simulate", "glass_atrium", "--path", "ring", "--beams", "181", "--rate", "5",
-                     "--out", str(folder / "good.bag")]) == 0
+    assert (
+        cli.main(
+            [
+                "simulate",
+                "glass_atrium",
+                "--path",
+                "ring",
+                "--beams",
+                "181",
+                "--rate",
+                "5",
+                "--out",
+                str(folder / "good.bag"),
+            ]
+        )
+        == 0
+    )
     return faults.read(folder / "good.bag"), map_file.load(folder / "good.map.yaml")
 
 
@@ -48,6 +63,7 @@ def good(request):
 @pytest.fixture
 def named(tmp_path):
     """named(records, grid_map): names of what the doctor finds in a bag of these records."""
+
     def found(records: List[faults.Record], grid_map: Optional[GridMap] = None) -> Set[str]:
         path = tmp_path / f"faulty{len(list(tmp_path.iterdir()))}.bag"
         seen = bag_observer.observe([faults.write(path, records)])
@@ -133,18 +149,35 @@ def no_return_as(metres: float) -> Callable[[int, Any], Any]:
 # name of the finding -> the fault; and what follows from it beside
 ON_EACH_MESSAGE: "List[Tuple[str, faults.Change, Set[str]]]" = [
     ("stamps-zero", scans(lambda i, m: with_stamp(m, lambda ns: 0) if second_of_ten(i) else m), set()),
-    ("stamps-backwards",
-     scans(lambda i, m: with_stamp(m, lambda ns: ns - 25 * 10**7) if second_of_ten(i) else m), set()),
+    (
+        "stamps-backwards",
+        scans(lambda i, m: with_stamp(m, lambda ns: ns - 25 * 10**7) if second_of_ten(i) else m),
+        set(),
+    ),
     ("stamps-repeated", scans(lambda i, m: [m, copy.deepcopy(m)] if second_of_ten(i) else m), {"scan-repeats"}),
     ("scan-gaps", scans(lambda i, m: None if 20 < i < 35 else m), set()),
     ("clocks-differ", scans(lambda i, m: with_stamp(m, lambda ns: ns - 15 * 10**8)), {"odometry-missing"}),
     ("scan-delay", faults.delayed(lambda i: 0.8 * (i % 7 == 0)), {"stamps-backwards"}),
     ("scan-units", scans(lambda i, m: with_ranges(m, lambda r: 1000.0 * r)), {"scan-blind"}),
-    ("scan-units", scans(lambda i, m: with_fields(with_ranges(m, lambda r: 1000.0 * r), range_min=1000.0 * m.range_min,
-                                                  range_max=1000.0 * m.range_max)), set()),
+    (
+        "scan-units",
+        scans(
+            lambda i, m: with_fields(
+                with_ranges(m, lambda r: 1000.0 * r), range_min=1000.0 * m.range_min, range_max=1000.0 * m.range_max
+            )
+        ),
+        set(),
+    ),
     ("scan-angles", scans(lambda i, m: with_fields(m, angle_max=m.angle_max - 0.3)), set()),
-    ("scan-angles-no-radians", scans(lambda i, m: with_fields(
-        m, angle_min=m.angle_min / DEG, angle_max=m.angle_max / DEG, angle_increment=m.angle_increment / DEG)), set()),
+    (
+        "scan-angles-no-radians",
+        scans(
+            lambda i, m: with_fields(
+                m, angle_min=m.angle_min / DEG, angle_max=m.angle_max / DEG, angle_increment=m.angle_increment / DEG
+            )
+        ),
+        set(),
+    ),
     ("scan-limits", scans(lambda i, m: with_fields(m, range_max=0.0)), {"scan-blind"}),
     ("scan-blind", scans(lambda i, m: with_ranges(m, lambda r: np.where(np.arange(len(r)) % 40, np.inf, r))), set()),
     ("no-return-as-range", scans(no_return_as(4.5)), set()),
@@ -163,7 +196,8 @@ ON_EACH_MESSAGE: "List[Tuple[str, faults.Change, Set[str]]]" = [
     ("frame-slash", links(slashed), set()),
     ("tf-contradiction", links(second_value), set()),
     ("tf-invalid", links(longer_quaternion), set()),
-    ("lidar-tilted", links(tilted, "laser"), set())]
+    ("lidar-tilted", links(tilted, "laser"), set()),
+]
 
 ON_THE_WAY: "List[Tuple[str, Callable[[], faults.Change], Set[str]]]" = [
     ("tf-gaps", lambda: links(lambda i, each: None if 200 < i < 350 else each), set()),
@@ -175,10 +209,17 @@ ON_THE_WAY: "List[Tuple[str, Callable[[], faults.Change], Set[str]]]" = [
     ("odometry-turns-opposite", lambda: odometry_steps(lambda step: step * [1.0, -1.0, -1.0]), set()),
     ("odometry-stands", lambda: odometry_steps(lambda step: step * 0.0), set()),
     ("lidar-mirrored", lambda: scans(lambda i, m: with_ranges(m, lambda r: r[::-1])), set()),
-    ("lidar-turned", lambda: links(lambda i, each: with_planar(each, faults.planar(each) + [0, 0, 30 * DEG]), "laser"),
-     set()),
-    ("lidar-turned", lambda: links(lambda i, each: with_planar(each, faults.planar(each) + [0, 0, np.pi]), "laser"),
-     set())]
+    (
+        "lidar-turned",
+        lambda: links(lambda i, each: with_planar(each, faults.planar(each) + [0, 0, 30 * DEG]), "laser"),
+        set(),
+    ),
+    (
+        "lidar-turned",
+        lambda: links(lambda i, each: with_planar(each, faults.planar(each) + [0, 0, np.pi]), "laser"),
+        set(),
+    ),
+]
 
 NEED_A_MAP = ("odometry-turns-opposite", "lidar-mirrored")
 
@@ -189,9 +230,14 @@ def test_nothing_is_found_where_nothing_is_wrong(good, named):
     assert named(short(records)) == set()
 
 
-@pytest.mark.parametrize("which, name, change, also", [
-    pytest.param(which, *fault, id=f"{which}-{fault[0]}")
-    for which, some in (("simulated", ON_EACH_MESSAGE), ("real", ON_EACH_MESSAGE[::2])) for fault in some])
+@pytest.mark.parametrize(
+    "which, name, change, also",
+    [
+        pytest.param(which, *fault, id=f"{which}-{fault[0]}")
+        for which, some in (("simulated", ON_EACH_MESSAGE), ("real", ON_EACH_MESSAGE[::2]))
+        for fault in some
+    ],
+)
 def test_a_fault_that_every_message_shows_is_named(request, named, which, name, change, also):
     found = named(change(short(request.getfixturevalue(which)[0])))
     assert name in found
@@ -215,10 +261,14 @@ def other_map(data_dir: Path) -> GridMap:
     return map_file.load(data_dir / "logs" / "uob_trace0" / "map.yaml")
 
 
-@pytest.mark.parametrize("name, change", [
-    ("map-mirrored", lambda own: replace(own, occupancy=np.ascontiguousarray(own.occupancy[:, ::-1]))),
-    ("map-empty", lambda own: replace(own, occupancy=np.where(own.occupied, -1, own.occupancy).astype(np.int8))),
-    ("map-inverted", lambda own: replace(own, occupancy=np.where(own.occupied, 0, 100).astype(np.int8)))])
+@pytest.mark.parametrize(
+    "name, change",
+    [
+        ("map-mirrored", lambda own: replace(own, occupancy=np.ascontiguousarray(own.occupancy[:, ::-1]))),
+        ("map-empty", lambda own: replace(own, occupancy=np.where(own.occupied, -1, own.occupancy).astype(np.int8))),
+        ("map-inverted", lambda own: replace(own, occupancy=np.where(own.occupied, 0, 100).astype(np.int8))),
+    ],
+)
 def test_a_map_that_does_not_belong_to_the_scans_is_named(good, named, name, change):
     records, grid_map = good
     found = named(records, change(grid_map))

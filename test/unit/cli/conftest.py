@@ -1,14 +1,9 @@
-"""Makes the helpers beside the tests importable: pytest's import mode importlib does not. Runs the command."""
-
-import sys
-from pathlib import Path
+"""Runs the command as a user does."""
 
 import pytest
 
 from glass_nav.cli import main as cli
 from glass_nav.cli import progress
-
-sys.path.append(str(Path(__file__).parent))
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from glass_nav.cli import main as cli
-from glass_nav.topology import atlas_file
+from glass_nav.topology.atlas import atlas_file
 from glass_nav.world import map_file
 from glass_nav.world.grid_map import GridMap
 
@@ -55,14 +55,20 @@ def size_px(path):
 def test_an_atlas_is_built_and_drawn(run, floor, tmp_path):
     code, out, err = run("build", floor, "--out", tmp_path / "atlas" / "ours")
     assert code == 0, err
-    said = re.fullmatch(r"6 nodes \(2 meetpoints, 4 dead ends\), 5 edges, (\d+) m of ways in 2 parts of the floor, "
-                        r"\d+ segments; written to atlas/ours/atlas.json \(\d+ kB\)\n", out)
+    said = re.fullmatch(
+        r"6 nodes \(2 meetpoints, 4 dead ends\), 5 edges, (\d+) m of ways in 2 parts of the floor, "
+        r"\d+ segments; written to atlas/ours/atlas.json \(\d+ kB\)\n",
+        out,
+    )
     assert said, out
     atlas = atlas_file.load(tmp_path / "atlas" / "ours")
     assert (atlas.name, atlas.source.name) == ("ours", "floor")
     assert float(said[1]) == pytest.approx(atlas.edges.length_m.sum(), abs=0.5)
-    for options, name, panels in ([], "ours.png", 3), (["--edge", 2], "ours_edge_2.png", 2), (
-            ["--map", floor], "ours.png", 3):
+    for options, name, panels in (
+        ([], "ours.png", 3),
+        (["--edge", 2], "ours_edge_2.png", 2),
+        (["--map", floor], "ours.png", 3),
+    ):
         code, out, err = run("show", tmp_path / "atlas" / "ours", *options)
         assert code == 0, err
         assert out == f"drawn to {name}" + ("\n" if "--map" in options else "; --map MAP draws the map under it\n")
@@ -77,8 +83,10 @@ def test_options_reach_the_graph_and_the_views(run, floor, tmp_path):
     assert run("build", floor, "--out", "b")[0] == 0
     wide = atlas_file.load(tmp_path / "b")
     assert len(wide.edges) == 5
-    length = [np.hypot(*(rows[:, 2:] - rows[:, :2]).T).max() for rows in (narrow.darts.segments_m.values,
-                                                                         wide.darts.segments_m.values)]
+    length = [
+        np.hypot(*(rows[:, 2:] - rows[:, :2]).T).max()
+        for rows in (narrow.darts.segments_m.values, wide.darts.segments_m.values)
+    ]
     assert length[0] < length[1]
 
 
@@ -121,23 +129,33 @@ def test_bad_input_is_one_line_and_exit_code_3(run, floor, tmp_path):
     map_file.save(GridMap(np.full((40, 40), 100, np.int8), CELL_M, np.zeros(3)), solid)
     assert run("build", floor, "--out", "a")[0] == 0
     for words, text in (
-            (["build", tmp_path / "no.yaml", "--out", "b"], "no.yaml: cannot be read: No such file or directory"),
-            (["build", solid, "--out", "b"], "no way of 2 m for a robot of 0.22 m radius in this map"),
-            (["show", tmp_path / "b"], "b: no such file, nor an atlas of the package, which are "),
-            (["show", tmp_path / "a", "--edge", 5], "a/atlas.json: --edge must be 0 to 4, got 5"),
-            (["show", tmp_path / "a", "--map", solid], "solid.yaml: the atlas a was made from another map, floor")):
+        (["build", tmp_path / "no.yaml", "--out", "b"], "no.yaml: cannot be read: No such file or directory"),
+        (["build", solid, "--out", "b"], "no way of 2 m for a robot of 0.22 m radius in this map"),
+        (["show", tmp_path / "b"], "b: no such file, nor an atlas of the package, which are "),
+        (["show", tmp_path / "a", "--edge", 5], "a/atlas.json: --edge must be 0 to 4, got 5"),
+        (["show", tmp_path / "a", "--map", solid], "solid.yaml: the atlas a was made from another map, floor"),
+    ):
         code, out, err = run(*words)
         assert (code, out) == (3, ""), words
         assert err.startswith(f"glass_nav atlas: {text}") and err.count("\n") == 1, err
     assert not (tmp_path / "b").exists()
 
 
-@pytest.mark.parametrize("words, text", [
-    (["build", "m.yaml", "--out", "b", "--robot-radius", "0"], "build: --robot-radius must be > 0 m, got 0.0"),
-    (["build", "m.yaml", "--out", "b", "--leaf-share", "-1"], "build: --leaf-share must be finite and >= 0, got -1.0"),
-    (["build", "m.yaml", "--out", "b", "--field-of-view", "0"],
-     "build: --field-of-view must be > 0 and <= 360, got 0.0"),
-    (["show", "a", "--edge", "-1"], "show: --edge must be >= 0, got -1")])
+@pytest.mark.parametrize(
+    "words, text",
+    [
+        (["build", "m.yaml", "--out", "b", "--robot-radius", "0"], "build: --robot-radius must be > 0 m, got 0.0"),
+        (
+            ["build", "m.yaml", "--out", "b", "--leaf-share", "-1"],
+            "build: --leaf-share must be finite and >= 0, got -1.0",
+        ),
+        (
+            ["build", "m.yaml", "--out", "b", "--field-of-view", "0"],
+            "build: --field-of-view must be > 0 and <= 360, got 0.0",
+        ),
+        (["show", "a", "--edge", "-1"], "show: --edge must be >= 0, got -1"),
+    ],
+)
 def test_wrong_options_are_refused_before_anything_is_read(run, words, text):
     code, out, err = run(*words)
     assert (code, out, err) == (2, "", f"glass_nav atlas: {text}\n")
@@ -146,9 +164,12 @@ def test_wrong_options_are_refused_before_anything_is_read(run, words, text):
 def test_an_atlas_without_lines_or_with_very_many_nodes_can_be_drawn(run, tmp_path, monkeypatch):
     """Edges without a polyline are drawn straight; beyond a number of nodes they carry no numbers."""
     atlas = atlas_file.load(REPO / "atlas" / "glass_bridge")
-    bare = replace(atlas, name="bare", edges=replace(atlas.edges, polyline_m=type(atlas.edges.polyline_m).empty(
-        len(atlas.edges), 2)))
+    bare = replace(
+        atlas,
+        name="bare",
+        edges=replace(atlas.edges, polyline_m=type(atlas.edges.polyline_m).empty(len(atlas.edges), 2)),
+    )
     atlas_file.save(bare, tmp_path / "bare.json")
-    monkeypatch.setattr("glass_nav.evaluation.atlas_picture.MOST_NUMBERS", 10)
+    monkeypatch.setattr("glass_nav.evaluation.plots.atlas_picture.MAX_NUMBERS", 10)
     assert run("show", tmp_path / "bare.json")[0] == 0
     assert size_px(tmp_path / "bare.png")[0] > 800

@@ -11,10 +11,10 @@ import pytest
 
 from glass_nav.cli import main as cli
 from glass_nav.cli import search_params
-from glass_nav.ros import topology_params
-from glass_nav.topology import atlas_file, shipped_atlases
-from glass_nav.topology.atlas import Atlas, Darts, Edges, MapReference, Nodes, Ragged, Visits, rings_clockwise
-from glass_nav.topology.atlas_localizer import SearchParams
+from glass_nav.ros.topology import topology_params
+from glass_nav.topology.atlas import atlas_file, shipped_atlases
+from glass_nav.topology.atlas.atlas import Atlas, Darts, Edges, MapReference, Nodes, Ragged, Visits, rings_clockwise
+from glass_nav.topology.search.atlas_localizer import SearchParams
 
 REPO = Path(__file__).parents[3]
 
@@ -26,10 +26,15 @@ def run(*arguments: str) -> int:
 def straight(path: Path) -> Path:
     """A corridor between equal dead ends, which looks the same from both."""
     node, bearing = np.array([0, 1]), np.array([0.0, np.pi])
-    atlas = Atlas("straight", MapReference("none", ""),
-                  Nodes(np.array([[0.0, 0.0], [9.0, 0.0]]), np.ones(2), np.full(2, 0.02), np.ones(2, np.int8)),
-                  Edges(np.array([9.0]), np.array([9.0]), np.array([0.02]), np.array([1.0]), Ragged.empty(1, 2)),
-                  Darts(node, bearing, Ragged.empty(2, 4)), rings_clockwise(node, bearing, 2), Visits.none(2, 1))
+    atlas = Atlas(
+        "straight",
+        MapReference("none", ""),
+        Nodes(np.array([[0.0, 0.0], [9.0, 0.0]]), np.ones(2), np.full(2, 0.02), np.ones(2, np.int8)),
+        Edges(np.array([9.0]), np.array([9.0]), np.array([0.02]), np.array([1.0]), Ragged.empty(1, 2)),
+        Darts(node, bearing, Ragged.empty(2, 4)),
+        rings_clockwise(node, bearing, 2),
+        Visits.none(2, 1),
+    )
     atlas_file.save(atlas, path)
     return path
 
@@ -84,12 +89,32 @@ def test_check_refuses_the_atlas_of_another_map(capsys: Any) -> None:
 def test_wake_up_writes_the_figures_and_they_repeat(tmp_path: Path, capsys: Any) -> None:
     figures = []
     for name in ("one.json", "two.json"):
-        assert run("wake-up", "glass_bridge", "--trials", "30", "--seed", "4", "--missed", "0.1", "--out",
-                   str(tmp_path / name)) == 0
+        assert (
+            run(
+                "wake-up",
+                "glass_bridge",
+                "--trials",
+                "30",
+                "--seed",
+                "4",
+                "--missed",
+                "0.1",
+                "--out",
+                str(tmp_path / name),
+            )
+            == 0
+        )
         figures.append(json.loads((tmp_path / name).read_text()))
     assert "30 robots: confirmed" in capsys.readouterr().out
-    assert {"confirmed_share", "wrong_share", "ambiguous_share", "lost_share", "edges_mean", "edges_p95",
-            "step_ms_max"} <= figures[0].keys()
+    assert {
+        "confirmed_share",
+        "wrong_share",
+        "ambiguous_share",
+        "lost_share",
+        "edges_mean",
+        "edges_p95",
+        "step_ms_max",
+    } <= figures[0].keys()
     assert figures[0]["trials"] == 30 and figures[0]["params"]["vote_mode"] == "best"
     for each in figures:
         del each["step_ms_max"]
@@ -120,15 +145,23 @@ def test_the_names_that_only_a_node_uses_are_those_of_the_node() -> None:
     assert set(params.names(topology_params.TopologyNodeParams)) == search_params.NODE_ONLY
 
 
-@pytest.mark.parametrize("arguments, line", [
-    (("explain", "--dart", "-1"), "glass_nav atlas: explain: --dart must be >= 0, got -1"),
-    (("check", "document_example", "--starts", "0"), "glass_nav atlas: check: --starts must be >= 1, got 0"),
-    (("wake-up", "document_example", "--trials", "0"), "glass_nav atlas: wake-up: --trials must be >= 1, got 0"),
-    (("wake-up", "document_example", "--seed", "-1"), "glass_nav atlas: wake-up: --seed must be >= 0, got -1"),
-    (("wake-up", "document_example", "--missed", "1"), "glass_nav atlas: wake-up: --missed must be in [0, 1), got 1.0"),
-    (("wake-up", "document_example", "--noise", "-1"),
-     "glass_nav atlas: wake-up: --noise must be in [0, 100), got -1.0"),
-])
+@pytest.mark.parametrize(
+    "arguments, line",
+    [
+        (("explain", "--dart", "-1"), "glass_nav atlas: explain: --dart must be >= 0, got -1"),
+        (("check", "document_example", "--starts", "0"), "glass_nav atlas: check: --starts must be >= 1, got 0"),
+        (("wake-up", "document_example", "--trials", "0"), "glass_nav atlas: wake-up: --trials must be >= 1, got 0"),
+        (("wake-up", "document_example", "--seed", "-1"), "glass_nav atlas: wake-up: --seed must be >= 0, got -1"),
+        (
+            ("wake-up", "document_example", "--missed", "1"),
+            "glass_nav atlas: wake-up: --missed must be in [0, 1), got 1.0",
+        ),
+        (
+            ("wake-up", "document_example", "--noise", "-1"),
+            "glass_nav atlas: wake-up: --noise must be in [0, 100), got -1.0",
+        ),
+    ],
+)
 def test_wrong_options_are_refused_in_one_line(arguments: Any, line: str, capsys: Any) -> None:
     assert run(*arguments) == 2
     assert capsys.readouterr().err.strip() == line

@@ -14,6 +14,7 @@ from glass_nav.cli import main as cli
 @pytest.fixture
 def doctor(capsys, tmp_path):
     """doctor(argument, ...): exit code, stdout, stderr."""
+
     def command(*arguments):
         code = cli.main(["doctor", *(str(argument) for argument in arguments)])
         captured = capsys.readouterr()
@@ -35,7 +36,10 @@ def test_a_good_bag_is_0_and_told_in_figures(doctor, room_bag, room_map):
         "written as "
         "nothing: all beams answer",
         "seen     tf odom -> base_link: 20 Hz for 6 s, 3.0 m; frames: base_link, laser, odom",
-        "seen     map: 122 x 82 cells of 0.05 m", "", "nothing found"]
+        "seen     map: 122 x 82 cells of 0.05 m",
+        "",
+        "nothing found",
+    ]
 
 
 def test_a_fault_is_1_with_what_to_do(doctor, room_bag):
@@ -58,19 +62,23 @@ def test_a_damaged_bag_is_a_finding(doctor, room_bag):
     path = room_bag(scans=400, beams=720).write()
     content = bytearray(path.read_bytes())
     middle = len(content) // 2
-    content[middle:middle + 5000] = bytes(5000)
+    content[middle : middle + 5000] = bytes(5000)
     path.write_bytes(content)
     code, out, _ = doctor(path)
     assert code == 1
     assert "finding  bag-damaged: the bag is damaged, " in out
 
 
-@pytest.mark.parametrize("arguments, code, line", [
-    ([], 2, "glass_nav doctor: give a bag, or --live to listen to the robot"),
-    (["x.bag", "--live"], 2, "glass_nav doctor: give a bag, or --live to listen to the robot, not both"),
-    (["--live", "--seconds", "0"], 2, "glass_nav doctor: --seconds must be > 0, got 0.0"),
-    (["absent.bag"], 3, "glass_nav doctor: absent.bag: does not exist"),
-    (["x.bag", "--map", "no.yaml"], 3, "glass_nav doctor: no.yaml: cannot be read: No such file or directory")])
+@pytest.mark.parametrize(
+    "arguments, code, line",
+    [
+        ([], 2, "glass_nav doctor: give a bag, or --live to listen to the robot"),
+        (["x.bag", "--live"], 2, "glass_nav doctor: give a bag, or --live to listen to the robot, not both"),
+        (["--live", "--seconds", "0"], 2, "glass_nav doctor: --seconds must be > 0, got 0.0"),
+        (["absent.bag"], 3, "glass_nav doctor: absent.bag: does not exist"),
+        (["x.bag", "--map", "no.yaml"], 3, "glass_nav doctor: no.yaml: cannot be read: No such file or directory"),
+    ],
+)
 def test_what_cannot_be_examined_is_one_line(doctor, arguments, code, line):
     told, out, err = doctor(*arguments)
     assert (told, out, err) == (code, "", line + "\n")
@@ -82,9 +90,10 @@ def test_without_a_roscore_live_says_so(doctor, monkeypatch):
     monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")
     code, _, err = doctor("--live", "--seconds", "1")
     assert code == 3
-    assert err.splitlines() == ["glass_nav doctor: listening for 1 s; let the robot drive, with a turn",
-                                "glass_nav doctor: no roscore at http://localhost:1: start the robot, or set "
-                                "ROS_MASTER_URI"]
+    assert err.splitlines() == [
+        "glass_nav doctor: listening for 1 s; let the robot drive, with a turn",
+        "glass_nav doctor: no roscore at http://localhost:1: start the robot, or set ROS_MASTER_URI",
+    ]
 
 
 def test_without_ros_what_needs_it_says_so(capsys, monkeypatch):

@@ -30,8 +30,17 @@ def room(tmp_path: Path) -> Path:
 
 
 def plan(folder: Path, *options: str) -> int:
-    return main(["landmarks", "plan", str(folder / "map.yaml"), str(folder / "tags.yaml"), "--out", str(folder / "out"),
-                 *options])
+    return main(
+        [
+            "landmarks",
+            "plan",
+            str(folder / "map.yaml"),
+            str(folder / "tags.yaml"),
+            "--out",
+            str(folder / "out"),
+            *options,
+        ]
+    )
 
 
 def test_a_plan_tells_what_there_is_and_what_one_more_tag_adds(room, capsys):
@@ -80,10 +89,14 @@ def test_a_map_where_no_tag_can_hang_gets_no_suggestion(room, capsys):
     assert "no other place on a wall helps" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("options, text", [
-    (["--add", "-1"], "glass_nav landmarks: --add must be >= 0, got -1"),
-    (["--step-deg", "0"], "glass_nav landmarks: --step-deg must be > 0 and <= 45 degrees, got 0.0"),
-    (["--spacing", "0"], "glass_nav landmarks: --spacing must be >= 0.05 m, got 0.0")])
+@pytest.mark.parametrize(
+    "options, text",
+    [
+        (["--add", "-1"], "glass_nav landmarks: --add must be >= 0, got -1"),
+        (["--step-deg", "0"], "glass_nav landmarks: --step-deg must be > 0 and <= 45 degrees, got 0.0"),
+        (["--spacing", "0"], "glass_nav landmarks: --spacing must be >= 0.05 m, got 0.0"),
+    ],
+)
 def test_wrong_options_are_told_before_any_file_is_read(tmp_path, capsys, options, text):
     assert plan(tmp_path, *options) == 2
     assert capsys.readouterr().err.strip() == text

@@ -46,8 +46,20 @@ def write_scan(path: Path, grid_map: GridMap, pose: np.ndarray) -> None:
 
 
 def locate(folder: Path, pose: np.ndarray, *options: str, grid: str = "map.yaml", scan: str = "scan.csv") -> int:
-    return main(["locate", "--map", str(folder / grid), "--scan", str(folder / scan), "--pose",
-                 *(str(value) for value in pose), "--out", str(folder / "out.png"), *options])
+    return main(
+        [
+            "locate",
+            "--map",
+            str(folder / grid),
+            "--scan",
+            str(folder / scan),
+            "--pose",
+            *(str(value) for value in pose),
+            "--out",
+            str(folder / "out.png"),
+            *options,
+        ]
+    )
 
 
 def told(text: str) -> np.ndarray:
@@ -84,8 +96,24 @@ def test_a_log_gives_the_scan_with_that_index(small_bag, capsys):
     for index in (0, 7):
         entry = [each for each in open_log(log) if not isinstance(each, Refusal)][index]
         true = truth.at(np.int64(entry.scan.stamp_ns))
-        assert main(["locate", "--map", str(grid), "--scan", str(log), "--index", str(index), "--pose",
-                     *(str(value) for value in true + OFF / 2.0), "--out", str(log.parent / "out.png")]) == 0
+        assert (
+            main(
+                [
+                    "locate",
+                    "--map",
+                    str(grid),
+                    "--scan",
+                    str(log),
+                    "--index",
+                    str(index),
+                    "--pose",
+                    *(str(value) for value in true + OFF / 2.0),
+                    "--out",
+                    str(log.parent / "out.png"),
+                ]
+            )
+            == 0
+        )
         left = told(capsys.readouterr().out) - true
         assert np.hypot(left[0], left[1]) < 0.03 and abs(angles.wrap(left[2])) < np.radians(0.5)
     assert main(["locate", "--map", str(grid), "--scan", str(log), "--index", "9999", "--pose", "0", "0", "0"]) == 3
@@ -126,11 +154,16 @@ def test_one_point_says_that_most_is_free(room, capsys):
     assert "free      2 of 3 directions, of " in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("options, line", [
-    (("--index", "3"), "--index is for logs, "), (("--index", "-1"), "--index must be >= 0, got -1"),
-    (("--iterations", "0"), "--iterations must be >= 1, got 0"),
-    (("--laser-pose", "0", "nan", "0"), "--laser-pose must be finite, got 0 nan 0"),
-    (("--method", "icp"), "invalid choice: 'icp'")])
+@pytest.mark.parametrize(
+    "options, line",
+    [
+        (("--index", "3"), "--index is for logs, "),
+        (("--index", "-1"), "--index must be >= 0, got -1"),
+        (("--iterations", "0"), "--iterations must be >= 1, got 0"),
+        (("--laser-pose", "0", "nan", "0"), "--laser-pose must be finite, got 0 nan 0"),
+        (("--method", "icp"), "invalid choice: 'icp'"),
+    ],
+)
 def test_wrong_options_are_told_before_any_file_is_opened(room, capsys, options, line):
     shutil.rmtree(room)
     assert locate(room, TRUE, *options) == 2

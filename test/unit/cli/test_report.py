@@ -8,10 +8,9 @@ import re
 import shutil
 from html.parser import HTMLParser
 
+import browser
 import pytest
 from PIL import Image
-
-import browser
 
 PICTURES = {"way.png", "cases_over_time.png", "glass.png", "errors.png", "reliability.png", "update_time.png"}
 WORST = {f"worst_{number:02d}.png" for number in range(1, 11)}
@@ -49,8 +48,15 @@ class Page(HTMLParser):
 
 @pytest.mark.long_run
 def test_a_log_becomes_one_page_that_asks_no_address_for_anything(run, room_bag, room_map, tmp_path):
-    code, out, err = run("report", room_bag(true_beams=(("/true_beams", "TrueBeams"),)).write(), "--map", room_map,
-                       "--out", tmp_path / "out", "--global")
+    code, out, err = run(
+        "report",
+        room_bag(true_beams=(("/true_beams", "TrueBeams"),)).write(),
+        "--map",
+        room_map,
+        "--out",
+        tmp_path / "out",
+        "--global",
+    )
     assert code == 0, err
     files = {path.name for path in (tmp_path / "out").iterdir()}
     drawn = PICTURES - {"glass.png"} | WORST | {"candidates.png", "confusion.png"}  # no wall was proved so early
@@ -95,8 +101,22 @@ def test_results_of_a_replay_become_the_same_report(run, room_bag, room_map, tmp
 
 def test_without_a_ground_truth_it_is_said_that_nobody_knows(run, room_bag, room_map, tmp_path):
     x, y, yaw = room_bag().poses(room_bag().stamps_ns[:1])[0]
-    code, out, _ = run("report", room_bag(ground_truth=False).write(), "--map", room_map, "--out", tmp_path / "out",
-                       "--initial-pose", x, y, yaw, "--initial-cov", 0.01, 0.01, 0.01)
+    code, out, _ = run(
+        "report",
+        room_bag(ground_truth=False).write(),
+        "--map",
+        room_map,
+        "--out",
+        tmp_path / "out",
+        "--initial-pose",
+        x,
+        y,
+        yaw,
+        "--initial-cov",
+        0.01,
+        0.01,
+        0.01,
+    )
     assert code == 0
     assert "There is no ground truth: how far off it was nobody knows." in out
     assert PICTURES | WORST <= {file.name for file in (tmp_path / "out").iterdir()}
@@ -109,18 +129,25 @@ def test_what_is_no_run_is_refused_in_one_line(run, room_bag, room_map, tmp_path
     assert run("report", path, "--map", room_map, "--out", tmp_path / "out", "--seed", -1)[0] == 2
     (tmp_path / "empty").mkdir()
     assert run("report", tmp_path / "empty", "--out", tmp_path / "out") == (
-        3, "", "glass_nav report: empty: holds no results of a replay (there is no metrics.json)\n")
-    assert run("replay", path, "--map", room_map, "--out", tmp_path / "results", "--no-picture",
-               "--max-scans", 3)[0] == 0
+        3,
+        "",
+        "glass_nav report: empty: holds no results of a replay (there is no metrics.json)\n",
+    )
+    assert (
+        run("replay", path, "--map", room_map, "--out", tmp_path / "results", "--no-picture", "--max-scans", 3)[0] == 0
+    )
     (tmp_path / "other.yaml").write_text((room_map.parent / "map.yaml").read_text().replace("map.pgm", "other.png"))
     Image.new("L", (30, 20), 254).save(tmp_path / "other.png")
     code, _, err = run("report", tmp_path / "results", "--map", tmp_path / "other.yaml", "--out", tmp_path / "out")
-    assert (code, err) == (3, "glass_nav report: results: its glass map has 122 x 82 cells, the map 30 x 20: it is of "
-                              "another map\n")
+    assert (code, err) == (
+        3,
+        "glass_nav report: results: its glass map has 122 x 82 cells, the map 30 x 20: it is of another map\n",
+    )
     metrics = tmp_path / "results" / "metrics.json"
     metrics.write_text(metrics.read_text().replace(str(room_map), "gone/map.yaml"))
     assert run("report", tmp_path / "results", "--out", tmp_path / "out")[2] == (
-        "glass_nav report: results: the map of that replay, gone/map.yaml, is not there from here: give --map\n")
+        "glass_nav report: results: the map of that replay, gone/map.yaml, is not there from here: give --map\n"
+    )
     (tmp_path / "results" / "glass_map.yaml").unlink()
     assert run("report", tmp_path / "results", "--map", room_map, "--out", tmp_path / "out")[0] == 0
     assert not (tmp_path / "out" / "glass.png").exists()

@@ -40,9 +40,19 @@ def hall(tmp_path):
 @pytest.fixture
 def run(hall, tmp_path, capsys):
     """run(option, ...): exit code, stdout, stderr; the bag is tmp_path/run.bag."""
+
     def command(*options, building=hall):
-        code = cli.main(["simulate", str(building), "--out", str(tmp_path / "run.bag"), "--beams", "61",
-                         *(str(option) for option in options)])
+        code = cli.main(
+            [
+                "simulate",
+                str(building),
+                "--out",
+                str(tmp_path / "run.bag"),
+                "--beams",
+                "61",
+                *(str(option) for option in options),
+            ]
+        )
         captured = capsys.readouterr()
         return code, captured.out.replace(f"{tmp_path}/", ""), captured.err.replace(f"{tmp_path}/", "")
 
@@ -66,14 +76,29 @@ def test_a_bag_and_its_map_replay_as_they_are(run, tmp_path):
     code, out, err = run("--seed", 1)
     assert code == 0, err
     assert {path.name for path in tmp_path.iterdir()} == {"hall", "run.bag", "run.map.yaml", "run.map.png"}
-    said = re.fullmatch(r"(\d+) scans, 2\.\d m, (\d+\.\d) s \(\d+ times real time\); beams: uncertain \d+\.\d %, "
-                        r"diffuse \d+\.\d %, specular \d+\.\d %, first penetration \d+\.\d %, second penetration "
-                        r"\d+\.\d %; written to run.bag and run.map.yaml\n", out)
+    said = re.fullmatch(
+        r"(\d+) scans, 2\.\d m, (\d+\.\d) s \(\d+ times real time\); beams: uncertain \d+\.\d %, "
+        r"diffuse \d+\.\d %, specular \d+\.\d %, first penetration \d+\.\d %, second penetration "
+        r"\d+\.\d %; written to run.bag and run.map.yaml\n",
+        out,
+    )
     assert said, out
     recording = open_log(tmp_path / "run.bag")
     assert len(recording) == int(said[1]) == round(10 * float(said[2])) + 1
-    assert cli.main(["replay", str(tmp_path / "run.bag"), "--map", str(tmp_path / "run.map.yaml"), "--no-picture",
-                     "--out", str(tmp_path / "out")]) == 0
+    assert (
+        cli.main(
+            [
+                "replay",
+                str(tmp_path / "run.bag"),
+                "--map",
+                str(tmp_path / "run.map.yaml"),
+                "--no-picture",
+                "--out",
+                str(tmp_path / "out"),
+            ]
+        )
+        == 0
+    )
     figures = json.loads((tmp_path / "out" / "metrics.json").read_text())
     assert figures["scans"] == len(recording)
     assert figures["position_max_m"] < 0.2
@@ -89,8 +114,24 @@ def test_the_same_seed_gives_the_same_bag(run, tmp_path):
 
 def test_options_reach_the_run(run, tmp_path):
     (tmp_path / "way.csv").write_text("1,1\n2,1\n")
-    code, out, err = run("--path", tmp_path / "way.csv", "--lidar", "weak", "--robot", "omni", "--rate", 5, "--speed",
-                         0.25, "--echo", "last", "--changed", 1.0, "--resolution", 0.1)
+    code, out, err = run(
+        "--path",
+        tmp_path / "way.csv",
+        "--lidar",
+        "weak",
+        "--robot",
+        "omni",
+        "--rate",
+        5,
+        "--speed",
+        0.25,
+        "--echo",
+        "last",
+        "--changed",
+        1.0,
+        "--resolution",
+        0.1,
+    )
     assert code == 0, err
     steps = list(open_log(tmp_path / "run.bag"))
     assert {len(step.scan) for step in steps} == {61}
@@ -116,13 +157,14 @@ def test_bad_input_is_one_line_and_exit_code_3(run, hall, tmp_path):
     (tmp_path / "bad.csv").write_text("1,1\n")
     (tmp_path / "bare.yaml").write_text(HALL.partition("paths:")[0] + "start: [1, 1, 0]\n")
     for options, building, text in (
-            (["--path", "rund"], hall, "hall: no path 'rund', it has round, out; did you mean round?"),
-            (["--path", tmp_path / "bad.csv"], hall, "bad.csv: a path needs 2 different waypoints, got 1"),
-            (["--path", tmp_path / "no.yaml"], hall, "no.yaml: cannot be read: No such file or directory"),
-            (["--path", "out"], hall, "hall: the robot is stuck at x 5.78 m, y 1.00 m after"),
-            ([], tmp_path / "bare.yaml", "has no path; give a file of waypoints"),
-            ([], tmp_path, f"{tmp_path}: a folder without building.yaml"),
-            ([], "palace", "palace: no such file, nor a building of the package, which are ")):
+        (["--path", "rund"], hall, "hall: no path 'rund', it has round, out; did you mean round?"),
+        (["--path", tmp_path / "bad.csv"], hall, "bad.csv: a path needs 2 different waypoints, got 1"),
+        (["--path", tmp_path / "no.yaml"], hall, "no.yaml: cannot be read: No such file or directory"),
+        (["--path", "out"], hall, "hall: the robot is stuck at x 5.78 m, y 1.00 m after"),
+        ([], tmp_path / "bare.yaml", "has no path; give a file of waypoints"),
+        ([], tmp_path, f"{tmp_path}: a folder without building.yaml"),
+        ([], "palace", "palace: no such file, nor a building of the package, which are "),
+    ):
         code, out, err = run(*options, building=building)
         line = err.splitlines()[-1]
         assert (code, out) == (3, "")
@@ -132,17 +174,23 @@ def test_bad_input_is_one_line_and_exit_code_3(run, hall, tmp_path):
     assert not [path for path in tmp_path.iterdir() if "run" in path.name]
 
 
-@pytest.mark.parametrize("options, text", [
-    (["--seed", "-1"], "--seed must be >= 0, got -1"),
-    (["--changed", "1.5"], "--changed must be 0 to 1, got 1.5"),
-    (["--rate", "0"], "--rate must be 0.1 to 1000 Hz, got 0.0"),
-    (["--speed", "0"], "--speed must be > 0 m/s, got 0.0"),
-    (["--resolution", "0"], "--resolution must be 0.01 to 1 m, got 0.0"),
-    (["--beams", "1"], "lidar beams must be a whole number >= 2, got 1"),
-    (["--lidar", "wek"], "unknown lidar preset 'wek', known are sensitive, weak, coated; did you mean weak?"),
-    (["--robot", "car"], "error: argument --robot: invalid choice: 'car' (choose from 'diff', 'omni')"),
-    (["--echo", "loudest"],
-     "error: argument --echo: invalid choice: 'loudest' (choose from 'first', 'strongest', 'last')")])
+@pytest.mark.parametrize(
+    "options, text",
+    [
+        (["--seed", "-1"], "--seed must be >= 0, got -1"),
+        (["--changed", "1.5"], "--changed must be 0 to 1, got 1.5"),
+        (["--rate", "0"], "--rate must be 0.1 to 1000 Hz, got 0.0"),
+        (["--speed", "0"], "--speed must be > 0 m/s, got 0.0"),
+        (["--resolution", "0"], "--resolution must be 0.01 to 1 m, got 0.0"),
+        (["--beams", "1"], "lidar beams must be a whole number >= 2, got 1"),
+        (["--lidar", "wek"], "unknown lidar preset 'wek', known are sensitive, weak, coated; did you mean weak?"),
+        (["--robot", "car"], "error: argument --robot: invalid choice: 'car' (choose from 'diff', 'omni')"),
+        (
+            ["--echo", "loudest"],
+            "error: argument --echo: invalid choice: 'loudest' (choose from 'first', 'strongest', 'last')",
+        ),
+    ],
+)
 def test_wrong_usage_is_exit_code_2(run, tmp_path, options, text):
     code, _, err = run(*options)
     assert code == 2

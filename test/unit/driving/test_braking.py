@@ -78,8 +78,10 @@ def test_before_a_wall_it_stands_and_further_away_it_is_slower_the_nearer_it_is(
 
 
 def test_in_a_dead_end_it_may_turn_and_back_out():
-    corner = np.array([[0.225, y] for y in np.linspace(-0.3, 0.3, 13)]
-                      + [[x, side] for x in np.linspace(-1.0, 0.2, 25) for side in (-0.26, 0.26)])
+    corner = np.array(
+        [[0.225, y] for y in np.linspace(-0.3, 0.3, 13)]
+        + [[x, side] for x in np.linspace(-1.0, 0.2, 25) for side in (-0.26, 0.26)]
+    )
     assert braking.allowed(AHEAD, corner, LIMITS).tolist() == [0.0, 0.0, 0.0]
     turning = np.array([0.2, 0.0, 0.8])
     assert braking.allowed(turning, corner, LIMITS).tolist() == [0.0, 0.0, 0.8]
@@ -114,8 +116,11 @@ def test_back_where_it_came_in_it_creeps_through_what_is_too_narrow_for_its_marg
     assert (0.0 < creeping[0] < 0.05) == out and (creeping[0] == 0.0) != out
 
 
-@pytest.mark.parametrize("obstacles", [np.zeros((0, 2)), np.array([[np.nan, 0.0], [np.inf, np.inf]]),
-                                       np.array([[5.0, 0.0]])], ids=["nothing", "no points", "far away"])
+@pytest.mark.parametrize(
+    "obstacles",
+    [np.zeros((0, 2)), np.array([[np.nan, 0.0], [np.inf, np.inf]]), np.array([[5.0, 0.0]])],
+    ids=["nothing", "no points", "far away"],
+)
 def test_where_nothing_stands_it_does_as_it_is_asked(obstacles):
     assert braking.allowed(AHEAD, obstacles, LIMITS).tolist() == AHEAD.tolist()
     assert braking.room_m(AHEAD, obstacles, LIMITS, 2.0) == 2.0

@@ -11,13 +11,22 @@ import pytest
 from made_buildings import CONTROL_S, T_MEETPOINT, T_R_M, Drive, glass_t, t_corridor, turned_to, walled
 
 from glass_nav.driving import edge_driver
-from glass_nav.driving.edge_driver import (ARRIVED, BLOCKED, FAILED, FOLLOWING, HOMING, IDLE, NO_GRAPH, SEEKING,
-                                           EdgeDriver)
+from glass_nav.driving.edge_driver import (
+    ARRIVED,
+    BLOCKED,
+    FAILED,
+    FOLLOWING,
+    HOMING,
+    IDLE,
+    NO_GRAPH,
+    SEEKING,
+    EdgeDriver,
+)
 from glass_nav.geometry import se2
 from glass_nav.simulation import building_file, lidar, shipped_buildings
 from glass_nav.simulation.building import Building, Pane, Thing, box
-from glass_nav.topology import atlas_file, shipped_atlases
-from glass_nav.topology.atlas import twin
+from glass_nav.topology.atlas import atlas_file, shipped_atlases
+from glass_nav.topology.atlas.atlas import twin
 from glass_nav.topology.observations import ObservationError
 
 LIMITS = edge_driver.EdgeDriverParams().limits
@@ -79,7 +88,7 @@ def off_walls_m(building, points_m):
     surfaces = building.surfaces
     along = surfaces.to_m - surfaces.from_m
     offset = points_m[:, None] - surfaces.from_m
-    share = np.clip((offset * along).sum(-1) / (along ** 2).sum(-1), 0.0, 1.0)
+    share = np.clip((offset * along).sum(-1) / (along**2).sum(-1), 0.0, 1.0)
     return np.linalg.norm(offset - share[..., None] * along, axis=-1).min(axis=1)
 
 
@@ -112,9 +121,14 @@ def test_meetpoints_and_edges_of_an_office_are_those_of_its_atlas():
         if dart >= 0:
             assert reference == twin(np.array(dart))  # it came along the edge by which it left
         ring = atlas.clockwise(np.full(seen.degree, reference), np.arange(seen.degree))
-        np.testing.assert_allclose([turned_to(float(leaves) + drive.simulation.map_from_base[2], bearing)
-                                    for leaves, bearing in zip(seen.bearings_rad, atlas.darts.bearing_rad[ring])],
-                                   0.0, atol=0.25)
+        np.testing.assert_allclose(
+            [
+                turned_to(float(leaves) + drive.simulation.map_from_base[2], bearing)
+                for leaves, bearing in zip(seen.bearings_rad, atlas.darts.bearing_rad[ring])
+            ],
+            0.0,
+            atol=0.25,
+        )
         dart = int(ring[turn])
         drive.driver.leave(turn)
         assert drive.driver.progress.phase == FOLLOWING and drive.driver.progress.travelled_m == 0.0
@@ -139,8 +153,11 @@ def test_a_t_is_as_the_closed_form_says_and_the_walls_of_its_foot_are_reported_a
     node = drive.driver.node
     assert node is not None and node.degree == 3 and len(node.branches) == 3
     assert node.position_m == pytest.approx(
-        se2.transform_points(drive.driver.local_from_base(drive.simulation.reading.odom_from_base),
-                             arrival.meetpoint.centre_m), abs=0.02)
+        se2.transform_points(
+            drive.driver.local_from_base(drive.simulation.reading.odom_from_base), arrival.meetpoint.centre_m
+        ),
+        abs=0.02,
+    )
     junction = drive.where(arrival)
     drive.driver.leave(rank_towards(arrival, drive, -math.pi / 2))
     arrival = drive.arrival()
@@ -251,8 +268,9 @@ def test_where_it_stands_obstacles_are_those_of_the_building():
     drive = Drive(building, IN_T)
     for _ in range(5):
         drive.scan()
-    seen = se2.transform_points(drive.simulation.map_from_base,
-                                drive.driver.obstacles_m(drive.simulation.reading.odom_from_base))
+    seen = se2.transform_points(
+        drive.simulation.map_from_base, drive.driver.obstacles_m(drive.simulation.reading.odom_from_base)
+    )
     assert len(seen) > 50 and np.percentile(off_walls_m(building, seen), 95) < 0.1
     assert np.abs(seen - drive.simulation.map_from_base[:2]).max() < 2.1
 
@@ -272,7 +290,8 @@ def test_what_bars_the_edge_ends_it_as_blocked_in_front_of_it_and_there_is_a_way
     told = drive.driver.progress
     assert told.failure == BLOCKED
     assert told.reason.startswith("something stands in the way, ") and told.reason.endswith(
-        " m before the end of what is seen of the edge")
+        " m before the end of what is seen of the edge"
+    )
     assert 3.5 < drive.simulation.map_from_base[0] < 4.5 - 0.22 and drive.blocked == 0
     drive.driver.go_back()
     drive.until(lambda: drive.driver.progress.phase == ARRIVED)
@@ -331,7 +350,7 @@ def test_out_of_a_dead_end_that_narrows_it_comes_as_it_went_in(seed):
     start = (*atlas.nodes.position_m[BESIDE_NARROW], 0.3)
     drive, arrival = arrived_in_t(building, start, model=lidar.preset("sensitive"), seed=seed)
     node, _ = node_at(atlas, drive, arrival)
-    inward, = (dart for dart in atlas.rings[node] if atlas.darts.node[twin(dart)] == NARROW_END)
+    (inward,) = (dart for dart in atlas.rings[node] if atlas.darts.node[twin(dart)] == NARROW_END)
     drive.driver.leave(rank_towards(arrival, drive, atlas.darts.bearing_rad[inward]))
     end = drive.arrival()
     assert end.meetpoint.degree == 1

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 import pytest
-from floors import floor
+from drawn_floors import floor
 
 from glass_nav.driving import edge_report
 from glass_nav.driving.edge_report import Node, Trace
 from glass_nav.driving.local_graph import Branch
 from glass_nav.geometry import se2
-from glass_nav.topology import atlas_builder
+from glass_nav.topology.atlas import atlas_builder
 from glass_nav.world.grid_map import GridMap
 
 ARM_M = np.array([[0.0, 0.0], [1.0, 0.0]])
@@ -22,8 +22,12 @@ L_WAY = np.array([[2.0, 2.0], [7.0, 2.0], [7.0, 6.0]])
 
 
 def branches(*bearings_rad):
-    return [Branch(bearing, ARM_M @ np.array([[math.cos(bearing), math.sin(bearing)],
-                                              [-math.sin(bearing), math.cos(bearing)]])) for bearing in bearings_rad]
+    return [
+        Branch(
+            bearing, ARM_M @ np.array([[math.cos(bearing), math.sin(bearing)], [-math.sin(bearing), math.cos(bearing)]])
+        )
+        for bearing in bearings_rad
+    ]
 
 
 def points(*xy):
@@ -78,15 +82,17 @@ def test_a_meetpoint_is_told_in_the_frame_of_the_robot():
     seen = edge_report.meetpoint(node, pose, 77)
     assert (seen.degree, seen.r_m, seen.sigma_r_m, seen.stamp_ns) == (3, 1.2, 0.03, 77)
     np.testing.assert_allclose(seen.centre_m, [0.5, 0.0], atol=1e-12)
-    np.testing.assert_allclose(np.mod(seen.bearings_rad, 2 * np.pi),
-                               np.mod([each.bearing_rad - math.pi / 2 for each in node.branches], 2 * np.pi))
+    np.testing.assert_allclose(
+        np.mod(seen.bearings_rad, 2 * np.pi),
+        np.mod([each.bearing_rad - math.pi / 2 for each in node.branches], 2 * np.pi),
+    )
     assert (np.diff(seen.bearings_rad) < 0.0).all()
     assert node.degree == 3
 
 
 def test_an_equidistance_is_the_less_sure_the_more_its_obstacles_leave_open():
     assert edge_report.sigma_r_m(0.0, 0.0) == pytest.approx(0.03)
-    assert edge_report.sigma_r_m(0.04, 0.12) == pytest.approx(math.sqrt(0.03 ** 2 + 0.04 ** 2 + 0.12 ** 2))
+    assert edge_report.sigma_r_m(0.04, 0.12) == pytest.approx(math.sqrt(0.03**2 + 0.04**2 + 0.12**2))
 
 
 def test_an_edge_has_its_length_chord_and_turn():
@@ -109,15 +115,27 @@ def test_the_walls_of_an_edge_lie_on_those_of_the_map(turn):
     driven = edge_report.traversal(way, 1, grid)
     leaves = atlas_builder.bearings(way)[0]
     start = np.array([*way[0], leaves])
-    ends = se2.transform_points(se2.inverse(to_other),
-                                se2.transform_points(start, driven.segments_m.reshape(-1, 2))).reshape(-1, 2, 2)
+    ends = se2.transform_points(
+        se2.inverse(to_other), se2.transform_points(start, driven.segments_m.reshape(-1, 2))
+    ).reshape(-1, 2, 2)
     assert len(ends) >= 5
-    faces = [(np.array(a, float), np.array(b, float)) for a, b in [
-        ((1, 1), (8, 1)), ((8, 1), (8, 8)), ((8, 8), (6, 8)), ((6, 8), (6, 3)), ((6, 3), (1, 3)), ((1, 3), (1, 1))]]
+    faces = [
+        (np.array(a, float), np.array(b, float))
+        for a, b in [
+            ((1, 1), (8, 1)),
+            ((8, 1), (8, 8)),
+            ((8, 8), (6, 8)),
+            ((6, 8), (6, 3)),
+            ((6, 3), (1, 3)),
+            ((1, 3), (1, 1)),
+        ]
+    ]
     for segment in ends:
         middle = segment.mean(axis=0)
-        off = [np.hypot(*(middle - (a + np.clip((middle - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1) * (b - a))))
-               for a, b in faces]
+        off = [
+            np.hypot(*(middle - (a + np.clip((middle - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1) * (b - a))))
+            for a, b in faces
+        ]
         assert min(off) < 0.1
 
 

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from floors import floor
+from drawn_floors import floor
 
 from glass_nav.driving.local_graph import LocalGraph, direction_at_end
-from glass_nav.topology.voronoi_graph import VoronoiParams
+from glass_nav.topology.atlas.voronoi_graph import VoronoiParams
 
 W = 2.0
 CELL_M = 0.05
@@ -37,8 +37,9 @@ def test_a_t_has_one_meetpoint_where_it_belongs_with_three_branches_clockwise():
     leaves_rad = [branch.bearing_rad for branch in branches]
     assert leaves_rad == sorted(leaves_rad, reverse=True)  # clockwise
     ends = [branch.way_m[-1] for branch in branches]
-    west, east, south = (min(range(3), key=lambda k: np.hypot(*(ends[k] - there))) for there in
-                         ([2, 6], [10, 6], [6, 2]))
+    west, east, south = (
+        min(range(3), key=lambda k: np.hypot(*(ends[k] - there))) for there in ([2, 6], [10, 6], [6, 2])
+    )
     assert [(west + k) % 3 for k in range(3)] == [west, east, south]  # west, north of it east, then south
     for branch in branches:
         np.testing.assert_allclose(branch.way_m[0], graph.graph.position_m[node], atol=1e-9)

@@ -205,28 +205,40 @@ def test_a_scan_of_one_beam_is_a_scan():
     np.testing.assert_allclose(cells(local.walls(), local.occupied()), [[2.025, 0.025]], atol=1e-9)
 
 
-@pytest.mark.parametrize("fields, line", [
-    ({"window_m": 0.0}, "~window_m must be > 0 m and finite, got 0.0"),
-    ({"robot_radius_m": math.inf}, "~robot_radius_m must be > 0 m and finite, got inf"),
-    ({"window_m": 0.4}, "~window_m must be at least ten cells, got 0.4 m of 0.05 m"),
-    ({"directions": 3}, "~directions must be 4 to 64, got 3"),
-    ({"least_ends": 0}, "~least_ends must be >= 1, got 0"),
-    ({"least_share": 0.0}, "~least_share must be in (0, 1], got 0.0"),
-    ({"extend_glass_m": -0.1}, "~extend_glass_m must be >= 0 m and finite, got -0.1")])
+@pytest.mark.parametrize(
+    "fields, line",
+    [
+        ({"window_m": 0.0}, "~window_m must be > 0 m and finite, got 0.0"),
+        ({"robot_radius_m": math.inf}, "~robot_radius_m must be > 0 m and finite, got inf"),
+        ({"window_m": 0.4}, "~window_m must be at least ten cells, got 0.4 m of 0.05 m"),
+        ({"directions": 3}, "~directions must be 4 to 64, got 3"),
+        ({"least_ends": 0}, "~least_ends must be >= 1, got 0"),
+        ({"least_share": 0.0}, "~least_share must be in (0, 1], got 0.0"),
+        ({"extend_glass_m": -0.1}, "~extend_glass_m must be >= 0 m and finite, got -0.1"),
+    ],
+)
 def test_parameters_that_mean_nothing_are_refused(fields, line):
     with pytest.raises(ValueError) as refused:
         LocalMapParams(**fields)
     assert str(refused.value) == line
 
 
-@pytest.mark.parametrize("half_m, edge_m", [pytest.param(1.0, 12.0, id="a room"), pytest.param(4.0, 15.2, id="a hall"),
-                                            pytest.param(9.0, 20.0, id="a larger one than the window can show")])
+@pytest.mark.parametrize(
+    "half_m, edge_m",
+    [
+        pytest.param(1.0, 12.0, id="a room"),
+        pytest.param(4.0, 15.2, id="a hall"),
+        pytest.param(9.0, 20.0, id="a larger one than the window can show"),
+    ],
+)
 def test_of_a_wide_place_more_is_looked_at_than_of_a_narrow_one(half_m, edge_m):
     walls = half_m * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
     local = LocalMap()
     for number in range(4):
-        local.add(scan_at(Building((Wall(walls, 0.02),)), (0.0, 0.0, 1.5 * number), np.random.default_rng(number)),
-                  np.array([0.0, 0.0, 1.5 * number]))
+        local.add(
+            scan_at(Building((Wall(walls, 0.02),)), (0.0, 0.0, 1.5 * number), np.random.default_rng(number)),
+            np.array([0.0, 0.0, 1.5 * number]),
+        )
     whole, part = local.grid(), local.grid_around(np.zeros(2))
     assert np.array(part.occupancy.shape) * part.resolution_m == pytest.approx([edge_m, edge_m], abs=0.25)
     rows, columns = np.nonzero(part.occupancy + 1)

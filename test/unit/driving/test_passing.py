@@ -27,8 +27,22 @@ def corridors(*panes):
     """Inner faces: a corridor y = -1 to 1 along x, and one x = -1 to 1 that leaves it upwards."""
     half = THICK_M / 2.0
     low, high, left, right = -1.0 - half, 1.0 + half, -1.0 - half, 1.0 + half
-    return Building(walls=(wall([-7.0, low], [7.0, low], [7.0, high], [right, high], [right, 7.0], [left, 7.0],
-                                [left, high], [-7.0, high], [-7.0, low]),), panes=panes)
+    return Building(
+        walls=(
+            wall(
+                [-7.0, low],
+                [7.0, low],
+                [7.0, high],
+                [right, high],
+                [right, 7.0],
+                [left, 7.0],
+                [left, high],
+                [-7.0, high],
+                [-7.0, low],
+            ),
+        ),
+        panes=panes,
+    )
 
 
 def drive(building, path_m, params=PassingParams(), rate_hz=5.0):
@@ -99,13 +113,16 @@ def test_a_pane_across_the_side_corridor_takes_its_meetpoint_away():
     assert [node for node in nodes if node.degree > 1] == []
 
 
-@pytest.mark.parametrize("change, text", [
-    ({"near_m": 0.0}, "near_m must be > 0 and finite, got 0.0"),
-    ({"graph_step_m": math.inf}, "graph_step_m must be > 0 and finite, got inf"),
-    ({"linger_m": -1.0}, "linger_m must be >= 0 and finite, got -1.0"),
-    ({"least_looks": 0}, "least_looks must be >= 1, got 0"),
-    ({"least_share": 1.5}, r"least_share must be in \[0, 1\], got 1.5"),
-])
+@pytest.mark.parametrize(
+    "change, text",
+    [
+        ({"near_m": 0.0}, "near_m must be > 0 and finite, got 0.0"),
+        ({"graph_step_m": math.inf}, "graph_step_m must be > 0 and finite, got inf"),
+        ({"linger_m": -1.0}, "linger_m must be >= 0 and finite, got -1.0"),
+        ({"least_looks": 0}, "least_looks must be >= 1, got 0"),
+        ({"least_share": 1.5}, r"least_share must be in \[0, 1\], got 1.5"),
+    ],
+)
 def test_a_parameter_out_of_its_range_is_refused(change, text):
     with pytest.raises(ValueError, match=text):
         PassingParams(**change)

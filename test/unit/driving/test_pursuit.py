@@ -35,7 +35,7 @@ def test_it_is_no_faster_than_the_base_and_slower_in_bends(point):
 @pytest.mark.parametrize("remaining_m", [0.0, 0.02, 0.1, 0.2])
 def test_near_the_end_it_is_as_slow_as_it_can_brake(remaining_m):
     speed = pursuit.along_arc(np.array([0.5, 0.0]), LIMITS, remaining_m)[0] - pursuit.CREEP
-    assert 0.0 <= speed ** 2 / (2.0 * LIMITS.max_acceleration_m_s2) <= remaining_m
+    assert 0.0 <= speed**2 / (2.0 * LIMITS.max_acceleration_m_s2) <= remaining_m
     assert pursuit.along_arc(np.array([0.5, 0.0]), LIMITS, 3.0)[0] == LIMITS.max_speed_m_s
 
 
@@ -45,4 +45,4 @@ def test_a_turn_on_the_spot_can_be_braked_within_the_angle(angle_rad):
     assert forward == left == 0.0 and math.copysign(1.0, turn) == math.copysign(1.0, angle_rad)
     assert abs(turn) <= LIMITS.max_turn_rad_s
     braked = max(abs(turn) - pursuit.CREEP, 0.0)
-    assert braked ** 2 / (2.0 * LIMITS.max_turn_acceleration_rad_s2) <= abs(angle_rad)
+    assert braked**2 / (2.0 * LIMITS.max_turn_acceleration_rad_s2) <= abs(angle_rad)

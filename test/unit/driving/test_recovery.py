@@ -9,8 +9,18 @@ import pytest
 
 from glass_nav.driving import recovery
 from glass_nav.driving.base_limits import BaseLimits
-from glass_nav.driving.recovery import (ABORT, BACK_OFF, NEXT_CHOICE, NONE, RETRY, TURN, WAIT, Recovery,
-                                        RecoveryParams, Stall)
+from glass_nav.driving.recovery import (
+    ABORT,
+    BACK_OFF,
+    NEXT_CHOICE,
+    NONE,
+    RETRY,
+    TURN,
+    WAIT,
+    Recovery,
+    RecoveryParams,
+    Stall,
+)
 from glass_nav.simulation.robot import Obstacles, Robot, RobotParams
 
 CONTROL_S = 0.05
@@ -111,8 +121,10 @@ def test_a_base_that_makes_no_way_though_it_is_told_to_is_noticed():
     assert not any(stall.is_on(np.array([0.0, 0.0, 1.0]), np.zeros(3), CONTROL_S) for _ in range(200))  # it turns
 
 
-@pytest.mark.parametrize("name, value, allowed", [("recovery_wait_s", -1.0, ">= 0"), ("recovered_m", 0.0, "> 0"),
-                                                  ("recovery_speed_m_s", math.nan, "> 0")])
+@pytest.mark.parametrize(
+    "name, value, allowed",
+    [("recovery_wait_s", -1.0, ">= 0"), ("recovered_m", 0.0, "> 0"), ("recovery_speed_m_s", math.nan, "> 0")],
+)
 def test_a_parameter_out_of_its_range_is_refused(name, value, allowed):
     with pytest.raises(ValueError, match=f"^~{name} must be {allowed} and finite, got {value}$"):
         RecoveryParams(**{name: value})

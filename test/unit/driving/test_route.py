@@ -13,7 +13,7 @@ from scipy import ndimage
 
 from glass_nav.driving.base_limits import BaseLimits
 from glass_nav.driving.route import RouteError, RoutePlanner
-from glass_nav.topology import atlas_file, shipped_atlases
+from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.world import map_file
 from glass_nav.world.grid_map import GridMap
 
@@ -57,10 +57,22 @@ def test_an_edge_that_is_too_narrow_for_the_robot_is_none():
 
 
 def test_of_parallel_edges_the_shorter_is_taken():
-    twice = atlas_of(np.array([[0.0, 0.0], [4.0, 0.0], [8.0, 0.0]]), np.ones(3), np.array([[0, 1], [0, 1], [1, 2]]),
-                     np.array([5.0, 4.0, 4.0]), np.array([0.6, np.pi - 0.6, 0.0, np.pi, 0.0, np.pi]))
-    bent = replace(twice, edges=replace(twice.edges, polyline_m=type(twice.edges.polyline_m).of(
-        [np.array([[0.0, 0.0], [2.0, 1.5], [4.0, 0.0]]), np.zeros((0, 2)), np.zeros((0, 2))], 2)))
+    twice = atlas_of(
+        np.array([[0.0, 0.0], [4.0, 0.0], [8.0, 0.0]]),
+        np.ones(3),
+        np.array([[0, 1], [0, 1], [1, 2]]),
+        np.array([5.0, 4.0, 4.0]),
+        np.array([0.6, np.pi - 0.6, 0.0, np.pi, 0.0, np.pi]),
+    )
+    bent = replace(
+        twice,
+        edges=replace(
+            twice.edges,
+            polyline_m=type(twice.edges.polyline_m).of(
+                [np.array([[0.0, 0.0], [2.0, 1.5], [4.0, 0.0]]), np.zeros((0, 2)), np.zeros((0, 2))], 2
+            ),
+        ),
+    )
     assert RoutePlanner(bent, LIMITS).to_node(np.array([0.0, -0.1]), 2).darts == (2, 4)
 
 
@@ -147,12 +159,19 @@ def test_in_a_building_a_robot_fits_along_the_whole_way(name):
         for last in rng.permutation(np.flatnonzero(component == component[first]))[:3]:
             start = atlas.nodes.position_m[first] + rng.normal(0.0, 0.05, 2)
             route = planner.to_node(start, int(last))
-            points = np.concatenate([route.polyline_m, *(
-                begin + np.linspace(0, 1, 50)[:, None] * (end - begin)
-                for begin, end in zip(route.polyline_m[:-1], route.polyline_m[1:]))])
+            points = np.concatenate(
+                [
+                    route.polyline_m,
+                    *(
+                        begin + np.linspace(0, 1, 50)[:, None] * (end - begin)
+                        for begin, end in zip(route.polyline_m[:-1], route.polyline_m[1:])
+                    ),
+                ]
+            )
             assert room_m[grid_map.cells(points)].min() > LIMITS.robot_radius_m - grid_map.resolution_m
             assert [atlas.darts.node[dart ^ 1] for dart in route.darts[:-1]] == [
-                atlas.darts.node[dart] for dart in route.darts[1:]]
+                atlas.darts.node[dart] for dart in route.darts[1:]
+            ]
 
 
 def test_a_dead_end_that_is_too_narrow_is_driven_into_as_far_as_the_robot_fits():
@@ -160,7 +179,7 @@ def test_a_dead_end_that_is_too_narrow_is_driven_into_as_far_as_the_robot_fits()
     cells[0], cells[-1], cells[:, 0], cells[:, -1] = 100, 100, 100, 100
     for column in range(100, 200):  # a wedge
         depth = (column - 100) // 5
-        cells[:depth, column], cells[40 - depth:, column] = 100, 100
+        cells[:depth, column], cells[40 - depth :, column] = 100, 100
     grid_map = GridMap(cells, 0.05, np.zeros(3))
     atlas = corridors([(1.0, 1.0), (9.9, 1.0)], [0.9, 0.05], [(0, 1)])
     atlas = replace(atlas, edges=replace(atlas.edges, clearance_m=np.array([0.05])))
@@ -168,5 +187,6 @@ def test_a_dead_end_that_is_too_narrow_is_driven_into_as_far_as_the_robot_fits()
     assert end_m[1] == 1.0
     room_m = ndimage.distance_transform_edt(grid_map.free) * grid_map.resolution_m
     assert room_m[grid_map.cells(end_m)] == pytest.approx(LIMITS.robot_radius_m + LIMITS.margin_m, abs=0.06)
-    np.testing.assert_array_equal(RoutePlanner(atlas, LIMITS).to_node(np.array([2.0, 1.0]), 1).polyline_m[-1],
-                                  [9.9, 1.0])  # without a map it drives on until it is stopped
+    np.testing.assert_array_equal(
+        RoutePlanner(atlas, LIMITS).to_node(np.array([2.0, 1.0]), 1).polyline_m[-1], [9.9, 1.0]
+    )  # without a map it drives on until it is stopped

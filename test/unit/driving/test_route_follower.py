@@ -44,7 +44,7 @@ def off_line(points, line):
     line = np.array(line, float)
     start, along = line[:-1], np.diff(line, axis=0)
     offset = points[:, None] - start
-    share = np.clip((offset * along).sum(-1) / (along ** 2).sum(-1), 0, 1)
+    share = np.clip((offset * along).sum(-1) / (along**2).sum(-1), 0, 1)
     return np.linalg.norm(offset - share[..., None] * along, axis=-1).min(axis=1)
 
 

@@ -13,12 +13,12 @@ from glass_nav.driving.edge_driver import EdgeDriver
 from glass_nav.driving.recovery import RecoveryParams
 from glass_nav.driving.tasks import SUCCEEDED, EdgeTask, Moment
 from glass_nav.geometry import angles
-from glass_nav.localization.scan_explanation import ScanExplanation
+from glass_nav.hypotheses.scan_explanation import ScanExplanation
 from glass_nav.simulation import building_map, lidar
 from glass_nav.simulation.building import Building, Wall
 from glass_nav.simulation.simulation import Simulation
-from glass_nav.topology import atlas_builder
-from glass_nav.topology.atlas_localizer import AMBIGUOUS, AtlasLocalizer, SearchParams
+from glass_nav.topology.atlas import atlas_builder
+from glass_nav.topology.search.atlas_localizer import AMBIGUOUS, AtlasLocalizer, SearchParams
 
 CONTROL_S = 0.05
 W, L = 1.0, 5.0  # half the width of the four arms of a cross, and how far they reach
@@ -26,10 +26,27 @@ W, L = 1.0, 5.0  # half the width of the four arms of a cross, and how far they 
 
 def cross() -> Building:
     """Four equal arms at right angles."""
-    outline = np.array([[W, W], [L, W], [L, -W], [W, -W], [W, -L], [-W, -L], [-W, -W], [-L, -W], [-L, W], [-W, W],
-                        [-W, L], [W, L], [W, W]])
-    ways = {"east and west": np.array([[L - 1.0, 0.0], [1.0 - L, 0.0]]),
-            "north and south": np.array([[0.0, L - 1.0], [0.0, 1.0 - L]])}
+    outline = np.array(
+        [
+            [W, W],
+            [L, W],
+            [L, -W],
+            [W, -W],
+            [W, -L],
+            [-W, -L],
+            [-W, -W],
+            [-L, -W],
+            [-L, W],
+            [-W, W],
+            [-W, L],
+            [W, L],
+            [W, W],
+        ]
+    )
+    ways = {
+        "east and west": np.array([[L - 1.0, 0.0], [1.0 - L, 0.0]]),
+        "north and south": np.array([[0.0, L - 1.0], [0.0, 1.0 - L]]),
+    }
     return Building(walls=(Wall(outline),), paths=ways, start=np.array([2.5, 0.2, 1.0]), name="cross")
 
 

@@ -30,14 +30,29 @@ from glass_nav.simulation.lidar import PRESETS
 from glass_nav.simulation.odometry import EXACT
 from glass_nav.simulation.robot import RobotParams
 from glass_nav.simulation.simulation import Simulation
-from glass_nav.topology import atlas_builder
+from glass_nav.topology.atlas import atlas_builder
 from glass_nav.topology.observations import ObservationError
 
 LIMITS = BaseLimits()
 CONTROL_S = 0.05
 QUICK = RecoveryParams(recovery_wait_s=0.5, recovery_turn_rad=1.0)
-WALLS = (Wall(np.array([[-0.1, -0.1], [12.1, -0.1], [12.1, 2.1], [6.1, 2.1], [6.1, 6.1], [3.9, 6.1], [3.9, 2.1],
-                        [-0.1, 2.1], [-0.1, -0.1]])),)
+WALLS = (
+    Wall(
+        np.array(
+            [
+                [-0.1, -0.1],
+                [12.1, -0.1],
+                [12.1, 2.1],
+                [6.1, 2.1],
+                [6.1, 6.1],
+                [3.9, 6.1],
+                [3.9, 2.1],
+                [-0.1, 2.1],
+                [-0.1, -0.1],
+            ]
+        )
+    ),
+)
 PATHS = {"all": np.array([[1.0, 1.0], [5.0, 1.0], [5.0, 5.0], [5.0, 1.0], [11.0, 1.0]])}
 CART = Thing(box(8.5, 1.0, 0.4, 1.8), mapped=False)  # across the corridor
 
@@ -52,8 +67,9 @@ class Drive:
     def __init__(self, building, start=(4.0, 1.0, 0.0), ledge_x=math.inf):
         """At ledge_x the floor has a step that no lidar sees and no wheel climbs."""
         lidar = replace(PRESETS["sensitive"], beams=361)
-        self.simulation = Simulation(building, lidar, RobotParams(braking_factor=4.0), odometry=EXACT,
-                                     start=np.array(start, float))
+        self.simulation = Simulation(
+            building, lidar, RobotParams(braking_factor=4.0), odometry=EXACT, start=np.array(start, float)
+        )
         self.driver, self.ledge_x = EdgeDriver(), ledge_x
         self.last, self.touched = np.zeros(3), False
         self.commands = []
@@ -166,8 +182,7 @@ def test_a_cart_across_the_only_way_is_waited_for_looked_at_and_given_up(planner
     outcome = drive.run(task, until=lambda: states.add((task.state, task.reason.split(":")[0])))
     assert outcome.code == tasks.BLOCKED
     assert outcome.reason.endswith("without the 1 that are blocked")
-    assert {reason for state, reason in states if state == tasks.RECOVERING} == {"waits", "backs off",
-                                                                               "turns in place"}
+    assert {reason for state, reason in states if state == tasks.RECOVERING} == {"waits", "backs off", "turns in place"}
     assert not drive.touched
 
 

@@ -38,5 +38,5 @@ def test_it_never_goes_sideways():
 def test_a_base_that_brakes_from_the_braking_speed_stands_within_the_way():
     for way in (0.01, 0.1, 1.0):
         speed = velocity.braking_speed(way, 0.5)
-        assert speed ** 2 / (2.0 * 0.5) < way
+        assert speed**2 / (2.0 * 0.5) < way
     assert velocity.braking_speed(-1.0, 0.5) == 0.0

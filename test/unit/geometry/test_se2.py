@@ -29,8 +29,9 @@ def test_a_pose_after_its_inverse_is_no_motion(seed):
 
 
 def test_a_quarter_turn_carries_x_to_y():
-    np.testing.assert_allclose(se2.transform_points(np.array([1.0, 0.0, np.pi / 2]), np.array([[2.0, 0.0]])),
-                               [[1.0, 2.0]], atol=1e-12)
+    np.testing.assert_allclose(
+        se2.transform_points(np.array([1.0, 0.0, np.pi / 2]), np.array([[2.0, 0.0]])), [[1.0, 2.0]], atol=1e-12
+    )
 
 
 def test_one_pose_composes_with_many():

@@ -44,7 +44,7 @@ def test_the_nearest_is_the_one_that_a_look_at_all_finds(seed, count):
 def test_little_memory_makes_no_difference(monkeypatch, pairs):
     segments, points = made(4, 60), np.random.default_rng(5).uniform(-5, 35, (300, 2))
     found = SegmentIndex(segments).nearest(points)
-    monkeypatch.setattr(segment_index, "_MOST_PAIRS", pairs)
+    monkeypatch.setattr(segment_index, "_MAX_PAIRS", pairs)
     again = SegmentIndex(segments).nearest(points)
     np.testing.assert_array_equal(found.segment, again.segment)
     np.testing.assert_array_equal(segment_index.nearest_of_all(points, segments)[0], again.segment)
@@ -69,10 +69,14 @@ def test_without_segments_nothing_is_near_and_without_points_nothing_is_asked():
     assert len(SegmentIndex(np.zeros((0, 4)))) == 0
 
 
-@pytest.mark.parametrize("segments, line", [
-    (np.zeros((2, 3)), "segments must have shape (S, 4), got (2, 3)"),
-    ([[0, 0, 1, 0], [1, 1, 1, 1]], "segment 1 must have finite ends and a length > 0, got [1.0, 1.0, 1.0, 1.0]"),
-    ([[0, 0, np.nan, 0]], "segment 0 must have finite ends and a length > 0, got [0.0, 0.0, nan, 0.0]")])
+@pytest.mark.parametrize(
+    "segments, line",
+    [
+        (np.zeros((2, 3)), "segments must have shape (S, 4), got (2, 3)"),
+        ([[0, 0, 1, 0], [1, 1, 1, 1]], "segment 1 must have finite ends and a length > 0, got [1.0, 1.0, 1.0, 1.0]"),
+        ([[0, 0, np.nan, 0]], "segment 0 must have finite ends and a length > 0, got [0.0, 0.0, nan, 0.0]"),
+    ],
+)
 def test_what_is_no_segment_is_refused(segments, line):
     with pytest.raises(ValueError) as refused:
         SegmentIndex(np.array(segments, float))

@@ -69,8 +69,9 @@ def test_what_is_short_is_none():
     assert len(segments.split_and_merge(points, 0.05, 5.0)[0]) == 0
 
 
-@pytest.mark.parametrize("points", [np.zeros((0, 2)), np.ones((1, 2)), np.ones((5, 2))],
-                         ids=["none", "one", "five times the same"])
+@pytest.mark.parametrize(
+    "points", [np.zeros((0, 2)), np.ones((1, 2)), np.ones((5, 2))], ids=["none", "one", "five times the same"]
+)
 def test_points_that_make_no_line_make_no_segment(points):
     found, label = segments.split_and_merge(points, 0.1, 0.3)
     assert found.shape == (0, 4) and (label == NO_SEGMENT).all() and len(label) == len(points)
@@ -88,8 +89,9 @@ def test_equal_variances_give_the_plain_fit_and_the_textbook_covariance():
     found, covariance = segments.weighted_fit(points, np.full(5, 0.04))
     np.testing.assert_allclose(found, segments.fit(points), atol=1e-12)
     heading = 0.04 / 10.0
-    np.testing.assert_allclose(covariance, [[heading, -5.0 * heading], [-5.0 * heading, 0.04 / 5 + 25 * heading]],
-                               rtol=1e-9)
+    np.testing.assert_allclose(
+        covariance, [[heading, -5.0 * heading], [-5.0 * heading, 0.04 / 5 + 25 * heading]], rtol=1e-9
+    )
 
 
 def test_a_point_that_is_hardly_known_hardly_moves_the_line():

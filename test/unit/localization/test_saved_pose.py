@@ -41,6 +41,7 @@ def test_a_write_that_fails_leaves_the_file_before(tmp_path, monkeypatch):
 
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")
+
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space left"):
         saved_pose.save(path, replace(SAVED, state="UNCERTAIN"))
@@ -70,31 +71,51 @@ def test_odometry_that_began_anew_leaves_the_robot_where_it_stood(since_reboot):
     assert "odometry began anew" in why
 
 
-@pytest.mark.parametrize("given, text", [
-    pytest.param(dict(after_s=3700.0), "it is 3700 s old, ~pose_file_max_age_s is 3600 s", id="too old"),
-    pytest.param(dict(after_s=-60.0), "it is of 60 s after the first scan", id="from the future"),
-    pytest.param(dict(digest="fedcba9876543210"), "it is of map 0123456789abcdef, the map in use is fedcba9876543210",
-                 id="another map"),
-    pytest.param(dict(saved=replace(SAVED, state="LOST")), "the robot was LOST when it was written", id="lost"),
-    pytest.param(dict(saved=replace(SAVED, state="GLOBAL_SEARCH")),
-                 "the robot was GLOBAL_SEARCH when it was written", id="searching"),
-    pytest.param(dict(odom=se2.compose(ODOM, np.array([30.0, 0.0, 0.0])), after_s=10.0),
-                 "odometry is 30.00 m away from where it was 10.0 s before, more than ~pose_file_max_speed_m_s = 1 m/s "
-                 "allows", id="odometry leapt")])
+@pytest.mark.parametrize(
+    "given, text",
+    [
+        pytest.param(dict(after_s=3700.0), "it is 3700 s old, ~pose_file_max_age_s is 3600 s", id="too old"),
+        pytest.param(dict(after_s=-60.0), "it is of 60 s after the first scan", id="from the future"),
+        pytest.param(
+            dict(digest="fedcba9876543210"),
+            "it is of map 0123456789abcdef, the map in use is fedcba9876543210",
+            id="another map",
+        ),
+        pytest.param(dict(saved=replace(SAVED, state="LOST")), "the robot was LOST when it was written", id="lost"),
+        pytest.param(
+            dict(saved=replace(SAVED, state="GLOBAL_SEARCH")),
+            "the robot was GLOBAL_SEARCH when it was written",
+            id="searching",
+        ),
+        pytest.param(
+            dict(odom=se2.compose(ODOM, np.array([30.0, 0.0, 0.0])), after_s=10.0),
+            "odometry is 30.00 m away from where it was 10.0 s before, more than ~pose_file_max_speed_m_s = 1 m/s "
+            "allows",
+            id="odometry leapt",
+        ),
+    ],
+)
 def test_what_is_not_to_be_believed_is_refused(given, text):
     with pytest.raises(SavedPoseError) as err:
         resumed(**given)
     assert str(err.value) == text
 
 
-@pytest.mark.parametrize("change, text", [
-    ({"stamp_ns": "now"}, "its stamp_ns must be int, got 'now'"),
-    ({"state": None}, "its state must be str, got None"),
-    ({"map_from_base": [1.0, 2.0]}, "its map_from_base must be finite numbers (3,), got [1.0, 2.0]"),
-    ({"odom_from_base": [1.0, 2.0, math.nan]}, "its odom_from_base must be finite numbers (3,), got [1.0, 2.0, nan]"),
-    ({"odom_from_base": {"x": 1}}, "its odom_from_base must be finite numbers (3,), got {'x': 1}"),
-    ({"covariance": [[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]}, "its covariance must be symmetric"),
-    ({"covariance": [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]}, "not negative, got [[-1.0")])
+@pytest.mark.parametrize(
+    "change, text",
+    [
+        ({"stamp_ns": "now"}, "its stamp_ns must be int, got 'now'"),
+        ({"state": None}, "its state must be str, got None"),
+        ({"map_from_base": [1.0, 2.0]}, "its map_from_base must be finite numbers (3,), got [1.0, 2.0]"),
+        (
+            {"odom_from_base": [1.0, 2.0, math.nan]},
+            "its odom_from_base must be finite numbers (3,), got [1.0, 2.0, nan]",
+        ),
+        ({"odom_from_base": {"x": 1}}, "its odom_from_base must be finite numbers (3,), got {'x': 1}"),
+        ({"covariance": [[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]}, "its covariance must be symmetric"),
+        ({"covariance": [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]}, "not negative, got [[-1.0"),
+    ],
+)
 def test_a_file_that_somebody_changed_is_refused(tmp_path, change, text):
     path = tmp_path / "pose.yaml"
     saved_pose.save(path, SAVED)
@@ -104,8 +125,14 @@ def test_a_file_that_somebody_changed_is_refused(tmp_path, change, text):
     assert text in str(err.value) and "\n" not in str(err.value)
 
 
-@pytest.mark.parametrize("content, text", [(b"[1, 2", "it cannot be read"), (b"\xff\xfe", "it cannot be read"),
-                                           (b"", "it must hold names and values, got NoneType")])
+@pytest.mark.parametrize(
+    "content, text",
+    [
+        (b"[1, 2", "it cannot be read"),
+        (b"\xff\xfe", "it cannot be read"),
+        (b"", "it must hold names and values, got NoneType"),
+    ],
+)
 def test_a_file_that_is_none_is_refused(tmp_path, content, text):
     path = tmp_path / "pose.yaml"
     path.write_bytes(content)
@@ -118,10 +145,14 @@ def test_no_file_is_no_fault(tmp_path):
         saved_pose.load(tmp_path / "pose.yaml")
 
 
-@pytest.mark.parametrize("values, text", [
-    (dict(pose_file="/nowhere/pose.yaml"), "~pose_file must lie in a folder that exists, got '/nowhere/pose.yaml'"),
-    (dict(pose_file_max_age_s=0.0), "~pose_file_max_age_s must be > 0 and finite, got 0.0"),
-    (dict(pose_file_max_speed_m_s=float("inf")), "~pose_file_max_speed_m_s must be > 0 and finite, got inf")])
+@pytest.mark.parametrize(
+    "values, text",
+    [
+        (dict(pose_file="/nowhere/pose.yaml"), "~pose_file must lie in a folder that exists, got '/nowhere/pose.yaml'"),
+        (dict(pose_file_max_age_s=0.0), "~pose_file_max_age_s must be > 0 and finite, got 0.0"),
+        (dict(pose_file_max_speed_m_s=float("inf")), "~pose_file_max_speed_m_s must be > 0 and finite, got inf"),
+    ],
+)
 def test_limits_that_are_none_are_refused(values, text):
     with pytest.raises(ValueError) as err:
         PoseFile(**values)

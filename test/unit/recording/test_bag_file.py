@@ -38,9 +38,11 @@ def test_scans_come_with_the_odometry_at_their_stamps(room_bag, odometry, static
     np.testing.assert_allclose(taken[3].scan.base_from_laser, bag.laser, atol=1e-9)
     assert len(recording) == bag.scans
     assert recording.name == "room.bag"
-    assert recording.notes == ["scans from /scan",
-                               "odometry from tf odom <- base_link" if odometry == "tf" else "odometry from /odom",
-                               "ground truth from /ground_truth"]
+    assert recording.notes == [
+        "scans from /scan",
+        "odometry from tf odom <- base_link" if odometry == "tf" else "odometry from /odom",
+        "ground truth from /ground_truth",
+    ]
 
 
 def test_odometry_is_interpolated_between_its_stamps(room_bag):
@@ -50,8 +52,9 @@ def test_odometry_is_interpolated_between_its_stamps(room_bag):
     bag = room_bag(scan_fields=late)
     taken = steps(open_log(bag.write()))
     true = bag.poses(bag.stamps_ns + 25_000_000)
-    np.testing.assert_allclose([step.odom_from_base for step in taken],
-                               true - [*bag.poses(bag.stamps_ns[:1])[0, :2], 0.0], atol=2e-4)
+    np.testing.assert_allclose(
+        [step.odom_from_base for step in taken], true - [*bag.poses(bag.stamps_ns[:1])[0, :2], 0.0], atol=2e-4
+    )
 
 
 @pytest.mark.parametrize("truth_type", ["PoseStamped", "PoseWithCovarianceStamped"])
@@ -95,8 +98,10 @@ def test_a_lidar_that_turns_is_straightened_by_odometry(room_bag, odometry):
 
 def test_a_time_that_no_lidar_takes_is_said_and_not_used(room_bag):
     recording = open_log(room_bag(scan_fields=turning(1.0)).write())
-    assert ("scans are taken as of one moment: time_increment 1 s times 60 beams makes 59 s, the most for one turn is "
-            "0.15 s") in recording.notes
+    assert (
+        "scans are taken as of one moment: time_increment 1 s times 60 beams makes 59 s, the most for one turn is "
+        "0.15 s"
+    ) in recording.notes
     assert all(step.scan.origins_m is None for step in steps(recording))
 
 
@@ -155,10 +160,14 @@ def test_a_compressed_bag_reads_the_same(room_bag):
     assert len(steps(open_log(bag.write()))) == bag.scans
 
 
-@pytest.mark.parametrize("options, note", [
-    (LogOptions(scan_topic="/rear"), "ground truth from /ground_truth"),
-    (LogOptions(scan_topic="rear"), "ground truth from /ground_truth"),  # relative names, as in a launch file
-    (LogOptions(), "scans from /scan")])
+@pytest.mark.parametrize(
+    "options, note",
+    [
+        (LogOptions(scan_topic="/rear"), "ground truth from /ground_truth"),
+        (LogOptions(scan_topic="rear"), "ground truth from /ground_truth"),  # relative names, as in a launch file
+        (LogOptions(), "scans from /scan"),
+    ],
+)
 def test_of_several_lasers_one_is_chosen(room_bag, options, note):
     recording = open_log(room_bag(scan_topics=("/scan", "/rear")).write(), options)
     assert note in recording.notes
@@ -183,53 +192,100 @@ def test_a_file_can_be_the_ground_truth(room_bag, tmp_path):
     np.testing.assert_allclose(recording.ground_truth.at(np.int64(1_000_500_000_000)), [1.5, 2.0, 0.0])
 
 
-TOPICS = ("/ground_truth (geometry_msgs/PoseStamped), /scan (sensor_msgs/LaserScan), /tf (tf2_msgs/TFMessage), "
-          "/tf_static (tf2_msgs/TFMessage)")
+TOPICS = (
+    "/ground_truth (geometry_msgs/PoseStamped), /scan (sensor_msgs/LaserScan), /tf (tf2_msgs/TFMessage), "
+    "/tf_static (tf2_msgs/TFMessage)"
+)
 
 
-@pytest.mark.parametrize("fields, options, text", [
-    ({}, LogOptions(scan_topic="/front"), f"room.bag: no topic /front; it has {TOPICS}"),
-    ({}, LogOptions(scan_topic="/tf"), "room.bag: /tf is tf2_msgs/TFMessage, expected sensor_msgs/LaserScan"),
-    ({}, LogOptions(odom_topic="odom"), f"room.bag: no topic odom; it has {TOPICS}"),
-    ({}, LogOptions(ground_truth="/truth"), f"room.bag: no topic /truth; it has {TOPICS}"),
-    ({}, LogOptions(ground_truth="/scan"),
-     "room.bag: /scan is sensor_msgs/LaserScan, expected geometry_msgs/PoseStamped or "
-     "geometry_msgs/PoseWithCovarianceStamped or nav_msgs/Odometry"),
-    ({}, LogOptions(ground_truth="true.txt"), "true.txt: no such file of poses, and no topic of room.bag"),
-    ({"scan_topics": ("/front", "/rear")}, LogOptions(),
-     "room.bag: 2 topics of sensor_msgs/LaserScan (/front, /rear), choose one with --scan-topic"),
-    ({"scan_topics": ()}, LogOptions(), "room.bag: no topic of sensor_msgs/LaserScan; it has "
-     "/ground_truth (geometry_msgs/PoseStamped), /tf (tf2_msgs/TFMessage), /tf_static (tf2_msgs/TFMessage)"),
-    ({"odometry": "none", "ground_truth": False}, LogOptions(),
-     "room.bag: no odometry: no transform odom <- base_link or base_footprint in tf and no topic of "
-     "nav_msgs/Odometry; it has /scan (sensor_msgs/LaserScan), /tf_static (tf2_msgs/TFMessage)"),
-    ({"odometry": "topic", "odom_topics": ("/left", "/right")}, LogOptions(),
-     "room.bag: 2 topics of nav_msgs/Odometry (/left, /right), choose one with --odom-topic"),
-    ({"odometry": "topic", "odom_topics": ("/true",)}, LogOptions(ground_truth="/true"),
-     "room.bag: no odometry: no transform odom <- base_link or base_footprint in tf and no topic of "
-     "nav_msgs/Odometry; it has /ground_truth (geometry_msgs/PoseStamped), /scan (sensor_msgs/LaserScan), "
-     "/tf_static (tf2_msgs/TFMessage), /true (nav_msgs/Odometry)"),
-    ({"laser": (float("nan"), 0.0, 0.0)}, LogOptions(),
-     "room.bag: no transform base_link <- laser for the laser on /scan; frames in tf: base_link, odom; "
-     "say where it is with --laser-pose X Y YAW"),
-    ({}, LogOptions(odom_frame="wheels"),
-     "room.bag: no transform wheels <- base_link or base_footprint; frames in tf: base_link, laser, odom"),
-    ({"laser_tf": False}, LogOptions(),
-     "room.bag: no transform base_link <- laser for the laser on /scan; frames in tf: base_link, odom; "
-     "say where it is with --laser-pose X Y YAW"),
-    ({"scan_fields": lambda index, fields: {**fields, "frame": ""}}, LogOptions(),
-     "room.bag: the scans on /scan have no frame_id; say where the laser is with --laser-pose X Y YAW")])
+@pytest.mark.parametrize(
+    "fields, options, text",
+    [
+        ({}, LogOptions(scan_topic="/front"), f"room.bag: no topic /front; it has {TOPICS}"),
+        ({}, LogOptions(scan_topic="/tf"), "room.bag: /tf is tf2_msgs/TFMessage, expected sensor_msgs/LaserScan"),
+        ({}, LogOptions(odom_topic="odom"), f"room.bag: no topic odom; it has {TOPICS}"),
+        ({}, LogOptions(ground_truth="/truth"), f"room.bag: no topic /truth; it has {TOPICS}"),
+        (
+            {},
+            LogOptions(ground_truth="/scan"),
+            "room.bag: /scan is sensor_msgs/LaserScan, expected geometry_msgs/PoseStamped or "
+            "geometry_msgs/PoseWithCovarianceStamped or nav_msgs/Odometry",
+        ),
+        ({}, LogOptions(ground_truth="true.txt"), "true.txt: no such file of poses, and no topic of room.bag"),
+        (
+            {"scan_topics": ("/front", "/rear")},
+            LogOptions(),
+            "room.bag: 2 topics of sensor_msgs/LaserScan (/front, /rear), choose one with --scan-topic",
+        ),
+        (
+            {"scan_topics": ()},
+            LogOptions(),
+            "room.bag: no topic of sensor_msgs/LaserScan; it has "
+            "/ground_truth (geometry_msgs/PoseStamped), /tf (tf2_msgs/TFMessage), /tf_static (tf2_msgs/TFMessage)",
+        ),
+        (
+            {"odometry": "none", "ground_truth": False},
+            LogOptions(),
+            "room.bag: no odometry: no transform odom <- base_link or base_footprint in tf and no topic of "
+            "nav_msgs/Odometry; it has /scan (sensor_msgs/LaserScan), /tf_static (tf2_msgs/TFMessage)",
+        ),
+        (
+            {"odometry": "topic", "odom_topics": ("/left", "/right")},
+            LogOptions(),
+            "room.bag: 2 topics of nav_msgs/Odometry (/left, /right), choose one with --odom-topic",
+        ),
+        (
+            {"odometry": "topic", "odom_topics": ("/true",)},
+            LogOptions(ground_truth="/true"),
+            "room.bag: no odometry: no transform odom <- base_link or base_footprint in tf and no topic of "
+            "nav_msgs/Odometry; it has /ground_truth (geometry_msgs/PoseStamped), /scan (sensor_msgs/LaserScan), "
+            "/tf_static (tf2_msgs/TFMessage), /true (nav_msgs/Odometry)",
+        ),
+        (
+            {"laser": (float("nan"), 0.0, 0.0)},
+            LogOptions(),
+            "room.bag: no transform base_link <- laser for the laser on /scan; frames in tf: base_link, odom; "
+            "say where it is with --laser-pose X Y YAW",
+        ),
+        (
+            {},
+            LogOptions(odom_frame="wheels"),
+            "room.bag: no transform wheels <- base_link or base_footprint; frames in tf: base_link, laser, odom",
+        ),
+        (
+            {"laser_tf": False},
+            LogOptions(),
+            "room.bag: no transform base_link <- laser for the laser on /scan; frames in tf: base_link, odom; "
+            "say where it is with --laser-pose X Y YAW",
+        ),
+        (
+            {"scan_fields": lambda index, fields: {**fields, "frame": ""}},
+            LogOptions(),
+            "room.bag: the scans on /scan have no frame_id; say where the laser is with --laser-pose X Y YAW",
+        ),
+    ],
+)
 def test_a_bag_that_lacks_something_is_refused_in_one_line(room_bag, fields, options, text):
     assert refusal(room_bag(**fields).write(), options) == text
 
 
-@pytest.mark.parametrize("keep, text", [
-    (0, "room.bag: is empty"),
-    (7, "room.bag: is no ROS 1 bag"),
-    (3000, "room.bag: cut short or never closed (its index is missing); `rosbag reindex room.bag` may save what it "
-           "holds"),
-    (-1, "room.bag: cut short or never closed (its index is missing); `rosbag reindex room.bag` may save what it "
-         "holds")])
+@pytest.mark.parametrize(
+    "keep, text",
+    [
+        (0, "room.bag: is empty"),
+        (7, "room.bag: is no ROS 1 bag"),
+        (
+            3000,
+            "room.bag: cut short or never closed (its index is missing); `rosbag reindex room.bag` may save what it "
+            "holds",
+        ),
+        (
+            -1,
+            "room.bag: cut short or never closed (its index is missing); `rosbag reindex room.bag` may save what it "
+            "holds",
+        ),
+    ],
+)
 def test_a_bag_cut_short_is_refused_in_one_line(room_bag, keep, text):
     path = room_bag().write()
     path.write_bytes(path.read_bytes()[:keep])
@@ -247,7 +303,7 @@ def test_a_damaged_bag_gives_what_comes_before_the_damage(room_bag):
     path = room_bag(scans=400, beams=720).write()
     content = bytearray(path.read_bytes())
     middle = len(content) // 2
-    content[middle:middle + 5000] = bytes(5000)
+    content[middle : middle + 5000] = bytes(5000)
     path.write_bytes(content)
     entries = list(open_log(path))
     assert sum(isinstance(entry, Step) for entry in entries) > 50
@@ -259,7 +315,7 @@ def test_what_is_missing_because_of_damage_is_said_with_the_damage(room_bag):
     path = room_bag(static_laser=False, scans=400).write()
     content = bytearray(path.read_bytes())
     chunk = content.index(b"/tf")  # from the first message of tf on
-    content[chunk + 3000:chunk + 6000] = bytes(3000)
+    content[chunk + 3000 : chunk + 6000] = bytes(3000)
     path.write_bytes(content)
     entries = list(open_log(path))
     assert any(isinstance(entry, Refusal) for entry in entries)
@@ -272,15 +328,19 @@ def one_bad_scan(**changes):
     return lambda index, fields: {**fields, **changes} if index == 3 else fields
 
 
-@pytest.mark.parametrize("changes, reason", [
-    ({"angle_increment": 0.0}, "angle_increment must be finite and not 0 rad, got 0.0"),
-    ({"angle_min": float("nan")}, "angle_min must be finite, got nan"),
-    ({"range_max": 0.0}, "range_max must be finite and > 0 m, got 0.0"),
-    ({"range_min": -1.0}, "range_min must be in [0, range_max = 10.0) m, got -1.0"),
-    ({"ranges": []}, "no ranges, a scan needs at least 1"),
-    ({"frame": "elsewhere"}, "no transform base_link <- elsewhere"),
-    ({"stamp_ns": 1_000_000_000_000 - 10**12}, "time runs backwards"),
-    ({"stamp_ns": 1_000_000_000_000 + 10**11}, "no transform odom <- base_link at that time")])
+@pytest.mark.parametrize(
+    "changes, reason",
+    [
+        ({"angle_increment": 0.0}, "angle_increment must be finite and not 0 rad, got 0.0"),
+        ({"angle_min": float("nan")}, "angle_min must be finite, got nan"),
+        ({"range_max": 0.0}, "range_max must be finite and > 0 m, got 0.0"),
+        ({"range_min": -1.0}, "range_min must be in [0, range_max = 10.0) m, got -1.0"),
+        ({"ranges": []}, "no ranges, a scan needs at least 1"),
+        ({"frame": "elsewhere"}, "no transform base_link <- elsewhere"),
+        ({"stamp_ns": 1_000_000_000_000 - 10**12}, "time runs backwards"),
+        ({"stamp_ns": 1_000_000_000_000 + 10**11}, "no transform odom <- base_link at that time"),
+    ],
+)
 def test_a_bad_scan_is_refused_and_the_rest_is_used(room_bag, changes, reason):
     entries = list(open_log(room_bag(scan_fields=one_bad_scan(**changes)).write()))
     assert [entry.reason for entry in entries if isinstance(entry, Refusal)] == [reason]
@@ -291,7 +351,8 @@ def test_a_bad_scan_is_refused_and_the_rest_is_used(room_bag, changes, reason):
 def test_no_odometry_at_the_time_of_a_scan_refuses_it(room_bag):
     bag = room_bag(odometry="topic", scan_fields=one_bad_scan(stamp_ns=1_000_000_000_000 + 10**11))
     assert [entry.reason for entry in open_log(bag.write()) if isinstance(entry, Refusal)] == [
-        "no odometry at that time"]
+        "no odometry at that time"
+    ]
 
 
 def test_ranges_that_are_no_numbers_are_taken_as_rep_117_says(room_bag):
@@ -308,8 +369,7 @@ def test_ranges_that_are_no_numbers_are_taken_as_rep_117_says(room_bag):
 def test_rosbags_missing_is_said_in_one_line(room_bag, monkeypatch):
     path = room_bag().write()
     monkeypatch.setitem(__import__("sys").modules, "rosbags.highlevel", None)
-    assert refusal(path).startswith(
-        "room.bag: reading bags needs the Python package rosbags (pip install rosbags): ")
+    assert refusal(path).startswith("room.bag: reading bags needs the Python package rosbags (pip install rosbags): ")
 
 
 def test_a_real_bag_gives_every_scan(data_dir: Path):
@@ -345,8 +405,9 @@ def test_true_cases_of_another_simulator_have_no_crossings(room_bag):
     assert truth.case.tolist() == [1] * 60
 
 
-@pytest.mark.parametrize("topics, option", [
-    ((), None), ((("/beam_cases", "BeamCases"),), None), ((("/true_beams", "TrueBeams"),), "none")])
+@pytest.mark.parametrize(
+    "topics, option", [((), None), ((("/beam_cases", "BeamCases"),), None), ((("/true_beams", "TrueBeams"),), "none")]
+)
 def test_without_truth_about_the_beams_there_is_none(room_bag, topics, option):
     recording = open_log(room_bag(true_beams=topics).write(), LogOptions(true_beams=option))
     assert recording.beam_truth is None
@@ -359,18 +420,26 @@ def test_the_topic_of_the_truth_can_be_chosen(room_bag):
     assert refusal(path) == ("room.bag: 2 topics with the truth about beams (/a, /b), choose one with --true-beams")
     assert open_log(path, LogOptions(true_beams="b")).notes[-1] == "true cases from /b"
     assert refusal(path, LogOptions(true_beams="/scan")) == (
-        "room.bag: /scan is sensor_msgs/LaserScan, expected glass_nav/TrueBeams or glass_nav/BeamCases")
+        "room.bag: /scan is sensor_msgs/LaserScan, expected glass_nav/TrueBeams or glass_nav/BeamCases"
+    )
     path.unlink()
     assert open_log(room_bag(true_beams=(*topics, ("/true_beams", "TrueBeams"))).write()).notes[-1] == (
-        "true cases from /true_beams")
+        "true cases from /true_beams"
+    )
 
 
-@pytest.mark.parametrize("changes, text", [
-    ({"cases": [1, 9, 2]}, "room.bag: /true_beams at 1000.300 s: cases must be 0 to 4, got 9"),
-    ({"crossing": [1.0]}, "room.bag: /true_beams at 1000.300 s: 60 cases, but 1 crossings")])
+@pytest.mark.parametrize(
+    "changes, text",
+    [
+        ({"cases": [1, 9, 2]}, "room.bag: /true_beams at 1000.300 s: cases must be 0 to 4, got 9"),
+        ({"crossing": [1.0]}, "room.bag: /true_beams at 1000.300 s: 60 cases, but 1 crossings"),
+    ],
+)
 def test_truth_that_is_none_is_refused(room_bag, changes, text):
-    bag = room_bag(true_beams=(("/true_beams", "TrueBeams"),),
-                   true_fields=lambda index, fields: {**fields, **(changes if index == 3 else {})})
+    bag = room_bag(
+        true_beams=(("/true_beams", "TrueBeams"),),
+        true_fields=lambda index, fields: {**fields, **(changes if index == 3 else {})},
+    )
     recording = open_log(bag.write())
     with pytest.raises(RecordingError) as caught:
         list(recording.beam_truth)
@@ -386,15 +455,19 @@ def test_tf_tells_where_another_localization_took_the_robot_to_be(room_bag, odom
     # Known at the scans 5, 10 and 15 and between them; a transform may be 0.1 s old or new.
     assert told.stamps_ns.tolist() == bag.stamps_ns[4:17].tolist()
     error = 0.1 * np.clip(np.arange(4, 17) / 5.0, 1.0, 3.0)
-    np.testing.assert_allclose(told.poses, bag.poses(told.stamps_ns) + np.stack(
-        [error, 0.0 * error, 0.0 * error], axis=1), atol=1e-9)
+    np.testing.assert_allclose(
+        told.poses, bag.poses(told.stamps_ns) + np.stack([error, 0.0 * error, 0.0 * error], axis=1), atol=1e-9
+    )
 
 
 def test_a_frame_that_tf_does_not_place_the_robot_in_is_refused(room_bag):
     assert refusal(room_bag().write(), LogOptions(ground_truth="tf:map")) == (
-        "room.bag: no transform map <- base_link; frames in tf: base_link, laser, odom")
+        "room.bag: no transform map <- base_link; frames in tf: base_link, laser, odom"
+    )
     room_bag().path.unlink()
-    early = room_bag(amcl_error_m=0.1, scan_fields=lambda index, fields: {
-        **fields, "stamp_ns": fields["stamp_ns"] - 10_000_000_000})
+    early = room_bag(
+        amcl_error_m=0.1, scan_fields=lambda index, fields: {**fields, "stamp_ns": fields["stamp_ns"] - 10_000_000_000}
+    )
     assert refusal(early.write(), LogOptions(ground_truth="tf:map")) == (
-        "room.bag: no scan on /scan is in the time of the transforms map <- base_link")
+        "room.bag: no scan on /scan is in the time of the transforms map <- base_link"
+    )

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from glass_nav.recording.log_file import open_log
-from glass_nav.recording.recording import RecordingError, Recording
+from glass_nav.recording.recording import Recording, RecordingError
 
 ROS2_BAGS = Path(__file__).resolve().parents[2] / "data" / "ros2"
 needs_rosbag = pytest.mark.skipif(shutil.which("rosbag") is None, reason="no rosbag in PATH")
@@ -21,10 +21,14 @@ needs_rosbag = pytest.mark.skipif(shutil.which("rosbag") is None, reason="no ros
 
 def ros(*command: str) -> str:
     """Runs a program of ROS 1, which has its own Python beside that of the tests."""
-    environment = {name: value for name, value in os.environ.items()
-                   if name != "PYTHONPATH" or sys.version_info[:2] == (3, 8) and os.path.exists("/opt/ros/noetic")}
-    done = subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT, text=True)
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if name != "PYTHONPATH" or sys.version_info[:2] == (3, 8) and os.path.exists("/opt/ros/noetic")
+    }
+    done = subprocess.run(
+        command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
     assert done.returncode == 0, done.stdout
     return done.stdout
 
@@ -77,38 +81,49 @@ def open_names(path: Path) -> List[str]:
 def test_a_bag_that_was_never_closed_comes_with_advice_that_helps(room_bag, tmp_path):
     plain = room_bag().write()
     killed = tmp_path / "killed.bag"
-    code = ("import os, rosbag\n"
-            f"new = rosbag.Bag({str(killed)!r}, 'w', chunk_threshold=4096)\n"
-            f"for topic, message, t in rosbag.Bag({str(plain)!r}).read_messages():\n    new.write(topic, message, t)\n"
-            "os._exit(0)\n")
+    code = (
+        "import os, rosbag\n"
+        f"new = rosbag.Bag({str(killed)!r}, 'w', chunk_threshold=4096)\n"
+        f"for topic, message, t in rosbag.Bag({str(plain)!r}).read_messages():\n    new.write(topic, message, t)\n"
+        "os._exit(0)\n"
+    )
     ros("/usr/bin/python3", "-c", code)
     with pytest.raises(RecordingError) as caught:
         open_log(killed)
     command = f"rosbag reindex {killed}"
-    assert str(caught.value) == (f"{killed}: cut short or never closed (its index is missing); `{command}` may save "
-                                 "what it holds")
+    assert str(caught.value) == (
+        f"{killed}: cut short or never closed (its index is missing); `{command}` may save what it holds"
+    )
     with pytest.raises(RecordingError, match=r"killed\.bag: cut short or never closed"):
         open_log([plain, killed])
     ros(*command.split())
     saved, whole = list(open_log(killed)), list(open_log(plain))
     assert 15 <= len(saved) <= len(whole)  # what was not in the file yet is lost
-    assert [step.scan.stamp_ns for step in saved] == [step.scan.stamp_ns for step in whole[:len(saved)]]
+    assert [step.scan.stamp_ns for step in saved] == [step.scan.stamp_ns for step in whole[: len(saved)]]
 
 
 def test_a_bag_of_ros_2_in_sqlite3(room_bag, tmp_path):
     plain = room_bag(true_beams=[("/true_beams", "TrueBeams")]).write()
-    subprocess.run([str(Path(sys.executable).with_name("rosbags-convert")),
-                    *(["--src"] if sys.version_info >= (3, 10) else []), str(plain), "--dst", str(tmp_path / "room2")],
-                   check=True)
+    subprocess.run(
+        [
+            str(Path(sys.executable).with_name("rosbags-convert")),
+            *(["--src"] if sys.version_info >= (3, 10) else []),
+            str(plain),
+            "--dst",
+            str(tmp_path / "room2"),
+        ],
+        check=True,
+    )
     recording = open_log(tmp_path / "room2")
     same(recording, open_log(plain))
     assert len(list(recording.beam_truth)) == 20
     (database,) = (tmp_path / "room2").glob("*.db3")
     assert len(open_log(database)) == 20
     (tmp_path / "room2" / "metadata.yaml").unlink()
-    for path, text in [(database, "a bag of ROS 2 needs metadata.yaml beside it (`ros2 bag reindex` writes it)"),
-                       (database.parent, "is a folder without metadata.yaml, so no bag of ROS 2 (`ros2 bag reindex` "
-                                         "writes it)")]:
+    for path, text in [
+        (database, "a bag of ROS 2 needs metadata.yaml beside it (`ros2 bag reindex` writes it)"),
+        (database.parent, "is a folder without metadata.yaml, so no bag of ROS 2 (`ros2 bag reindex` writes it)"),
+    ]:
         with pytest.raises(RecordingError) as caught:
             open_log(path)
         assert str(caught.value) == f"{path}: {text}"
@@ -127,10 +142,11 @@ def test_a_bag_of_ros_2_in_mcap():
 
 def test_parts_that_make_no_run_are_refused(room_bag, tmp_path):
     plain = room_bag().write()
-    for paths, text in [([plain, plain], f"{plain}, {plain}: a bag is named twice"),
-                        ([plain, tmp_path / "run.rawlog"],
-                         f"{tmp_path / 'run.rawlog'}: only bags can be parts of one run, got 2 logs"),
-                        ([plain, tmp_path / "no.bag"], f"{tmp_path / 'no.bag'}: does not exist")]:
+    for paths, text in [
+        ([plain, plain], f"{plain}, {plain}: a bag is named twice"),
+        ([plain, tmp_path / "run.rawlog"], f"{tmp_path / 'run.rawlog'}: only bags can be parts of one run, got 2 logs"),
+        ([plain, tmp_path / "no.bag"], f"{tmp_path / 'no.bag'}: does not exist"),
+    ]:
         with pytest.raises(RecordingError) as caught:
             open_log(paths)
         assert str(caught.value) == text

@@ -32,8 +32,12 @@ def ranges(index):
 
 
 def truth(index):
-    return (np.array([1.0 + index, 2.0, 3.0]), (np.arange(BEAMS) % 5).astype(np.uint8),
-            np.where(np.arange(BEAMS) % 5, 1.5 + index, np.nan), np.full(BEAMS, 0.25 + index))
+    return (
+        np.array([1.0 + index, 2.0, 3.0]),
+        (np.arange(BEAMS) % 5).astype(np.uint8),
+        np.where(np.arange(BEAMS) % 5, 1.5 + index, np.nan),
+        np.full(BEAMS, 0.25 + index),
+    )
 
 
 @pytest.fixture
@@ -47,8 +51,9 @@ def bag(tmp_path):
             stamp_ns = START_NS + 100_000_000 * index
             for reading in range(READINGS):
                 step = READINGS * index + reading
-                writer.odometry(stamp_ns - 20_000_000 * (READINGS - 1 - reading), odometry(step),
-                                np.array([0.5, 0.25, 0.125]))
+                writer.odometry(
+                    stamp_ns - 20_000_000 * (READINGS - 1 - reading), odometry(step), np.array([0.5, 0.25, 0.125])
+                )
             scan = scan_from_fields(stamp_ns, ranges(index), -1.5, 0.1, 0.1, 25.0, LASER)
             writer.scan(scan, 0.1)
             writer.truth(stamp_ns, *truth(index))
@@ -62,15 +67,17 @@ def messages(path):
     read = {}
     with AnyReader([path]) as reader:
         for connection, stamp_ns, raw in reader.messages():
-            read.setdefault(connection.topic, []).append(
-                (stamp_ns, reader.deserialize(raw, connection.msgtype)))
+            read.setdefault(connection.topic, []).append((stamp_ns, reader.deserialize(raw, connection.msgtype)))
     return read
 
 
 def test_our_reader_takes_it_as_a_robots(bag):
     recording = open_log(bag)
-    assert recording.notes[:3] == ["scans from /scan", "odometry from tf odom <- base_link",
-                                   "ground truth from /ground_truth"]
+    assert recording.notes[:3] == [
+        "scans from /scan",
+        "odometry from tf odom <- base_link",
+        "ground truth from /ground_truth",
+    ]
     steps = list(recording)
     assert len(steps) == len(recording) == SCANS
     for index, step in enumerate(steps):
@@ -100,8 +107,14 @@ def test_the_truth_has_the_stamps_of_the_scans(bag):
 def test_wheels_time_and_transforms_are_those_of_a_real_robot(bag):
     read = messages(bag)
     assert {topic: len(of_topic) for topic, of_topic in read.items()} == {
-        "/scan": SCANS, "/ground_truth": SCANS, "/true_beams": SCANS, "/odom": SCANS * READINGS,
-        "/tf": SCANS * READINGS, "/clock": SCANS * READINGS, "/tf_static": 1}
+        "/scan": SCANS,
+        "/ground_truth": SCANS,
+        "/true_beams": SCANS,
+        "/odom": SCANS * READINGS,
+        "/tf": SCANS * READINGS,
+        "/clock": SCANS * READINGS,
+        "/tf_static": 1,
+    }
     _, last = read["/odom"][-1]
     assert (last.header.frame_id, last.child_frame_id) == ("odom", "base_link")
     assert (last.twist.twist.linear.x, last.twist.twist.linear.y, last.twist.twist.angular.z) == (0.5, 0.25, 0.125)

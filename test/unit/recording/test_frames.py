@@ -14,10 +14,14 @@ def turned(yaw, x=0.0, y=0.0, z=0.0):
 def matrix(transform):
     """4 x 4, by the textbook: the second implementation."""
     (x, y, z), (qx, qy, qz, qw) = transform
-    return np.array([[1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy - qz * qw), 2 * (qx * qz + qy * qw), x],
-                     [2 * (qx * qy + qz * qw), 1 - 2 * (qx * qx + qz * qz), 2 * (qy * qz - qx * qw), y],
-                     [2 * (qx * qz - qy * qw), 2 * (qy * qz + qx * qw), 1 - 2 * (qx * qx + qy * qy), z],
-                     [0, 0, 0, 1]])
+    return np.array(
+        [
+            [1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy - qz * qw), 2 * (qx * qz + qy * qw), x],
+            [2 * (qx * qy + qz * qw), 1 - 2 * (qx * qx + qz * qz), 2 * (qy * qz - qx * qw), y],
+            [2 * (qx * qz - qy * qw), 2 * (qy * qz + qx * qw), 1 - 2 * (qx * qx + qy * qy), z],
+            [0, 0, 0, 1],
+        ]
+    )
 
 
 def random_transform(rng):
@@ -47,8 +51,9 @@ def test_a_lookup_goes_up_and_down_the_tree(seed):
     tree.add("base", "wheel", 0, base_wheel, static=True)
     expected = np.linalg.inv(matrix(base_wheel)) @ matrix(base_mast) @ matrix(mast_laser)
     np.testing.assert_allclose(matrix(tree.lookup("wheel", "laser", 5)), expected, atol=1e-12)
-    np.testing.assert_allclose(matrix(tree.lookup("odom", "laser", 5)),
-                               matrix(odom_base) @ matrix(base_mast) @ matrix(mast_laser), atol=1e-12)
+    np.testing.assert_allclose(
+        matrix(tree.lookup("odom", "laser", 5)), matrix(odom_base) @ matrix(base_mast) @ matrix(mast_laser), atol=1e-12
+    )
     assert tree.lookup("laser", "laser", 5) == frames.IDENTITY
     assert tree.frames == ["base", "laser", "mast", "odom", "wheel"]
     assert tree.connected("wheel", "odom")

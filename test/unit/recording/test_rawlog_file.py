@@ -31,9 +31,11 @@ def test_movements_between_frames_add_up_to_odometry():
     steps = list(recording)
     assert [step.scan.stamp_ns for step in steps] == [10**12, 1001 * 10**9, 1002 * 10**9, 1003 * 10**9]
     c, s = np.cos(0.5), np.sin(0.5)
-    np.testing.assert_allclose([step.odom_from_base for step in steps],
-                               [[0, 0, 0], [1, 0, 0.5], [1 + c, s, 1.0],
-                                [1 + c + np.cos(1.0), s + np.sin(1.0), 1.5]], atol=1e-9)
+    np.testing.assert_allclose(
+        [step.odom_from_base for step in steps],
+        [[0, 0, 0], [1, 0, 0.5], [1 + c, s, 1.0], [1 + c + np.cos(1.0), s + np.sin(1.0), 1.5]],
+        atol=1e-9,
+    )
     scan = steps[1].scan
     np.testing.assert_allclose(scan.angles_rad, np.radians([-90, -45, 0, 45, 90]), atol=1e-6)
     np.testing.assert_allclose(scan.ranges_m, [2.0, 2.125, np.inf, 2.375, 2.5])  # MRPT: no answer
@@ -54,8 +56,11 @@ def test_single_observations_are_joined_by_their_times(sensor, pose, first_angle
     recording = open_log(RAWLOGS / "observations.rawlog", LogOptions(scan_topic=sensor))
     steps = list(recording)
     # readings at -0.5, 0.5, 1.5 and 2.5 s of 0..3 m, and at 3 s of 4 m
-    np.testing.assert_allclose([step.odom_from_base for step in steps],
-                               [[0.5, 0, 0.05], [1.5, 0, 0.15], [2.5, 0, 0.25], [4, 0, 0.4]], atol=1e-9)
+    np.testing.assert_allclose(
+        [step.odom_from_base for step in steps],
+        [[0.5, 0, 0.05], [1.5, 0, 0.15], [2.5, 0, 0.25], [4, 0, 0.4]],
+        atol=1e-9,
+    )
     x, y, yaw = steps[0].scan.base_from_laser
     assert (x, y) == (pytest.approx(pose[0], abs=1e-6), pytest.approx(pose[1], abs=1e-6))
     assert np.cos(yaw - pose[2]) == pytest.approx(1.0)
@@ -87,7 +92,7 @@ def test_the_file_may_be_compressed_or_not(tmp_path):
 
 def test_a_rawlog_cut_short_gives_what_it_holds_and_says_so(tmp_path):
     raw = gzip.decompress((RAWLOGS / "paired.rawlog").read_bytes())
-    (tmp_path / "cut.rawlog").write_bytes(raw[:len(raw) * 2 // 3])
+    (tmp_path / "cut.rawlog").write_bytes(raw[: len(raw) * 2 // 3])
     recording = open_log(tmp_path / "cut.rawlog")
     assert 0 < len(list(recording)) < 4
     assert recording.notes[0].startswith("reading stopped early: the file ends within object ")
@@ -109,27 +114,48 @@ def test_bytes_that_make_no_text_do_no_harm(tmp_path):
     (tmp_path / "bad.rawlog").write_bytes(raw.replace(b"CActionCollection", b"CActionColle\xfftion"))
     assert refusal(tmp_path / "bad.rawlog").startswith(
         "bad.rawlog: holds no odometry; it holds 1 CObservation2DRangeScan, 1 CSensoryFrame; "
-        "the file has object 2 damaged (")
+        "the file has object 2 damaged ("
+    )
 
 
-@pytest.mark.parametrize("name, options, text", [
-    ("absent.rawlog", LogOptions(), "absent.rawlog: does not exist"),
-    ("no_odometry.rawlog", LogOptions(),
-     "no_odometry.rawlog: holds no odometry; it holds 4 CObservation2DRangeScan"),
-    ("no_scans.rawlog", LogOptions(),
-     "no_scans.rawlog: holds no CObservation2DRangeScan; it holds 1 CObservationComment"),
-    ("observations.rawlog", LogOptions(),
-     "observations.rawlog: has scans of 2 sensors ('front', 'rear'), choose one with --scan-topic"),
-    ("observations.rawlog", LogOptions(scan_topic="top"),
-     "observations.rawlog: no sensor 'top'; sensors with scans: 'front', 'rear'")])
+@pytest.mark.parametrize(
+    "name, options, text",
+    [
+        ("absent.rawlog", LogOptions(), "absent.rawlog: does not exist"),
+        (
+            "no_odometry.rawlog",
+            LogOptions(),
+            "no_odometry.rawlog: holds no odometry; it holds 4 CObservation2DRangeScan",
+        ),
+        (
+            "no_scans.rawlog",
+            LogOptions(),
+            "no_scans.rawlog: holds no CObservation2DRangeScan; it holds 1 CObservationComment",
+        ),
+        (
+            "observations.rawlog",
+            LogOptions(),
+            "observations.rawlog: has scans of 2 sensors ('front', 'rear'), choose one with --scan-topic",
+        ),
+        (
+            "observations.rawlog",
+            LogOptions(scan_topic="top"),
+            "observations.rawlog: no sensor 'top'; sensors with scans: 'front', 'rear'",
+        ),
+    ],
+)
 def test_a_rawlog_that_lacks_something_is_refused_in_one_line(name, options, text):
     assert refusal(RAWLOGS / name, options) == text
 
 
-@pytest.mark.parametrize("content, text", [
-    (b"", "log.rawlog: is empty or cut short"),
-    (b"\x1f\x8b\x08\x00\x00", "log.rawlog: is empty or cut short"),
-    (b"words and more words, but no objects at all" * 10, "log.rawlog: is no rawlog: it ")])
+@pytest.mark.parametrize(
+    "content, text",
+    [
+        (b"", "log.rawlog: is empty or cut short"),
+        (b"\x1f\x8b\x08\x00\x00", "log.rawlog: is empty or cut short"),
+        (b"words and more words, but no objects at all" * 10, "log.rawlog: is no rawlog: it "),
+    ],
+)
 def test_files_that_are_no_rawlogs_are_refused_in_one_line(tmp_path, content, text):
     (tmp_path / "log.rawlog").write_bytes(content)
     assert refusal(tmp_path / "log.rawlog").startswith(text)
@@ -139,28 +165,42 @@ def test_nothing_goes_to_stderr(tmp_path):
     """By a process of its own: MRPT would write past Python's sys.stderr."""
     raw = gzip.decompress((RAWLOGS / "paired.rawlog").read_bytes())
     (tmp_path / "cut.rawlog").write_bytes(raw[:200])
-    program = ("import sys; from glass_nav.recording.log_file import open_log\n"
-               "for path in sys.argv[1:]:\n"
-               "    try: open_log(path)\n"
-               "    except ValueError as err: print(err)\n")
-    done = subprocess.run([sys.executable, "-c", program, str(tmp_path / "cut.rawlog"), str(tmp_path)],
-                          capture_output=True, text=True)
+    program = (
+        "import sys; from glass_nav.recording.log_file import open_log\n"
+        "for path in sys.argv[1:]:\n"
+        "    try: open_log(path)\n"
+        "    except ValueError as err: print(err)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(tmp_path / "cut.rawlog"), str(tmp_path)], capture_output=True, text=True
+    )
     assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_scans_that_cannot_be_used_are_refused_one_by_one():
     from glass_nav.recording.rawlog_file import _Entries  # a file with these faults cannot be written by MRPT
 
-    good = {"stamps_ns": np.array([5, 4, -1, 6, 7, 8]) * 10**9, "beams": np.full(6, 2),
-            "ranges_m": np.ones(12, np.float32), "valid": np.ones(12, np.uint8), "first_angle_rad": np.zeros(6),
-            "angle_step_rad": np.array([0.1, 0.1, 0.1, 0.1, 0.0, 0.1]), "range_max_m": np.full(6, 9.0),
-            "sensor_pose": np.zeros((6, 6)), "odometry_index": np.full(6, -1), "odometry": np.zeros((0, 3))}
+    good = {
+        "stamps_ns": np.array([5, 4, -1, 6, 7, 8]) * 10**9,
+        "beams": np.full(6, 2),
+        "ranges_m": np.ones(12, np.float32),
+        "valid": np.ones(12, np.uint8),
+        "first_angle_rad": np.zeros(6),
+        "angle_step_rad": np.array([0.1, 0.1, 0.1, 0.1, 0.0, 0.1]),
+        "range_max_m": np.full(6, 9.0),
+        "sensor_pose": np.zeros((6, 6)),
+        "odometry_index": np.full(6, -1),
+        "odometry": np.zeros((0, 3)),
+    }
     good["sensor_pose"][3, 5] = np.pi / 2
     entries = list(_Entries(good, np.arange(6), None, None))
     assert isinstance(entries[0], Step) and isinstance(entries[5], Step)
     assert [entry.reason for entry in entries if isinstance(entry, Refusal)] == [
-        "time runs backwards", "the scan has no time", "the laser is tilted by 90 degrees",
-        "angle_increment must be finite and not 0 rad, got 0.0"]
+        "time runs backwards",
+        "the scan has no time",
+        "the laser is tilted by 90 degrees",
+        "angle_increment must be finite and not 0 rad, got 0.0",
+    ]
 
 
 @pytest.mark.skipif(not DEMO.exists(), reason="no rawlogs of apt's mrpt-common")

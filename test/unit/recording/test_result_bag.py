@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from glass_nav.cli import main as cli
-from glass_nav.localization import beam_cloud
+from glass_nav.localization.beam_classification import beam_cloud
 
 STARTS_AT = 10**12
 NODE = "/glass_localization"
@@ -20,8 +20,20 @@ def messages(room_map, room_bag, tmp_path):
     from rosbags.highlevel import AnyReader
 
     def written(*options):
-        code = cli.main(["replay", str(room_bag().write()), "--map", str(room_map), "--out", str(tmp_path / "out"),
-                         "--no-picture", "--bag", str(tmp_path / "bags" / "out.bag"), *options])
+        code = cli.main(
+            [
+                "replay",
+                str(room_bag().write()),
+                "--map",
+                str(room_map),
+                "--out",
+                str(tmp_path / "out"),
+                "--no-picture",
+                "--bag",
+                str(tmp_path / "bags" / "out.bag"),
+                *options,
+            ]
+        )
         assert code == 0
         found = defaultdict(list)
         with AnyReader([tmp_path / "bags" / "out.bag"]) as reader:
@@ -39,8 +51,14 @@ def stamps(found):
 def test_every_scan_has_its_pose_cases_cloud_status_and_transforms(messages, room_bag, tmp_path):
     found = messages()
     scans_ns = room_bag().stamps_ns.tolist()
-    for topic in ("/scan", "/scan_surfaces", "/ground_truth", NODE + "/status", NODE + "/beam_cases",
-                  NODE + "/beam_cloud"):
+    for topic in (
+        "/scan",
+        "/scan_surfaces",
+        "/ground_truth",
+        NODE + "/status",
+        NODE + "/beam_cases",
+        NODE + "/beam_cloud",
+    ):
         assert stamps(found[topic]) == scans_ns, topic
     assert set(stamps(found["/amcl_pose"])) <= set(scans_ns)
     assert len(found["/map"]) == len(found["/tf_static"]) == 1
@@ -79,7 +97,8 @@ def test_a_bag_that_cannot_be_written_is_refused_and_a_run_that_fails_leaves_non
     (tmp_path / "folder.bag").mkdir()
     arguments = ["replay", str(path), "--map", str(room_map), "--out", str(tmp_path / "out"), "--bag"]
     assert cli.main([*arguments, str(tmp_path / "folder.bag")]) == 3
-    assert capsys.readouterr().err.splitlines()[-1] == (f"glass_nav replay: {tmp_path / 'folder.bag'}: is a folder, "
-                                                        "a bag is a file")
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        f"glass_nav replay: {tmp_path / 'folder.bag'}: is a folder, a bag is a file"
+    )
     assert cli.main([*arguments, str(tmp_path / "no.bag"), "--start", "1000"]) == 3
     assert not list(tmp_path.glob("*no.bag*"))

@@ -45,18 +45,22 @@ def test_a_table_of_angles_and_ranges_is_a_scan(tmp_path, head):
     assert scan.range_max_m > 2.0 and scan.base_from_laser.tolist() == [0.0, 0.0, 0.0]
 
 
-@pytest.mark.parametrize("name, text, line", [
-    ("a.yaml", "[1, 2", "is no yaml"),
-    ("a.yaml", "angle_min: 1", "must hold the fields of a LaserScan, with a list of ranges"),
-    ("a.yaml", "ranges: [1.0]", "lacks angle_min, angle_increment, range_min, range_max"),
-    ("a.yaml", MESSAGE.replace("2.5", "far"), "range 3 must be a number, got 'far'"),
-    ("a.yaml", MESSAGE.replace("2.5", "true"), "range 3 must be a number, got True"),
-    ("a.yaml", MESSAGE.replace("range_max: 10.0", "range_max: [1]"), "range_max must be a number, got [1]"),
-    ("a.yaml", MESSAGE.replace("range_max: 10.0", "range_max: 0"), "range_max must be finite and > 0 m, got 0.0"),
-    ("a.csv", "angle,range\n", "no beams, a scan needs at least 1"),
-    ("a.csv", "0.1,1\nfar,2\n", "line 2 must be an angle [rad] and a range [m], got 'far,2'"),
-    ("a.csv", "0.1\n", "line 1 must be an angle [rad] and a range [m], got '0.1'"),
-    ("a.csv", "nan,1\n", "line 1 must be an angle [rad] and a range [m], got 'nan,1'")])
+@pytest.mark.parametrize(
+    "name, text, line",
+    [
+        ("a.yaml", "[1, 2", "is no yaml"),
+        ("a.yaml", "angle_min: 1", "must hold the fields of a LaserScan, with a list of ranges"),
+        ("a.yaml", "ranges: [1.0]", "lacks angle_min, angle_increment, range_min, range_max"),
+        ("a.yaml", MESSAGE.replace("2.5", "far"), "range 3 must be a number, got 'far'"),
+        ("a.yaml", MESSAGE.replace("2.5", "true"), "range 3 must be a number, got True"),
+        ("a.yaml", MESSAGE.replace("range_max: 10.0", "range_max: [1]"), "range_max must be a number, got [1]"),
+        ("a.yaml", MESSAGE.replace("range_max: 10.0", "range_max: 0"), "range_max must be finite and > 0 m, got 0.0"),
+        ("a.csv", "angle,range\n", "no beams, a scan needs at least 1"),
+        ("a.csv", "0.1,1\nfar,2\n", "line 2 must be an angle [rad] and a range [m], got 'far,2'"),
+        ("a.csv", "0.1\n", "line 1 must be an angle [rad] and a range [m], got '0.1'"),
+        ("a.csv", "nan,1\n", "line 1 must be an angle [rad] and a range [m], got 'nan,1'"),
+    ],
+)
 def test_what_holds_no_scan_is_refused_in_one_line(tmp_path, name, text, line):
     (tmp_path / name).write_text(text)
     with pytest.raises(RecordingError) as refused:

@@ -18,8 +18,10 @@ def test_tum_files_come_back_to_the_nanosecond(tmp_path):
 
 
 def test_tum_files_may_be_unsorted_with_comments_and_short_or_scientific_stamps(tmp_path):
-    (tmp_path / "way.txt").write_text("# stamp x y z qx qy qz qw\n2.5 2 0 0 0 0 0 1\n\n1 1 0 0 0 0 0 1\n"
-                                      "1.5e9,3,0,0,0,0,0,1\n2.5 9 9 9 0 0 0 1\n-0.25 0 0 0 0 0 0 1\n")
+    (tmp_path / "way.txt").write_text(
+        "# stamp x y z qx qy qz qw\n2.5 2 0 0 0 0 0 1\n\n1 1 0 0 0 0 0 1\n"
+        "1.5e9,3,0,0,0,0,0,1\n2.5 9 9 9 0 0 0 1\n-0.25 0 0 0 0 0 0 1\n"
+    )
     back = trajectory_file.load(tmp_path / "way.txt")
     assert back.stamps_ns.tolist() == [-250_000_000, 1_000_000_000, 2_500_000_000, 1_500_000_000_000_000_000]
     assert back.poses[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0]
@@ -32,17 +34,24 @@ def test_a_row_of_mrpt_belongs_to_the_scan_after_its_index(tmp_path):
     np.testing.assert_allclose(back.poses, [[0, 0, 0], [1, 0, 0.1], [2, 0, 7.0 - 2 * np.pi]])
 
 
-@pytest.mark.parametrize("text, stamps, reason", [
-    ("", None, "holds no poses"),
-    ("# only words\n", None, "holds no poses"),
-    ("1 2 3\n1 2 3 4 5\n", None, "a row of poses has 8 columns (TUM: stamp x y z qx qy qz qw) or 4 "
-                                 "(MRPT: index x y yaw), got 3, 5"),
-    ("1 2 3 0 0 0 0 0\n", None, "line 1: the quaternion has no direction"),
-    ("1 2 3 0 0 0 0 1\n2 x 3 0 0 0 0 1\n", None, "line 2: could not convert string to float: 'x'"),
-    ("1 nan 3 0 0 0 0 1\n", None, "line 1: a pose must be finite, got nan 3 0 0 0 0 1"),
-    ("soon 2 3 0 0 0 0 1\n", None, "line 1: could not convert string to float: 'soon'"),
-    ("0 0 0 0\n", None, "its rows have an index and no stamp, which fits a rawlog only; give a TUM file"),
-    ("8 0 0 0\n", np.array([100]), "none of its 1 rows belongs to one of 1 scans")])
+@pytest.mark.parametrize(
+    "text, stamps, reason",
+    [
+        ("", None, "holds no poses"),
+        ("# only words\n", None, "holds no poses"),
+        (
+            "1 2 3\n1 2 3 4 5\n",
+            None,
+            "a row of poses has 8 columns (TUM: stamp x y z qx qy qz qw) or 4 (MRPT: index x y yaw), got 3, 5",
+        ),
+        ("1 2 3 0 0 0 0 0\n", None, "line 1: the quaternion has no direction"),
+        ("1 2 3 0 0 0 0 1\n2 x 3 0 0 0 0 1\n", None, "line 2: could not convert string to float: 'x'"),
+        ("1 nan 3 0 0 0 0 1\n", None, "line 1: a pose must be finite, got nan 3 0 0 0 0 1"),
+        ("soon 2 3 0 0 0 0 1\n", None, "line 1: could not convert string to float: 'soon'"),
+        ("0 0 0 0\n", None, "its rows have an index and no stamp, which fits a rawlog only; give a TUM file"),
+        ("8 0 0 0\n", np.array([100]), "none of its 1 rows belongs to one of 1 scans"),
+    ],
+)
 def test_other_files_are_refused_in_one_line(tmp_path, text, stamps, reason):
     path = tmp_path / "way.txt"
     path.write_text(text)

@@ -9,15 +9,23 @@ from io import BytesIO
 import numpy as np
 import pytest
 import rospy
-from geometry_msgs.msg import (Point32, PolygonStamped, Pose, PoseArray, PoseWithCovarianceStamped, Quaternion,
-                               Transform, Vector3)
+from geometry_msgs.msg import (
+    Point32,
+    PolygonStamped,
+    Pose,
+    PoseArray,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    Transform,
+    Vector3,
+)
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
 
 from glass_nav.geometry import angles
-from glass_nav.localization.glass_mcl import BeamCases, Estimate
-from glass_nav.localization.surface_scan import SurfaceScan
+from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
+from glass_nav.localization.localizer import BeamCases, Estimate
 from glass_nav.msg import BeamCases as BeamCasesMsg
 from glass_nav.msg import LocalizationStatus
 from glass_nav.ros import conversions
@@ -34,14 +42,20 @@ def sent_and_received(msg, kind=None):
 
 def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
     """By composing half-angle quaternions about z, y, x."""
+
     def times(a, b):
-        return (a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-                a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-                a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-                a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0])
+        return (
+            a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+            a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+            a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+            a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+        )
+
     half = np.array([roll, pitch, yaw]) / 2
-    w, x, y, z = times(times((np.cos(half[2]), 0, 0, np.sin(half[2])), (np.cos(half[1]), 0, np.sin(half[1]), 0)),
-                       (np.cos(half[0]), np.sin(half[0]), 0, 0))
+    w, x, y, z = times(
+        times((np.cos(half[2]), 0, 0, np.sin(half[2])), (np.cos(half[1]), 0, np.sin(half[1]), 0)),
+        (np.cos(half[0]), np.sin(half[0]), 0, 0),
+    )
     return Quaternion(x, y, z, w)
 
 
@@ -113,10 +127,16 @@ def test_a_guess_without_spread_is_a_guess():
     assert not conversions.guess_from_msg(msg, "map").covariance.any()
 
 
-@pytest.mark.parametrize("index, value, text", [
-    pytest.param(0, np.nan, "finite", id="NaN"), pytest.param(14, np.inf, "finite", id="inf of z"),
-    pytest.param(1, 0.2, "symmetric", id="asymmetric"), pytest.param(35, -0.1, "negative", id="negative yaw"),
-    pytest.param(0, 0.01, "negative", id="correlation above 1")])
+@pytest.mark.parametrize(
+    "index, value, text",
+    [
+        pytest.param(0, np.nan, "finite", id="NaN"),
+        pytest.param(14, np.inf, "finite", id="inf of z"),
+        pytest.param(1, 0.2, "symmetric", id="asymmetric"),
+        pytest.param(35, -0.1, "negative", id="negative yaw"),
+        pytest.param(0, 0.01, "negative", id="correlation above 1"),
+    ],
+)
 def test_a_covariance_that_is_none_is_refused(index, value, text):
     msg = guess_message()
     msg.pose.covariance[index] = value
@@ -137,12 +157,28 @@ def test_a_guess_in_another_frame_is_refused(frame):
 
 def estimate(particles: int = 3) -> Estimate:
     covariance = np.array([[0.04, 0.01, 0.002], [0.01, 0.09, 0.003], [0.002, 0.003, 0.01]])
-    cases = BeamCases(np.array([1, 0, 4], np.uint8), np.array([1.0, np.nan, 3.0]), np.array([0.1, np.nan, 0.0]),
-                      np.array([0.9, 0.2, 0.6]))
+    cases = BeamCases(
+        np.array([1, 0, 4], np.uint8),
+        np.array([1.0, np.nan, 3.0]),
+        np.array([0.1, np.nan, 0.0]),
+        np.array([0.9, 0.2, 0.6]),
+    )
     poses = np.random.default_rng(0).uniform(-3, 3, (particles, 3))
     surface = SurfaceScan(np.array([1.1, np.inf, 2.0]), np.array([False, False, True]), True)
-    return Estimate(1_000_000_001, np.array([1.0, 2.0, 0.5]), covariance, np.zeros(3), cases, surface, poses,
-                    "LOCALIZED", "for the test", 0.9, True, 0.8)
+    return Estimate(
+        1_000_000_001,
+        np.array([1.0, 2.0, 0.5]),
+        covariance,
+        np.zeros(3),
+        cases,
+        surface,
+        poses,
+        "LOCALIZED",
+        "for the test",
+        0.9,
+        True,
+        0.8,
+    )
 
 
 def test_the_pose_message_holds_the_covariance_at_x_y_and_yaw():
@@ -189,12 +225,18 @@ def test_an_area_is_its_corners():
     assert corners.tolist() == [[0.0, 0.0], [2.0, 0.0], [2.0, 1.5]]
 
 
-@pytest.mark.parametrize("msg, text", [
-    (area((0.0, 0.0), (1.0, 0.0)), "an area needs at least 3 corners, got 2"),
-    (area(), "an area needs at least 3 corners, got 0"),
-    (area((0.0, 0.0), (1.0, 0.0), (math.nan, 1.0)), "the corners of an area must be finite, got [[0.0, 0.0], "
-                                                    "[1.0, 0.0], [nan, 1.0]]"),
-    (area((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), frame="odom"), "the area must be given in frame 'map', got 'odom'")])
+@pytest.mark.parametrize(
+    "msg, text",
+    [
+        (area((0.0, 0.0), (1.0, 0.0)), "an area needs at least 3 corners, got 2"),
+        (area(), "an area needs at least 3 corners, got 0"),
+        (
+            area((0.0, 0.0), (1.0, 0.0), (math.nan, 1.0)),
+            "the corners of an area must be finite, got [[0.0, 0.0], [1.0, 0.0], [nan, 1.0]]",
+        ),
+        (area((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), frame="odom"), "the area must be given in frame 'map', got 'odom'"),
+    ],
+)
 def test_an_area_that_is_none_is_refused(msg, text):
     with pytest.raises(ValueError) as err:
         conversions.area_from_msg(msg, "map")
@@ -202,9 +244,14 @@ def test_an_area_that_is_none_is_refused(msg, text):
 
 
 def test_beam_cases_arrive_beam_by_beam():
-    msg = sent_and_received(conversions.beam_cases_msg(Header(stamp=rospy.Time(3), frame_id="/laser"),
-                                                       conversions.scan_from_msg(scan_message(), upright()),
-                                                       estimate().cases), BeamCasesMsg)
+    msg = sent_and_received(
+        conversions.beam_cases_msg(
+            Header(stamp=rospy.Time(3), frame_id="/laser"),
+            conversions.scan_from_msg(scan_message(), upright()),
+            estimate().cases,
+        ),
+        BeamCasesMsg,
+    )
     assert list(msg.cases) == [1, 0, 4]
     assert (msg.header.frame_id, msg.header.stamp) == ("laser", rospy.Time(3))
     assert np.array(msg.expected) == pytest.approx([1.0, np.nan, 3.0], nan_ok=True)
@@ -215,8 +262,9 @@ def test_beam_cases_arrive_beam_by_beam():
 
 
 def scan_message(**fields) -> LaserScan:
-    values = dict(angle_min=-0.5, angle_max=0.5, angle_increment=0.5, range_min=0.1, range_max=10.0,
-                  ranges=[1.0, np.inf, 2.0])
+    values = dict(
+        angle_min=-0.5, angle_max=0.5, angle_increment=0.5, range_min=0.1, range_max=10.0, ranges=[1.0, np.inf, 2.0]
+    )
     return LaserScan(header=Header(stamp=rospy.Time(9), frame_id="laser"), **{**values, **fields})
 
 
@@ -333,13 +381,19 @@ def test_maps_survive_the_way_there_and_back():
     assert back.map_from_grid == pytest.approx(grid_map.map_from_grid)
 
 
-@pytest.mark.parametrize("fields, text", [
-    ({"data": [0] * 5}, "3 x 2 cells needs 6 values, got 5"), ({"data": []}, "got 0"),
-    ({"width": 0, "height": 0, "data": []}, "at least one cell, got 0 x 0"),
-    ({"data": [0, 0, 0, 0, 0, 101]}, "0 to 100 or -1 for unknown, got 101 in 1 cell"),
-    ({"data": [0, -2, -3, 0, 0, 0]}, "got -2 in 2 cell"),
-    ({"resolution": 0.0}, "resolution > 0"), ({"resolution": np.nan}, "resolution > 0"),
-    ({"origin": Pose()}, "the origin of the map: a quaternion")])
+@pytest.mark.parametrize(
+    "fields, text",
+    [
+        ({"data": [0] * 5}, "3 x 2 cells needs 6 values, got 5"),
+        ({"data": []}, "got 0"),
+        ({"width": 0, "height": 0, "data": []}, "at least one cell, got 0 x 0"),
+        ({"data": [0, 0, 0, 0, 0, 101]}, "0 to 100 or -1 for unknown, got 101 in 1 cell"),
+        ({"data": [0, -2, -3, 0, 0, 0]}, "got -2 in 2 cell"),
+        ({"resolution": 0.0}, "resolution > 0"),
+        ({"resolution": np.nan}, "resolution > 0"),
+        ({"origin": Pose()}, "the origin of the map: a quaternion"),
+    ],
+)
 def test_what_is_no_map_is_refused(fields, text):
     with pytest.raises(ValueError, match=text.replace("(", r"\(")):
         conversions.map_from_msg(grid_message(**fields))

@@ -37,6 +37,7 @@ def test_take_waits_for_an_item_of_another_thread():
 def test_an_errand_tells_the_one_who_waits_what_came_of_it():
     def fail() -> None:
         raise ValueError("no map")
+
     errand = Errand(fail)
     threading.Timer(0.02, errand.run).start()
     with pytest.raises(ValueError, match="no map"):
@@ -60,6 +61,7 @@ def test_an_errand_nobody_waits_for_any_more_is_not_done():
 def test_an_error_that_is_not_about_values_stays_with_the_run_loop():
     def broken() -> None:
         raise KeyError("a bug")
+
     with pytest.raises(KeyError):
         Errand(broken).run()
 
@@ -147,6 +149,7 @@ def test_a_flood_does_not_slow_down_the_one_who_takes():
     def flood() -> None:
         while not stop.is_set():
             box.put("scans", 0)
+
     thread = threading.Thread(target=flood)
     thread.start()
     try:

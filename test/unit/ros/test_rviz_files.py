@@ -9,8 +9,10 @@ from typing import Any, Iterator
 
 import yaml
 
-from glass_nav.ros import (beam_displays, driver_displays, driver_node, landmarks_node, localization_node,
-                           topology_displays, wall_display)
+from glass_nav.ros.driver import driver_displays, driver_node
+from glass_nav.ros.landmarks import landmarks_node
+from glass_nav.ros.localization import beam_displays, localization_node, wall_display
+from glass_nav.ros.topology import topology_displays
 
 REPO = Path(__file__).parents[3]
 CONFIG = yaml.safe_load((REPO / "rviz" / "glass_nav.rviz").read_text(encoding="utf-8"))
@@ -89,8 +91,12 @@ def test_every_topic_below_a_node_can_be_remapped_to_another_name():
     assert {topic for topic in remaps if topic.count("/") == 2} == below
     for origin in below:
         _, node, topic = origin.split("/")
-        argument = {"glass_localization": "name", "glass_topology": "topology_name", "glass_driver": "driver_name",
-                    "landmarks": "landmarks_name"}[node]
+        argument = {
+            "glass_localization": "name",
+            "glass_topology": "topology_name",
+            "glass_driver": "driver_name",
+            "landmarks": "landmarks_name",
+        }[node]
         assert remaps[origin] == f"/$(arg {argument})/{topic}"
     defaults = {arg.get("name"): arg.get("default") for arg in launch.iter("arg")}
     assert (defaults["name"], defaults["topology_name"]) == ("glass_localization", "glass_topology")

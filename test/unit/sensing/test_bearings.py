@@ -35,8 +35,9 @@ def test_a_bearing_is_told_from_where_the_robot_was():
 
 def test_going_there_and_back_is_no_less_unsure_than_the_whole_way():
     single = [LandmarkBearing(number, name, 0.0, 0.01) for number, name in enumerate("ABC")]
-    taken = bearings.collected(single, np.array([[0.0, 0, 0], [2.0, 0, 0], [0.0, 0, 0]]), np.zeros(3),
-                               OdometryDrift(0.1, 0.0, 0.0))
+    taken = bearings.collected(
+        single, np.array([[0.0, 0, 0], [2.0, 0, 0], [0.0, 0, 0]]), np.zeros(3), OdometryDrift(0.1, 0.0, 0.0)
+    )
     np.testing.assert_allclose(taken.origin_sigma_m, [0.4, 0.2, 0.0])
 
 
@@ -56,26 +57,43 @@ def test_a_subset_keeps_what_belongs_together():
         assert (part.angles_rad[0], part.sigma_rad[0]) == (0.2, 0.02)
 
 
-@pytest.mark.parametrize("fields, text", [
-    ({"landmark_id": ""}, "a bearing needs the id of its landmark, got ''"),
-    ({"angle_rad": np.nan}, "bearing of 'A': angle must be finite, got nan rad"),
-    ({"sigma_rad": 0.0}, "bearing of 'A': sigma must be > 0 rad, got 0.0")])
+@pytest.mark.parametrize(
+    "fields, text",
+    [
+        ({"landmark_id": ""}, "a bearing needs the id of its landmark, got ''"),
+        ({"angle_rad": np.nan}, "bearing of 'A': angle must be finite, got nan rad"),
+        ({"sigma_rad": 0.0}, "bearing of 'A': sigma must be > 0 rad, got 0.0"),
+    ],
+)
 def test_a_bearing_that_means_nothing_is_refused(fields, text):
     with pytest.raises(ValueError) as caught:
         LandmarkBearing(**{"stamp_ns": 0, "landmark_id": "A", "angle_rad": 0.0, "sigma_rad": 0.1, **fields})
     assert str(caught.value) == text
 
 
-@pytest.mark.parametrize("fields, text", [
-    ({"ids": ("A", "A")}, "bearings must be of different landmarks, got A more than once"),
-    ({"angles_rad": np.zeros(3)}, "expected 2 ids with angles (N,), sigma (N,), sensor poses (N, 3) and origin "
-                                  "sigma (N,), got (3,), (2,), (2, 3), (2,)"),
-    ({"angles_rad": np.array([0.0, np.inf])}, "bearings and the poses they were taken from must be finite"),
-    ({"sigma_rad": np.array([0.1, 0.0])}, "sigma of bearings must be > 0 rad, got [0.1, 0.0]"),
-    ({"origin_sigma_m": np.array([0.1, -1.0])}, "origin sigma of bearings must be >= 0 m, got [0.1, -1.0]")])
+@pytest.mark.parametrize(
+    "fields, text",
+    [
+        ({"ids": ("A", "A")}, "bearings must be of different landmarks, got A more than once"),
+        (
+            {"angles_rad": np.zeros(3)},
+            "expected 2 ids with angles (N,), sigma (N,), sensor poses (N, 3) and origin "
+            "sigma (N,), got (3,), (2,), (2, 3), (2,)",
+        ),
+        ({"angles_rad": np.array([0.0, np.inf])}, "bearings and the poses they were taken from must be finite"),
+        ({"sigma_rad": np.array([0.1, 0.0])}, "sigma of bearings must be > 0 rad, got [0.1, 0.0]"),
+        ({"origin_sigma_m": np.array([0.1, -1.0])}, "origin sigma of bearings must be >= 0 m, got [0.1, -1.0]"),
+    ],
+)
 def test_bearings_that_do_not_fit_together_are_refused(fields, text):
-    good = {"stamp_ns": 0, "ids": ("A", "B"), "angles_rad": np.zeros(2), "sigma_rad": np.ones(2),
-            "base_from_sensor": np.zeros((2, 3)), "origin_sigma_m": np.zeros(2)}
+    good = {
+        "stamp_ns": 0,
+        "ids": ("A", "B"),
+        "angles_rad": np.zeros(2),
+        "sigma_rad": np.ones(2),
+        "base_from_sensor": np.zeros((2, 3)),
+        "origin_sigma_m": np.zeros(2),
+    }
     with pytest.raises(ValueError) as caught:
         LandmarkBearings(**{**good, **fields})
     assert str(caught.value) == text

@@ -36,8 +36,17 @@ def measured(track: Trajectory, base_from_laser: np.ndarray, upside_down: bool =
     with np.errstate(divide="ignore"):
         ranges_m = (WALL_X_M - lasers[:, 0]) / direction[:, 0]
     ranges_m[(direction[:, 0] <= 0.0) | (ranges_m > 10.0)] = np.inf
-    scan = scan_from_fields(STAMP_NS, ranges_m, ANGLES_RAD[0], ANGLES_RAD[1] - ANGLES_RAD[0], 0.05, 10.0,
-                            base_from_laser, upside_down, time_increment_s=STEP_S)
+    scan = scan_from_fields(
+        STAMP_NS,
+        ranges_m,
+        ANGLES_RAD[0],
+        ANGLES_RAD[1] - ANGLES_RAD[0],
+        0.05,
+        10.0,
+        base_from_laser,
+        upside_down,
+        time_increment_s=STEP_S,
+    )
     return scan, lasers[:, :2] + np.where(np.isfinite(ranges_m), ranges_m, np.nan)[:, None] * direction
 
 
@@ -60,8 +69,9 @@ def test_beams_without_an_answer_turn_with_the_lidar_and_stay_as_they_are():
     lost = ~scan.answered
     assert lost.any() and np.array_equal(straight.answered, scan.answered)
     np.testing.assert_array_equal(straight.ranges_m[lost], scan.ranges_m[lost])
-    np.testing.assert_allclose(straight.angles_rad[lost], ANGLES_RAD[lost] + 2.0 * STEP_S * np.flatnonzero(lost),
-                               atol=1e-6)
+    np.testing.assert_allclose(
+        straight.angles_rad[lost], ANGLES_RAD[lost] + 2.0 * STEP_S * np.flatnonzero(lost), atol=1e-6
+    )
 
 
 def test_a_range_on_a_beam_is_told_from_where_the_beam_began():
@@ -80,18 +90,27 @@ def test_a_robot_that_stands_has_nothing_to_make_up_for():
     np.testing.assert_allclose(straight.angles_rad, scan.angles_rad, atol=1e-12)
 
 
-@pytest.mark.parametrize("beams, step_s, whole_ns", [(181, 0.0005, 90_000_000), (1, 0.1, 0), (181, 0.0, 0),
-                                                     (181, -0.001, 0), (181, np.nan, 0), (181, 1.0, 0)])
+@pytest.mark.parametrize(
+    "beams, step_s, whole_ns",
+    [(181, 0.0005, 90_000_000), (1, 0.1, 0), (181, 0.0, 0), (181, -0.001, 0), (181, np.nan, 0), (181, 1.0, 0)],
+)
 def test_a_turn_takes_its_steps(beams, step_s, whole_ns):
     assert deskew.turn_ns(beams, step_s) == whole_ns
 
 
-@pytest.mark.parametrize("step_s, scan_time_s, text", [
-    (0.0, 0.1, None), (0.0005, 0.1, None), (0.0005, 0.0, None), (0.0005, 0.07, None),
-    (-0.001, 0.1, "time_increment must be finite and >= 0 s, got -0.001"),
-    (np.inf, 0.1, "time_increment must be finite and >= 0 s, got inf"),
-    (0.5, 0.1, "time_increment 0.5 s times 181 beams makes 90 s, the most for one turn is 0.15 s"),
-    (0.01, 0.0, "time_increment 0.01 s times 181 beams makes 1.8 s, the most for one turn is 1 s")])
+@pytest.mark.parametrize(
+    "step_s, scan_time_s, text",
+    [
+        (0.0, 0.1, None),
+        (0.0005, 0.1, None),
+        (0.0005, 0.0, None),
+        (0.0005, 0.07, None),
+        (-0.001, 0.1, "time_increment must be finite and >= 0 s, got -0.001"),
+        (np.inf, 0.1, "time_increment must be finite and >= 0 s, got inf"),
+        (0.5, 0.1, "time_increment 0.5 s times 181 beams makes 90 s, the most for one turn is 0.15 s"),
+        (0.01, 0.0, "time_increment 0.01 s times 181 beams makes 1.8 s, the most for one turn is 1 s"),
+    ],
+)
 def test_what_no_driver_can_mean_is_said(step_s, scan_time_s, text):
     assert deskew.fault(181, step_s, scan_time_s) == text
 

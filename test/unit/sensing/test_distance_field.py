@@ -59,7 +59,8 @@ def test_distances_are_cut():
     occupied = np.zeros((5, 60), bool)
     occupied[:, 0] = True
     distance, along_x, along_y = DistanceField(grid_map(occupied), max_distance_m=1.5).at(
-        np.array([0.45, 4.0]), np.array([0.2, 0.2]))
+        np.array([0.45, 4.0]), np.array([0.2, 0.2])
+    )
     np.testing.assert_allclose(distance, [0.4, 1.5], atol=1e-6)
     np.testing.assert_allclose(along_x, [1.0, 0.0], atol=1e-5)
     np.testing.assert_allclose(along_y, 0.0, atol=1e-6)
@@ -67,7 +68,8 @@ def test_distances_are_cut():
 
 def test_without_a_wall_all_is_far_and_flat():
     distance, along_x, along_y = DistanceField(grid_map(np.zeros((4, 5), bool)), max_distance_m=1.2).at(
-        np.array([0.1, 0.3, -5.0]), np.array([0.1, 0.2, 9.0]))
+        np.array([0.1, 0.3, -5.0]), np.array([0.1, 0.2, 9.0])
+    )
     np.testing.assert_allclose(distance, 1.2, rtol=1e-6)
     np.testing.assert_array_equal(along_x, 0.0)
     np.testing.assert_array_equal(along_y, 0.0)
@@ -105,7 +107,7 @@ def test_a_beam_does_not_end_deep_inside_what_is_drawn_solid():
     field = DistanceField(grid_map(occupied))
     distance, along_x, _ = field.at(np.array([2.05, 2.35, 4.35]), np.array([2.0, 2.0, 2.0]))
     np.testing.assert_allclose(distance[:2], 0.0, atol=1e-6)  # a wall drawn as thick as walls are
-    assert distance[2] > 1.5                                  # 2 m inside: some way out
+    assert distance[2] > 1.5  # 2 m inside: some way out
     assert along_x[2] > 0.9
 
 

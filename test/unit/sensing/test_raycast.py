@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 import slow_raycast
+
 from glass_nav.geometry import se2
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.world.grid_map import UNKNOWN, GridMap
@@ -38,19 +38,21 @@ def bordered(rng, shape) -> np.ndarray:
     return cells
 
 
-GRIDS = [pytest.param(lambda rng: scattered(rng, (40, 60), 0.1), id="scattered cells"),
-         pytest.param(lambda rng: scattered(rng, (25, 33), 0.6), id="more wall than room"),
-         pytest.param(lambda rng: thin_walls(rng, (70, 50)), id="walls one cell thick"),
-         pytest.param(lambda rng: bordered(rng, (64, 64)), id="border of wall"),
-         pytest.param(lambda rng: scattered(rng, (1, 30), 0.1), id="one row"),
-         pytest.param(lambda rng: scattered(rng, (600, 700), 0.00005), id="beyond 255 cells")]
+GRIDS = [
+    pytest.param(lambda rng: scattered(rng, (40, 60), 0.1), id="scattered cells"),
+    pytest.param(lambda rng: scattered(rng, (25, 33), 0.6), id="more wall than room"),
+    pytest.param(lambda rng: thin_walls(rng, (70, 50)), id="walls one cell thick"),
+    pytest.param(lambda rng: bordered(rng, (64, 64)), id="border of wall"),
+    pytest.param(lambda rng: scattered(rng, (1, 30), 0.1), id="one row"),
+    pytest.param(lambda rng: scattered(rng, (600, 700), 0.00005), id="beyond 255 cells"),
+]
 
 
 def poses_around(rng, world: GridMap, count) -> np.ndarray:
     """(P, 3) poses in the map and up to a fifth of its size outside; anywhere, on cell centres and on corners."""
     height, width = world.occupancy.shape
     column_row = rng.uniform(-0.2, 1.2, (count, 2)) * [width, height]
-    column_row[count // 2:] = np.floor(column_row[count // 2:] * 2.0) / 2.0
+    column_row[count // 2 :] = np.floor(column_row[count // 2 :] * 2.0) / 2.0
     yaw = np.where(rng.random(count) < 0.5, rng.choice(EIGHT_WINDS, count), rng.uniform(-np.pi, np.pi, count))
     return se2.compose(world.map_from_grid, np.c_[column_row * world.resolution_m, yaw])
 
@@ -60,8 +62,14 @@ def assert_as_slow(world: GridMap, caster: RayCaster, poses, angles_rad, max_ran
     in_grid = se2.compose(se2.inverse(world.map_from_grid), poses)
     for p, (x, y, yaw) in enumerate(in_grid):
         for b, angle in enumerate(angles_rad):
-            t, cells = slow_raycast.first_hit(world.occupied, x / world.resolution_m, y / world.resolution_m,
-                                              yaw + angle, max_range_m / world.resolution_m, stops)
+            t, cells = slow_raycast.first_hit(
+                world.occupied,
+                x / world.resolution_m,
+                y / world.resolution_m,
+                yaw + angle,
+                max_range_m / world.resolution_m,
+                stops,
+            )
             where = f"pose {poses[p]}, angle {angle}"
             assert hits.range_m[p, b] == pytest.approx(t * world.resolution_m, abs=1e-8), where
             assert hits.cell[p, b] in cells, where
@@ -103,14 +111,25 @@ def test_rays_that_stop_at_unknown_cells_agree_with_the_slow_traversal(seed, bac
     rng = np.random.default_rng(seed)
     world = grid_map(np.where(rng.random((50, 50)) < 0.03, UNKNOWN, scattered(rng, (50, 50), 0.05)), 0.05)
     poses = np.c_[rng.uniform(-0.5, 3.0, (60, 2)), rng.uniform(-np.pi, np.pi, 60)]
-    assert_as_slow(world, RayCaster(world, backend, unknown="stop"), poses, rng.uniform(-np.pi, np.pi, 6), 5.0,
-                   stops=world.occupancy < 0)
+    assert_as_slow(
+        world,
+        RayCaster(world, backend, unknown="stop"),
+        poses,
+        rng.uniform(-np.pi, np.pi, 6),
+        5.0,
+        stops=world.occupancy < 0,
+    )
 
 
 @pytest.mark.parametrize("backend", ["exact", "mrpt"])
-@pytest.mark.parametrize("direction_rad, expected_m", [
-    pytest.param(0.0, 250 - 0.1, id="east"), pytest.param(np.pi / 2, 150 - 0.1, id="north"),
-    pytest.param(np.pi, np.inf, id="west, out of the map")])
+@pytest.mark.parametrize(
+    "direction_rad, expected_m",
+    [
+        pytest.param(0.0, 250 - 0.1, id="east"),
+        pytest.param(np.pi / 2, 150 - 0.1, id="north"),
+        pytest.param(np.pi, np.inf, id="west, out of the map"),
+    ],
+)
 def test_a_range_far_beyond_255_cells_is_exact(backend, direction_rad, expected_m):
     cells = np.zeros((700, 1100), np.int8)
     cells[600, :] = cells[:, 1000] = 100
@@ -174,7 +193,7 @@ def test_simulate_scan_ray_agrees_within_its_step_where_it_cannot_leak(seed):
     rng = np.random.default_rng(seed)
     cells = np.zeros((120, 160))
     for row, column in zip(rng.integers(5, 110, 12), rng.integers(5, 150, 12)):
-        cells[row:row + 6, column:column + 6] = 100
+        cells[row : row + 6, column : column + 6] = 100
     cells[:4], cells[-4:], cells[:, :4], cells[:, -4:] = 100, 100, 100, 100
     world = grid_map(cells, 0.05)
     rows, columns = np.nonzero(world.free)
@@ -203,16 +222,20 @@ def test_no_rays_give_an_empty_result(poses, beams):
     assert caster.cast_surfaces(np.zeros((poses, 3)), np.zeros(beams), 1.0).mirrored_m.shape == (poses, beams)
 
 
-@pytest.mark.parametrize("poses, angles_rad, max_range_m, text", [
-    ([[0, 0, 0], [0, np.nan, 0]], [0.0], 1.0, r"pose 1 is not finite: \[ 0. nan  0.\]"),
-    ([[np.inf, 0, 0]], [0.0], 1.0, r"pose 0 is not finite"),
-    ([[0, 0, 0]], [0.0, np.nan], 1.0, r"angle 1 is not finite: nan"),
-    ([0, 0, 0], [0.0], 1.0, r"poses must have shape \(P, 3\), got \(3,\)"),
-    ([[0, 0]], [0.0], 1.0, r"poses must have shape \(P, 3\), got \(1, 2\)"),
-    ([[0, 0, 0]], [[0.0]], 1.0, r"angles must have shape \(B,\), got \(1, 1\)"),
-    ([[0, 0, 0]], [0.0], 0.0, r"max_range must be finite and > 0 m, got 0.0"),
-    ([[0, 0, 0]], [0.0], np.nan, r"max_range must be finite and > 0 m, got nan"),
-    ([[0, 0, 0]], [0.0], np.inf, r"max_range must be finite and > 0 m, got inf")])
+@pytest.mark.parametrize(
+    "poses, angles_rad, max_range_m, text",
+    [
+        ([[0, 0, 0], [0, np.nan, 0]], [0.0], 1.0, r"pose 1 is not finite: \[ 0. nan  0.\]"),
+        ([[np.inf, 0, 0]], [0.0], 1.0, r"pose 0 is not finite"),
+        ([[0, 0, 0]], [0.0, np.nan], 1.0, r"angle 1 is not finite: nan"),
+        ([0, 0, 0], [0.0], 1.0, r"poses must have shape \(P, 3\), got \(3,\)"),
+        ([[0, 0]], [0.0], 1.0, r"poses must have shape \(P, 3\), got \(1, 2\)"),
+        ([[0, 0, 0]], [[0.0]], 1.0, r"angles must have shape \(B,\), got \(1, 1\)"),
+        ([[0, 0, 0]], [0.0], 0.0, r"max_range must be finite and > 0 m, got 0.0"),
+        ([[0, 0, 0]], [0.0], np.nan, r"max_range must be finite and > 0 m, got nan"),
+        ([[0, 0, 0]], [0.0], np.inf, r"max_range must be finite and > 0 m, got inf"),
+    ],
+)
 def test_rays_that_cannot_be_cast_are_refused_in_one_line(poses, angles_rad, max_range_m, text):
     caster = RayCaster(grid_map(np.zeros((3, 3))))
     for cast in (caster.cast, caster.cast_first, caster.cast_surfaces, caster.simulate_scan_ray_raw):
@@ -221,11 +244,15 @@ def test_rays_that_cannot_be_cast_are_refused_in_one_line(poses, angles_rad, max
         assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("options, text", [
-    ({"backend": "fast"}, "backend must be one of exact, mrpt, got 'fast'"),
-    ({"unknown": "wall"}, "unknown must be one of pass, stop, got 'wall'"),
-    ({"threads": 0}, "threads must be a whole number >= 1, got 0"),
-    ({"threads": 1.5}, "threads must be a whole number >= 1, got 1.5")])
+@pytest.mark.parametrize(
+    "options, text",
+    [
+        ({"backend": "fast"}, "backend must be one of exact, mrpt, got 'fast'"),
+        ({"unknown": "wall"}, "unknown must be one of pass, stop, got 'wall'"),
+        ({"threads": 0}, "threads must be a whole number >= 1, got 0"),
+        ({"threads": 1.5}, "threads must be a whole number >= 1, got 1.5"),
+    ],
+)
 def test_options_that_do_not_exist_are_refused_in_one_line(options, text):
     with pytest.raises(ValueError, match=f"^ray caster: {text}$"):
         RayCaster(grid_map(np.zeros((3, 3))), **options)

@@ -6,8 +6,8 @@ import re
 
 import numpy as np
 import pytest
-
 import slow_raycast
+
 from glass_nav.geometry.angles import wrap
 from glass_nav.geometry.se2 import compose, inverse
 from glass_nav.sensing.raycast import RayCaster, SurfaceHits
@@ -21,7 +21,7 @@ def three_walls(thickness_cells=(1, 2, 3), map_from_grid=(0.0, 0.0, 0.0)) -> Gri
     """Walls across the map that begin at 2, 4 and 6 m of 8 x 20 m."""
     cells = np.zeros((400, 160), np.int8)
     for start, thickness in zip((40, 80, 120), thickness_cells):
-        cells[:, start:start + thickness] = 100
+        cells[:, start : start + thickness] = 100
     return GridMap(cells, CELL_M, np.array(map_from_grid))
 
 
@@ -70,8 +70,9 @@ def test_thickness_is_judged_along_the_normal_not_along_the_ray():
     assert found.first_thickness_m[0, 0] == pytest.approx(0.1, rel=1e-5)
 
 
-@pytest.mark.parametrize("min_gap_m, second_m", [pytest.param(0.16, 3.0, id="one surface"),
-                                                 pytest.param(0.14, 1.2, id="two surfaces")])
+@pytest.mark.parametrize(
+    "min_gap_m, second_m", [pytest.param(0.16, 3.0, id="one surface"), pytest.param(0.14, 1.2, id="two surfaces")]
+)
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_gap_parts_two_surfaces_only_if_it_is_long_enough(min_gap_m, second_m, backend):
     world = three_walls((1, 1, 1))
@@ -136,10 +137,16 @@ def test_a_path_longer_than_max_range_is_not_mirrored():
     assert np.isfinite(hits(world, [1.0, 10.0, 0.0], 0.0, max_range_m=10.96).mirrored_m[0, 0])
 
 
-@pytest.mark.parametrize("draw", [
-    pytest.param(lambda cells: cells.__setitem__((slice(49, 52), slice(49, 52)), 100), id="mullion"),
-    pytest.param(lambda cells: (cells.__setitem__((50, slice(50, 90)), 100),
-                                cells.__setitem__((slice(50, 90), 50), 100)), id="corner")])
+@pytest.mark.parametrize(
+    "draw",
+    [
+        pytest.param(lambda cells: cells.__setitem__((slice(49, 52), slice(49, 52)), 100), id="mullion"),
+        pytest.param(
+            lambda cells: (cells.__setitem__((50, slice(50, 90)), 100), cells.__setitem__((slice(50, 90), 50), 100)),
+            id="corner",
+        ),
+    ],
+)
 def test_mullions_and_corners_have_no_normal_to_mirror_at(draw):
     cells = np.zeros((100, 100), np.int8)
     cells[:, 0] = cells[:, 99] = cells[0] = cells[99] = 100
@@ -182,7 +189,7 @@ def test_posts_that_stick_out_do_not_turn_the_normal_of_a_wall(post_cells, limit
     cells = np.zeros((60, 240), np.int8)
     cells[30] = 100
     for start in range(20, 240 - post_cells, 34):
-        cells[rows, start:start + post_cells] = 100
+        cells[rows, start : start + post_cells] = 100
     found_rad, _ = RayCaster(GridMap(cells.T.copy() if turned else cells, CELL_M, np.zeros(3))).normals()
     flat = found_rad.reshape(240, 60).T if turned else found_rad.reshape(60, 240)
     off_deg = np.degrees(np.abs(wrap(2.0 * (flat[30, 20:220] - (0.0 if turned else np.pi / 2))))) / 2.0
@@ -227,7 +234,7 @@ def test_surfaces_are_the_runs_of_the_slow_traversal(seed, backend):
     cells = np.where(rng.random((90, 110)) < 0.01, 100, 0).astype(np.int8)
     for _ in range(10):
         row, column, height, width = rng.integers([0, 0, 1, 1], [80, 100, 30, 8])
-        cells[row:row + height, column:column + width] = 100
+        cells[row : row + height, column : column + width] = 100
     world = GridMap(cells, CELL_M, np.zeros(3))
     max_range_m, max_thickness_m, min_linearity, min_gap_m = 4.0, 0.2, 0.9, 0.12
     caster = RayCaster(world, backend)
@@ -245,8 +252,11 @@ def test_surfaces_are_the_runs_of_the_slow_traversal(seed, backend):
     for p, b in np.ndindex(len(poses), len(angles_rad)):
         direction = poses[p, 2] + angles_rad[b]
         expected_m, expected_thickness_m = np.full(3, np.inf), np.full(3, np.inf)
-        for i, run in enumerate(slow_raycast.surfaces(world.occupied, *poses[p, :2] / CELL_M, direction,
-                                                      max_range_m / CELL_M, min_gap_m / CELL_M, same_wall)[:3]):
+        for i, run in enumerate(
+            slow_raycast.surfaces(
+                world.occupied, *poses[p, :2] / CELL_M, direction, max_range_m / CELL_M, min_gap_m / CELL_M, same_wall
+            )[:3]
+        ):
             expected_m[i] = run.t_in * CELL_M
             straight = linearity[run.cells[0]] >= min_linearity
             cos = abs(np.cos(axis_rad[run.cells[0]] - direction)) if straight else 1.0
@@ -272,8 +282,14 @@ def test_paths_end_where_surfaces_are_as_far_as_one_looks(seed):
     near = caster.cast_paths(poses, angles_rad, reach_m, 0.2, 0.9, 0.12)
     far = caster.cast_surfaces(poses, angles_rad, 9.0, 0.2, 0.9, 0.12)
     beam_rad = poses[:, 2:] + angles_rad
-    for path, (range_m, cell) in enumerate([(far.first_m, far.first_cell), (far.mirrored_m, far.mirrored_cell),
-                                            (far.second_m, far.second_cell), (far.third_m, far.third_cell)]):
+    for path, (range_m, cell) in enumerate(
+        [
+            (far.first_m, far.first_cell),
+            (far.mirrored_m, far.mirrored_cell),
+            (far.second_m, far.second_cell),
+            (far.third_m, far.third_cell),
+        ]
+    ):
         seen = range_m <= reach_m
         assert seen.any() and not seen.all()
         np.testing.assert_array_equal(near.range_m[path], np.where(seen, range_m, np.inf))
@@ -283,10 +299,14 @@ def test_paths_end_where_surfaces_are_as_far_as_one_looks(seed):
         np.testing.assert_allclose(near.cos_incidence[path], cos, atol=1e-5)
 
 
-@pytest.mark.parametrize("reach_m, text", [
-    ([1.0], "reach must have the shape of the angles (2,), got (1,)"),
-    ([1.0, 0.0], "reach must be finite and > 0 m, got 0.0 to 1.0"),
-    ([1.0, np.inf], "reach must be finite and > 0 m, got 1.0 to inf")])
+@pytest.mark.parametrize(
+    "reach_m, text",
+    [
+        ([1.0], "reach must have the shape of the angles (2,), got (1,)"),
+        ([1.0, 0.0], "reach must be finite and > 0 m, got 0.0 to 1.0"),
+        ([1.0, np.inf], "reach must be finite and > 0 m, got 1.0 to inf"),
+    ],
+)
 def test_a_reach_that_is_none_is_refused(reach_m, text):
     caster = RayCaster(GridMap(np.zeros((9, 9), np.int8), CELL_M, np.zeros(3)))
     with pytest.raises(ValueError, match=re.escape(text)):
@@ -341,11 +361,15 @@ def test_threads_do_not_change_the_surfaces():
         np.testing.assert_array_equal(values, getattr(two, name), err_msg=name)
 
 
-@pytest.mark.parametrize("limits, text", [
-    ({"max_thickness_m": -0.1}, "max_thickness must be >= 0 m, got -0.1"),
-    ({"max_thickness_m": np.nan}, "max_thickness must be >= 0 m, got nan"),
-    ({"min_linearity": 1.5}, r"min_linearity must be in \[0, 1\], got 1.5"),
-    ({"min_gap_m": np.inf}, "min_gap must be finite and >= 0 m, got inf")])
+@pytest.mark.parametrize(
+    "limits, text",
+    [
+        ({"max_thickness_m": -0.1}, "max_thickness must be >= 0 m, got -0.1"),
+        ({"max_thickness_m": np.nan}, "max_thickness must be >= 0 m, got nan"),
+        ({"min_linearity": 1.5}, r"min_linearity must be in \[0, 1\], got 1.5"),
+        ({"min_gap_m": np.inf}, "min_gap must be finite and >= 0 m, got inf"),
+    ],
+)
 def test_limits_out_of_bounds_are_refused_in_one_line(limits, text):
     with pytest.raises(ValueError, match=f"^ray caster: {text}$"):
         hits(three_walls(), [1.0, 10.0, 0.0], 0.0, **limits)

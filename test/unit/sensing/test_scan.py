@@ -5,28 +5,33 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from glass_nav.sensing.scan import Scan, ScanError, scan_from_fields
+from glass_nav.sensing.scan import Scan, ScanError, scan_from_fields, spread_evenly
 
 STAMP_NS = 12_345_000_000
 HERE = np.zeros(3)
 
 
 def scan(ranges_m, range_min_m=0.1, range_max_m=10.0, base_from_laser=HERE, **kwargs):
-    return scan_from_fields(STAMP_NS, np.array(ranges_m, float), -0.5, 0.25, range_min_m, range_max_m,
-                            base_from_laser, **kwargs)
+    return scan_from_fields(
+        STAMP_NS, np.array(ranges_m, float), -0.5, 0.25, range_min_m, range_max_m, base_from_laser, **kwargs
+    )
 
 
-@pytest.mark.parametrize("written, meant", [
-    pytest.param(5.0, 5.0, id="a range stays"),
-    pytest.param(0.1, 0.1, id="range_min is a range"),
-    pytest.param(0.09, -np.inf, id="nearer is too near"),
-    pytest.param(-1.0, -np.inf, id="negative is too near"),
-    pytest.param(0.0, np.nan, id="0 is a failed measurement"),
-    pytest.param(10.0, np.inf, id="range_max means nothing met"),
-    pytest.param(11.0, np.inf, id="beyond it too"),
-    pytest.param(np.inf, np.inf, id="inf stays"),
-    pytest.param(-np.inf, -np.inf, id="-inf stays"),
-    pytest.param(np.nan, np.nan, id="NaN stays")])
+@pytest.mark.parametrize(
+    "written, meant",
+    [
+        pytest.param(5.0, 5.0, id="a range stays"),
+        pytest.param(0.1, 0.1, id="range_min is a range"),
+        pytest.param(0.09, -np.inf, id="nearer is too near"),
+        pytest.param(-1.0, -np.inf, id="negative is too near"),
+        pytest.param(0.0, np.nan, id="0 is a failed measurement"),
+        pytest.param(10.0, np.inf, id="range_max means nothing met"),
+        pytest.param(11.0, np.inf, id="beyond it too"),
+        pytest.param(np.inf, np.inf, id="inf stays"),
+        pytest.param(-np.inf, -np.inf, id="-inf stays"),
+        pytest.param(np.nan, np.nan, id="NaN stays"),
+    ],
+)
 def test_ranges_mean_what_rep_117_says(written, meant):
     np.testing.assert_array_equal(scan([written, 3.0]).ranges_m, [meant, 3.0])
 
@@ -70,12 +75,16 @@ def test_a_beam_without_an_answer_ends_nowhere():
     np.testing.assert_array_equal(np.isnan(points).all(axis=1), [False, True, True, True])
 
 
-@pytest.mark.parametrize("limits, kept", [
-    pytest.param((-1.0, -1.0), [0.2, 1.0, 3.0, 9.0, np.inf], id="the scan's own"),
-    pytest.param((1.0, -1.0), [-np.inf, 1.0, 3.0, 9.0, np.inf], id="not nearer than 1 m"),
-    pytest.param((-1.0, 3.0), [0.2, 1.0, np.inf, np.inf, np.inf], id="nearer than 3 m"),
-    pytest.param((0.5, 5.0), [-np.inf, 1.0, 3.0, np.inf, np.inf], id="between"),
-    pytest.param((0.05, 50.0), [0.2, 1.0, 3.0, 9.0, np.inf], id="the lidar's own limits are the stricter ones")])
+@pytest.mark.parametrize(
+    "limits, kept",
+    [
+        pytest.param((-1.0, -1.0), [0.2, 1.0, 3.0, 9.0, np.inf], id="the scan's own"),
+        pytest.param((1.0, -1.0), [-np.inf, 1.0, 3.0, 9.0, np.inf], id="not nearer than 1 m"),
+        pytest.param((-1.0, 3.0), [0.2, 1.0, np.inf, np.inf, np.inf], id="nearer than 3 m"),
+        pytest.param((0.5, 5.0), [-np.inf, 1.0, 3.0, np.inf, np.inf], id="between"),
+        pytest.param((0.05, 50.0), [0.2, 1.0, 3.0, 9.0, np.inf], id="the lidar's own limits are the stricter ones"),
+    ],
+)
 def test_limits_leave_the_ranges_between_them(limits, kept):
     np.testing.assert_array_equal(scan([0.2, 1.0, 3.0, 9.0, 20.0]).limited(*limits).ranges_m, kept)
 
@@ -92,31 +101,62 @@ def test_a_limited_scan_says_so_and_leaves_the_other_as_it_is():
     np.testing.assert_array_equal(whole.ranges_m, [0.2, 9.0])
 
 
-@pytest.mark.parametrize("limits, text", [
-    ((12.0, -1.0), "scan at 12.345 s: no range is left between 12 m and 10 m"),
-    ((-1.0, 0.05), "scan at 12.345 s: no range is left between 0.1 m and 0.05 m"),
-    ((-1.0, 0.0), "scan at 12.345 s: no range is left between 0.1 m and 0 m")])
+@pytest.mark.parametrize(
+    "limits, text",
+    [
+        ((12.0, -1.0), "scan at 12.345 s: no range is left between 12 m and 10 m"),
+        ((-1.0, 0.05), "scan at 12.345 s: no range is left between 0.1 m and 0.05 m"),
+        ((-1.0, 0.0), "scan at 12.345 s: no range is left between 0.1 m and 0 m"),
+    ],
+)
 def test_limits_that_leave_nothing_are_refused_in_one_line(limits, text):
     with pytest.raises(ScanError) as err:
         scan([1.0]).limited(*limits)
     assert str(err.value) == text
 
 
-@pytest.mark.parametrize("fields, text", [
-    (dict(ranges_m=[]), "no ranges, a scan needs at least 1"),
-    (dict(angle_increment_rad=0.0), "angle_increment must be finite and not 0 rad, got 0.0"),
-    (dict(angle_increment_rad=np.nan), "angle_increment must be finite and not 0 rad, got nan"),
-    (dict(angle_min_rad=np.inf), "angle_min must be finite, got inf"),
-    (dict(range_max_m=0.0), "range_max must be finite and > 0 m, got 0.0"),
-    (dict(range_max_m=np.inf), "range_max must be finite and > 0 m, got inf"),
-    (dict(range_min_m=-0.1), "range_min must be in [0, range_max = 10.0) m, got -0.1"),
-    (dict(range_min_m=10.0), "range_min must be in [0, range_max = 10.0) m, got 10.0"),
-    (dict(base_from_laser=np.zeros(2)), "the laser's pose on the robot must be finite x, y, yaw, got [0. 0.]"),
-    (dict(base_from_laser=np.array([0.0, np.nan, 0.0])),
-     "the laser's pose on the robot must be finite x, y, yaw, got [ 0. nan  0.]")])
+@pytest.mark.parametrize(
+    "fields, text",
+    [
+        (dict(ranges_m=[]), "no ranges, a scan needs at least 1"),
+        (dict(angle_increment_rad=0.0), "angle_increment must be finite and not 0 rad, got 0.0"),
+        (dict(angle_increment_rad=np.nan), "angle_increment must be finite and not 0 rad, got nan"),
+        (dict(angle_min_rad=np.inf), "angle_min must be finite, got inf"),
+        (dict(range_max_m=0.0), "range_max must be finite and > 0 m, got 0.0"),
+        (dict(range_max_m=np.inf), "range_max must be finite and > 0 m, got inf"),
+        (dict(range_min_m=-0.1), "range_min must be in [0, range_max = 10.0) m, got -0.1"),
+        (dict(range_min_m=10.0), "range_min must be in [0, range_max = 10.0) m, got 10.0"),
+        (dict(base_from_laser=np.zeros(2)), "the laser's pose on the robot must be finite x, y, yaw, got [0. 0.]"),
+        (
+            dict(base_from_laser=np.array([0.0, np.nan, 0.0])),
+            "the laser's pose on the robot must be finite x, y, yaw, got [ 0. nan  0.]",
+        ),
+    ],
+)
 def test_what_describes_no_lidar_is_refused_in_one_line(fields, text):
-    good = dict(stamp_ns=STAMP_NS, ranges_m=[1.0, 2.0], angle_min_rad=0.0, angle_increment_rad=0.1,
-                range_min_m=0.1, range_max_m=10.0, base_from_laser=HERE)
+    good = dict(
+        stamp_ns=STAMP_NS,
+        ranges_m=[1.0, 2.0],
+        angle_min_rad=0.0,
+        angle_increment_rad=0.1,
+        range_min_m=0.1,
+        range_max_m=10.0,
+        base_from_laser=HERE,
+    )
     with pytest.raises(ScanError) as err:
         scan_from_fields(**{**good, **fields})
     assert str(err.value) == f"scan at 12.345 s: {text}"
+
+
+def test_beams_are_chosen_evenly_over_those_that_are_understood():
+    case = np.zeros(360, np.uint8)
+    case[90:270] = 3
+    chosen = spread_evenly(case, 60)
+    assert len(chosen) == 60 and len(set(chosen)) == 60
+    assert chosen[0] == 90 and chosen[-1] == 269
+    assert set(np.diff(chosen)) == {3, 4}  # 179 beams in 59 strides
+
+
+def test_few_beams_are_all_chosen():
+    np.testing.assert_array_equal(spread_evenly(np.array([0, 1, 0, 4, 2]), 60), [1, 3, 4])
+    assert len(spread_evenly(np.zeros(8), 60)) == 0

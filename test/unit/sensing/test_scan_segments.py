@@ -23,8 +23,9 @@ def ranges_in_room(origin, bearing):
     return np.where(np.abs(ray) > 1e-12, there, np.inf).min(axis=1)
 
 
-def room_scan(base=(1.3, 1.1, 0.4), beams=360, rng=None, sigma_m=0.0, base_from_laser=(0.1, 0.05, 0.2),
-              field_deg=360.0):
+def room_scan(
+    base=(1.3, 1.1, 0.4), beams=360, rng=None, sigma_m=0.0, base_from_laser=(0.1, 0.05, 0.2), field_deg=360.0
+):
     angles_rad = np.radians(np.linspace(-field_deg / 2, field_deg / 2, beams, endpoint=field_deg < 360.0))
     laser = se2.compose(np.array(base), np.array(base_from_laser))
     ranges_m = ranges_in_room(laser[:2], angles_rad + laser[2])
@@ -97,8 +98,9 @@ def test_the_end_of_a_wall_and_what_is_behind_it_are_not_joined():
     angles_rad = np.radians(np.linspace(-80.0, 80.0, 321))
     x = np.where(np.abs(np.tan(angles_rad) * 2.0) < 0.5, 6.0, 2.0)  # a gap of 1 m in a wall 2 m ahead
     found = scan_segments.extract(Scan(0, x / np.cos(angles_rad), angles_rad, 0.05, 30.0, np.zeros(3)))
-    heading = np.abs(np.arctan2(found.segments_m[:, 3] - found.segments_m[:, 1],
-                                found.segments_m[:, 2] - found.segments_m[:, 0]))
+    heading = np.abs(
+        np.arctan2(found.segments_m[:, 3] - found.segments_m[:, 1], found.segments_m[:, 2] - found.segments_m[:, 0])
+    )
     assert len(found) == 3
     np.testing.assert_allclose(heading, np.pi / 2, atol=1e-6)
     assert found.segments_m[:, 0] == pytest.approx([2.0, 6.0, 2.0], abs=1e-6)
@@ -119,10 +121,14 @@ def test_a_scan_without_walls_has_no_segments(ranges_m):
     assert len(found) == 0 and found.covariance.shape == (0, 2, 2) and found.beam_segment.tolist() == [-1] * 3
 
 
-@pytest.mark.parametrize("fields, line", [
-    ({"gap_m": 0.0}, "gap_m must be finite and > 0 m, got 0.0"),
-    ({"bearing_sigma_rad": -1.0}, "bearing_sigma_rad must be finite and >= 0, got -1.0"),
-    ({"least_points": 2}, "least_points must be >= 3, got 2")])
+@pytest.mark.parametrize(
+    "fields, line",
+    [
+        ({"gap_m": 0.0}, "gap_m must be finite and > 0 m, got 0.0"),
+        ({"bearing_sigma_rad": -1.0}, "bearing_sigma_rad must be finite and >= 0, got -1.0"),
+        ({"least_points": 2}, "least_points must be >= 3, got 2"),
+    ],
+)
 def test_parameters_that_mean_nothing_are_refused(fields, line):
     with pytest.raises(ValueError) as refused:
         ScanSegmentParams(**fields)

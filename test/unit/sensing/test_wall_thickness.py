@@ -22,19 +22,19 @@ def thickness_of(occupied, resolution_m=CELL_M):
 
 def wall(cells, across=60, along=60):
     occupied = np.zeros((along, across), bool)
-    occupied[:, 20:20 + cells] = True
+    occupied[:, 20 : 20 + cells] = True
     return occupied
 
 
 @pytest.mark.parametrize("cells", [1, 3, 5, 7, 9, 15])
 def test_every_cell_of_a_wall_knows_how_thick_the_wall_is(cells):
     thickness_m = thickness_of(wall(cells))
-    np.testing.assert_allclose(thickness_m[10:-10, 20:20 + cells], cells * CELL_M, rtol=1e-5)
+    np.testing.assert_allclose(thickness_m[10:-10, 20 : 20 + cells], cells * CELL_M, rtol=1e-5)
 
 
 @pytest.mark.parametrize("cells", [2, 4, 6])
 def test_an_even_wall_has_no_middle_cell_and_is_a_cell_off_at_most(cells):
-    thickness_m = thickness_of(wall(cells))[10:-10, 20:20 + cells]
+    thickness_m = thickness_of(wall(cells))[10:-10, 20 : 20 + cells]
     assert np.all(np.abs(thickness_m - cells * CELL_M) <= CELL_M + 1e-6)
 
 

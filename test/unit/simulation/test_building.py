@@ -10,26 +10,33 @@ LINE = np.array([[0.0, 0.0], [2.0, 0.0]])
 SQUARE = np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0], [0.0, 0.0]])
 
 
-@pytest.mark.parametrize("make, text", [
-    (lambda: Wall(LINE[:1]), "wall has 1 point, a wall needs at least 2"),
-    (lambda: Wall(np.zeros((2, 3))), r"wall must have points of \[x, y\], got shape \(2, 3\)"),
-    (lambda: Wall(LINE, thickness_m=0.0), "wall thickness must be > 0 m, got 0.0"),
-    (lambda: Wall(LINE, reflectance=1.2), "wall reflectance must be > 0 and <= 1, got 1.2"),
-    (lambda: Wall(LINE, thickness_m=np.nan), "wall thickness must be > 0 m, got nan"),
-    (lambda: Pane(SQUARE), "pane has 5 points, a pane needs 2"),
-    (lambda: Pane(LINE[[0, 0]]), r"pane has no length at \[0.0, 0.0\]: two points one after the other are the same"),
-    (lambda: Pane(LINE * np.nan), r"pane has the point \[nan, nan\], coordinates must be finite"),
-    (lambda: Pane(LINE, glazing="triple"), "pane glazing must be single or double, got 'triple'"),
-    (lambda: Pane(LINE, gap_m=0.1), r"pane gap must be > 0 and < 0.1 m \(else they are two panes\), got 0.1"),
-    (lambda: Pane(LINE, coating=-1.0), "pane coating must be > 0, got -1.0"),
-    (lambda: Pane(LINE, dirt=0.5), "pane dirt must be 0 to 0.1, got 0.5"),
-    (lambda: Mirror(LINE, reflectance=0.0), "mirror reflectance must be > 0 and <= 1, got 0.0"),
-    (lambda: Door(LINE, now="ajar"), "door now must be open or closed, got 'ajar'"),
-    (lambda: Door(LINE, mapped="shut"), "door mapped must be open or closed, got 'shut'"),
-    (lambda: Thing(LINE), "thing has 2 points, a thing needs at least 3"),
-    (lambda: Thing(np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]])), "thing has no area"),
-    (lambda: Person(LINE, speed_m_s=0.0), "person speed must be > 0 m/s, got 0.0"),
-    (lambda: Person(LINE, radius_m=-1.0), "person radius must be > 0 m, got -1.0")])
+@pytest.mark.parametrize(
+    "make, text",
+    [
+        (lambda: Wall(LINE[:1]), "wall has 1 point, a wall needs at least 2"),
+        (lambda: Wall(np.zeros((2, 3))), r"wall must have points of \[x, y\], got shape \(2, 3\)"),
+        (lambda: Wall(LINE, thickness_m=0.0), "wall thickness must be > 0 m, got 0.0"),
+        (lambda: Wall(LINE, reflectance=1.2), "wall reflectance must be > 0 and <= 1, got 1.2"),
+        (lambda: Wall(LINE, thickness_m=np.nan), "wall thickness must be > 0 m, got nan"),
+        (lambda: Pane(SQUARE), "pane has 5 points, a pane needs 2"),
+        (
+            lambda: Pane(LINE[[0, 0]]),
+            r"pane has no length at \[0.0, 0.0\]: two points one after the other are the same",
+        ),
+        (lambda: Pane(LINE * np.nan), r"pane has the point \[nan, nan\], coordinates must be finite"),
+        (lambda: Pane(LINE, glazing="triple"), "pane glazing must be single or double, got 'triple'"),
+        (lambda: Pane(LINE, gap_m=0.1), r"pane gap must be > 0 and < 0.1 m \(else they are two panes\), got 0.1"),
+        (lambda: Pane(LINE, coating=-1.0), "pane coating must be > 0, got -1.0"),
+        (lambda: Pane(LINE, dirt=0.5), "pane dirt must be 0 to 0.1, got 0.5"),
+        (lambda: Mirror(LINE, reflectance=0.0), "mirror reflectance must be > 0 and <= 1, got 0.0"),
+        (lambda: Door(LINE, now="ajar"), "door now must be open or closed, got 'ajar'"),
+        (lambda: Door(LINE, mapped="shut"), "door mapped must be open or closed, got 'shut'"),
+        (lambda: Thing(LINE), "thing has 2 points, a thing needs at least 3"),
+        (lambda: Thing(np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]])), "thing has no area"),
+        (lambda: Person(LINE, speed_m_s=0.0), "person speed must be > 0 m/s, got 0.0"),
+        (lambda: Person(LINE, radius_m=-1.0), "person radius must be > 0 m, got -1.0"),
+    ],
+)
 def test_a_part_that_cannot_be_is_refused_in_one_line(make, text):
     with pytest.raises(ValueError, match=f"^{text}$"):
         make()
@@ -87,8 +94,12 @@ def test_distances_are_to_the_nearest_point_of_a_segment():
 def furnished():
     things = [Thing(box(x, y, 0.5, 0.5), movable=True) for x in (1.5, 4.0, 6.5) for y in (6.0, 7.0)]
     fixed = (Thing(box(7.0, 2.0, 1.0, 0.5)), Thing(box(5.0, 4.0, 0.4, 0.4), mapped=False, movable=True))
-    return Building((Wall(SQUARE, 0.2),), panes=(Pane(np.array([[0.1, 5.0], [7.9, 5.0]])),), things=(*things, *fixed),
-                    paths={"low": np.array([[1.0, 1.0], [7.0, 1.0]]), "high": np.array([[1.0, 5.3], [1.2, 5.3]])})
+    return Building(
+        (Wall(SQUARE, 0.2),),
+        panes=(Pane(np.array([[0.1, 5.0], [7.9, 5.0]])),),
+        things=(*things, *fixed),
+        paths={"low": np.array([[1.0, 1.0], [7.0, 1.0]]), "high": np.array([[1.0, 5.3], [1.2, 5.3]])},
+    )
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -96,7 +107,7 @@ def test_moved_furniture_is_gone_from_its_place_and_stands_elsewhere_in_its_room
     before = furnished()
     after = before.changed(0.5, np.random.default_rng(seed))
     gone = [thing for thing in after.things if not thing.present]
-    new = after.things[len(before.things):]
+    new = after.things[len(before.things) :]
     assert len(gone) == 3 and all(thing.mapped for thing in gone)
     assert 1 <= len(new) <= 3 and all(not thing.mapped and thing.present and thing.movable for thing in new)
     surfaces = Building(after.walls, after.panes, things=tuple(t for t in after.things if t.present)).surfaces
@@ -129,8 +140,12 @@ def test_what_finds_no_place_has_left_the_building():
 
 
 def test_in_an_opaque_building_film_is_on_every_pane_and_mirror():
-    glass = Building((Wall(LINE + 4.0),), panes=(Pane(LINE), Pane(LINE + 1.0, glazing="double")),
-                     mirrors=(Mirror(LINE + 2.0),), name="shop")
+    glass = Building(
+        (Wall(LINE + 4.0),),
+        panes=(Pane(LINE), Pane(LINE + 1.0, glazing="double")),
+        mirrors=(Mirror(LINE + 2.0),),
+        name="shop",
+    )
     opaque = glass.opaque()
     assert (opaque.surfaces.kind == OPAQUE).all() and opaque.name == "shop"
     assert len(opaque.surfaces.kind) == 4 + 3

@@ -16,6 +16,7 @@ PATHS = "paths:\n  across: [[1, 1], [3, 1]]\n"
 @pytest.fixture
 def load(tmp_path):
     """load(text): the Building in maps/lab/building.yaml of a text."""
+
     def load_text(text):
         path = tmp_path / "lab" / "building.yaml"
         path.parent.mkdir(exist_ok=True)
@@ -28,13 +29,14 @@ def load(tmp_path):
 @pytest.fixture
 def error(load, tmp_path):
     """error(text): the one line that refuses it, without the folder."""
+
     def error_of(text):
         with pytest.raises(BuildingError) as caught:
             load(text)
         line = str(caught.value)
         assert "\n" not in line
         assert line.startswith(f"{tmp_path}/lab/building.yaml: ")
-        return line[len(f"{tmp_path}/lab/building.yaml: "):]
+        return line[len(f"{tmp_path}/lab/building.yaml: ") :]
 
     return error_of
 
@@ -80,9 +82,14 @@ start: [1, 1, 90]
     assert table.outline_m.min(axis=0) == pytest.approx([1.6, 3.2])
     assert table.reflectance == MATERIALS["black"]
     assert [(t.mapped, t.present, t.movable) for t in (table, corner, new, gone)] == [
-        (True, True, True), (True, True, False), (False, True, False), (True, False, False)]
+        (True, True, True),
+        (True, True, False),
+        (False, True, False),
+        (True, False, False),
+    ]
     assert [post.outline_m.mean(axis=0).tolist() for post in posts] == [
-        pytest.approx(at) for at in ([1, 2], [3, 2], [5, 2], [1, 3], [5, 3])]  # 4 m hold two fields of about 1.9 m
+        pytest.approx(at) for at in ([1, 2], [3, 2], [5, 2], [1, 3], [5, 3])
+    ]  # 4 m hold two fields of about 1.9 m
     assert posts[0].outline_m.max() - 5.0 < 0.05 + 1e-9 and posts[0].reflectance == MATERIALS["metal"]
     assert building.people[0].speed_m_s == 1.5 and building.people[0].radius_m == 0.3
     assert building.seen_m.tolist() == [[2, 2.5], [2, 5]]
@@ -92,13 +99,18 @@ start: [1, 1, 90]
 
 
 def test_the_whole_building_may_be_placed_and_turned(load):
-    building = load("placed: [10, 20, 90]\nstart: [1, 0, 10]\n" + WALLS + PATHS + """
+    building = load(
+        "placed: [10, 20, 90]\nstart: [1, 0, 10]\n"
+        + WALLS
+        + PATHS
+        + """
 furniture:
   - {box: [2, 1, 1, 0.4]}
 mullions:
   - {points: [[3, 0]]}
 seen: [[2, 2]]
-""")
+"""
+    )
     np.testing.assert_allclose(building.walls[0].line_m[1], [10, 24], atol=1e-12)
     np.testing.assert_allclose(building.paths["across"], [[9, 21], [9, 23]])
     np.testing.assert_allclose(building.seen_m, [[8, 22]])
@@ -113,10 +125,15 @@ def test_without_a_start_the_robot_stands_at_the_first_path_and_looks_along_it(l
 
 
 def test_tags_hang_in_the_building_wherever_it_is_placed(load):
-    building = load("placed: [10, 20, 90]\n" + WALLS + PATHS + """tags:
+    building = load(
+        "placed: [10, 20, 90]\n"
+        + WALLS
+        + PATHS
+        + """tags:
   - {id: A, position: [1, 2], facing_deg: 135}
   - {id: 8, position: [3, 0], range: 5}
-""")
+"""
+    )
     assert building.tags.ids == ("A", "8")
     np.testing.assert_allclose(building.tags.positions_m, [[8, 21], [10, 23]], atol=1e-12)
     np.testing.assert_allclose(np.degrees(building.tags.facing_rad), [-135, np.nan])
@@ -132,74 +149,107 @@ def test_a_start_alone_will_do(load):
 POINTS = "two points one after the other are the same"
 
 
-@pytest.mark.parametrize("text, line", [
-    ("", "is empty; a building needs walls, and a path or a start"),
-    ("# nothing yet\n", "is empty; a building needs walls, and a path or a start"),
-    ("- 1\n", f"is no building: expected the keys {', '.join(building_file.SECTIONS)}"),
-    ("walls: []\n", "has no walls; a building needs at least one"),
-    (PATHS, "has no walls; a building needs at least one"),
-    (WALLS, "has no paths and no start; a building needs one of them"),
-    (WALLS + "wals: []\n", "unknown key 'wals'; did you mean walls?"),
-    (WALLS + "7: []\n", f"unknown key 7; known are {', '.join(building_file.SECTIONS)}"),
-    (WALLS + "panes: 3\n", "panes must be a list, got 3"),
-    (WALLS + "panes: [3]\n", "pane 1 must have keys of line, thickness, coating, glazing, gap, dirt, got 3"),
-    (WALLS + "panes: [{line: [[0, 0], [1, 0]]}, {line: [[0, 0], [1, 1]]}, {line: [[1, 1]]}]\n",
-     "pane 3 has 1 point, a pane needs 2"),
-    (WALLS + "panes: [{line: []}]\n", "pane 1 has 0 points, a pane needs 2"),
-    (WALLS + "panes: [{thickness: 0.01}]\n", "pane 1 has no line"),
-    (WALLS + "panes: [{line: [[1, 1], [1, 1]]}]\n", f"pane 1 has no length at [1.0, 1.0]: {POINTS}"),
-    (WALLS + "panes: [{line: [[1, 1], [.nan, 1]]}]\n", "pane 1 has the point [nan, 1.0], coordinates must be finite"),
-    (WALLS + "panes: [{line: [[1, 1], [2, '1']]}]\n", "pane 1 has the point [2, '1'], a point is [x, y] in m"),
-    (WALLS + "panes: [{line: [[1, 1], 2]}]\n", "pane 1 has the point 2, a point is [x, y] in m"),
-    (WALLS + "panes: [{line: [[1, 1], [1, 2, 3]]}]\n", "pane 1 has the point [1, 2, 3], a point is [x, y] in m"),
-    (WALLS + "panes: [{line: 5}]\n", "pane 1 line must be a list of points [x, y], got 5"),
-    (WALLS + "panes: [{line: [[0, 0], [1, 0]], thicknes: 1}]\n",
-     "pane 1 has unknown key 'thicknes'; did you mean thickness?"),
-    (WALLS + "panes: [{line: [[0, 0], [1, 0]], thickness: 0}]\n", "pane 1 thickness must be > 0 m, got 0.0"),
-    (WALLS + "panes: [{line: [[0, 0], [1, 0]], thickness: thin}]\n",
-     "pane 1 thickness must be a finite number, got 'thin'"),
-    (WALLS + "panes: [{line: [[0, 0], [1, 0]], coating: .inf}]\n",
-     "pane 1 coating must be a finite number, got inf"),
-    (WALLS + "panes: [{line: [[0, 0], [1, 0]], glazing: tripel}]\n",
-     "pane 1 glazing must be single or double, got 'tripel'"),
-    (WALLS + "panes: [{line: [[0, 0], [1, 0]], glazing: double, gap: 0.2}]\n",
-     "pane 1 gap must be > 0 and < 0.1 m (else they are two panes), got 0.2"),
-    ("walls: [{line: [[0, 0], [1, 0]], reflectance: brick}]\n",
-     f"wall 1 reflectance must be a number or one of {', '.join(MATERIALS)}, got 'brick'"),
-    ("walls: [{line: [[0, 0], [1, 0]], reflectance: 3}]\n", "wall 1 reflectance must be > 0 and <= 1, got 3.0"),
-    ("walls: [{line: [[0, 0]]}]\n", "wall 1 has 1 point, a wall needs at least 2"),
-    (WALLS + "doors: [{line: [[0, 0], [1, 0]], now: ajar}]\n", "door 1 now must be open or closed, got 'ajar'"),
-    (WALLS + "mirrors: [{line: [[0, 0], [1, 0], [2, 0]]}]\n", "mirror 1 has 3 points, a mirror needs 2"),
-    (WALLS + "furniture: [{yaw_deg: 3}]\n",
-     "furniture 1 needs either box: [x, y, length, width] or outline: [[x, y], ...]"),
-    (WALLS + "furniture: [{outline: [[0, 0], [1, 0], [1, 1]], yaw_deg: 3}]\n",
-     "furniture 1 yaw_deg goes with a box only"),
-    (WALLS + "furniture: [{outline: [[0, 0], [1, 0]]}]\n", "furniture 1 has 2 points, a thing needs at least 3"),
-    (WALLS + "furniture: [{outline: [[0, 0], [1, 0], [2, 0]]}]\n", "furniture 1 has no area"),
-    (WALLS + "furniture: [{box: [1, 1, 2]}]\n", "furniture 1 box must be [x, y, length, width] in m, got [1, 1, 2]"),
-    (WALLS + "furniture: [{box: [1, 1, 2, 0]}]\n",
-     "furniture 1 box must have length and width > 0 m, got [1, 1, 2, 0]"),
-    (WALLS + "unmapped: [{box: [1, 1, 2, x]}]\n", "unmapped 1 box must be a finite number, got 'x'"),
-    (WALLS + "furniture: [{box: [1, 1, 2, 1], movable: 1}]\n", "furniture 1 movable must be true or false, got 1"),
-    (WALLS + "gone: [{box: [1, 1, 2, 1], movable: true}]\n",
-     "gone 1 has unknown key 'movable'; known are box, yaw_deg, outline, reflectance"),
-    (WALLS + "mullions: [{line: [[0, 0], [1, 0]], every: 0}]\n", "mullion 1 every must be > 0 m, got 0.0"),
-    (WALLS + "mullions: [{line: [[0, 0]]}]\n", "mullion 1 has 1 point, a mullion needs 2"),
-    (WALLS + "mullions: [{every: 1}]\n",
-     "mullion 1 needs either line: [[x, y], [x, y]] with every, or points: [[x, y], ...]"),
-    (WALLS + "people: [{waypoints: [[0, 0], [1, 0]], speed: -1}]\n", "person 1 speed must be > 0 m/s, got -1.0"),
-    (WALLS + "people: [{waypoints: [[0, 0]]}]\n", "person 1 has 1 point, a person needs at least 2"),
-    (WALLS + "paths: [[0, 0], [1, 0]]\n", "paths must be name: [[x, y], ...], got [[0, 0], [1, 0]]"),
-    (WALLS + "paths:\n  short: [[0, 0]]\n", "path short has 1 point, a path needs at least 2"),
-    (WALLS + "paths:\n  still: [[1, 0], [1, 0]]\n", f"path still has no length at [1.0, 0.0]: {POINTS}"),
-    (WALLS + "paths:\n  odd: [[0, 0], [1, true]]\n", "path odd has the point [1, True], a point is [x, y] in m"),
-    (WALLS + PATHS + "tags: 3\n", "tags must be a list, got 3"),
-    (WALLS + PATHS + "tags: [{id: A}]\n", "tags: landmark 1 (A) position must be [x, y] in m, got None"),
-    (WALLS + "start: [1, 2]\n", "start must be [x, y, yaw_deg] in m, m, degrees, got [1, 2]"),
-    (WALLS + "start: [1, 2, east]\n", "start must be a finite number, got 'east'"),
-    (WALLS + PATHS + "placed: 3\n", "placed must be [x, y, yaw_deg] in m, m, degrees, got 3"),
-    (WALLS + PATHS + "seen: [[1, .inf]]\n", "seen has the point [1.0, inf], coordinates must be finite"),
-])
+@pytest.mark.parametrize(
+    "text, line",
+    [
+        ("", "is empty; a building needs walls, and a path or a start"),
+        ("# nothing yet\n", "is empty; a building needs walls, and a path or a start"),
+        ("- 1\n", f"is no building: expected the keys {', '.join(building_file.SECTIONS)}"),
+        ("walls: []\n", "has no walls; a building needs at least one"),
+        (PATHS, "has no walls; a building needs at least one"),
+        (WALLS, "has no paths and no start; a building needs one of them"),
+        (WALLS + "wals: []\n", "unknown key 'wals'; did you mean walls?"),
+        (WALLS + "7: []\n", f"unknown key 7; known are {', '.join(building_file.SECTIONS)}"),
+        (WALLS + "panes: 3\n", "panes must be a list, got 3"),
+        (WALLS + "panes: [3]\n", "pane 1 must have keys of line, thickness, coating, glazing, gap, dirt, got 3"),
+        (
+            WALLS + "panes: [{line: [[0, 0], [1, 0]]}, {line: [[0, 0], [1, 1]]}, {line: [[1, 1]]}]\n",
+            "pane 3 has 1 point, a pane needs 2",
+        ),
+        (WALLS + "panes: [{line: []}]\n", "pane 1 has 0 points, a pane needs 2"),
+        (WALLS + "panes: [{thickness: 0.01}]\n", "pane 1 has no line"),
+        (WALLS + "panes: [{line: [[1, 1], [1, 1]]}]\n", f"pane 1 has no length at [1.0, 1.0]: {POINTS}"),
+        (
+            WALLS + "panes: [{line: [[1, 1], [.nan, 1]]}]\n",
+            "pane 1 has the point [nan, 1.0], coordinates must be finite",
+        ),
+        (WALLS + "panes: [{line: [[1, 1], [2, '1']]}]\n", "pane 1 has the point [2, '1'], a point is [x, y] in m"),
+        (WALLS + "panes: [{line: [[1, 1], 2]}]\n", "pane 1 has the point 2, a point is [x, y] in m"),
+        (WALLS + "panes: [{line: [[1, 1], [1, 2, 3]]}]\n", "pane 1 has the point [1, 2, 3], a point is [x, y] in m"),
+        (WALLS + "panes: [{line: 5}]\n", "pane 1 line must be a list of points [x, y], got 5"),
+        (
+            WALLS + "panes: [{line: [[0, 0], [1, 0]], thicknes: 1}]\n",
+            "pane 1 has unknown key 'thicknes'; did you mean thickness?",
+        ),
+        (WALLS + "panes: [{line: [[0, 0], [1, 0]], thickness: 0}]\n", "pane 1 thickness must be > 0 m, got 0.0"),
+        (
+            WALLS + "panes: [{line: [[0, 0], [1, 0]], thickness: thin}]\n",
+            "pane 1 thickness must be a finite number, got 'thin'",
+        ),
+        (
+            WALLS + "panes: [{line: [[0, 0], [1, 0]], coating: .inf}]\n",
+            "pane 1 coating must be a finite number, got inf",
+        ),
+        (
+            WALLS + "panes: [{line: [[0, 0], [1, 0]], glazing: tripel}]\n",
+            "pane 1 glazing must be single or double, got 'tripel'",
+        ),
+        (
+            WALLS + "panes: [{line: [[0, 0], [1, 0]], glazing: double, gap: 0.2}]\n",
+            "pane 1 gap must be > 0 and < 0.1 m (else they are two panes), got 0.2",
+        ),
+        (
+            "walls: [{line: [[0, 0], [1, 0]], reflectance: brick}]\n",
+            f"wall 1 reflectance must be a number or one of {', '.join(MATERIALS)}, got 'brick'",
+        ),
+        ("walls: [{line: [[0, 0], [1, 0]], reflectance: 3}]\n", "wall 1 reflectance must be > 0 and <= 1, got 3.0"),
+        ("walls: [{line: [[0, 0]]}]\n", "wall 1 has 1 point, a wall needs at least 2"),
+        (WALLS + "doors: [{line: [[0, 0], [1, 0]], now: ajar}]\n", "door 1 now must be open or closed, got 'ajar'"),
+        (WALLS + "mirrors: [{line: [[0, 0], [1, 0], [2, 0]]}]\n", "mirror 1 has 3 points, a mirror needs 2"),
+        (
+            WALLS + "furniture: [{yaw_deg: 3}]\n",
+            "furniture 1 needs either box: [x, y, length, width] or outline: [[x, y], ...]",
+        ),
+        (
+            WALLS + "furniture: [{outline: [[0, 0], [1, 0], [1, 1]], yaw_deg: 3}]\n",
+            "furniture 1 yaw_deg goes with a box only",
+        ),
+        (WALLS + "furniture: [{outline: [[0, 0], [1, 0]]}]\n", "furniture 1 has 2 points, a thing needs at least 3"),
+        (WALLS + "furniture: [{outline: [[0, 0], [1, 0], [2, 0]]}]\n", "furniture 1 has no area"),
+        (
+            WALLS + "furniture: [{box: [1, 1, 2]}]\n",
+            "furniture 1 box must be [x, y, length, width] in m, got [1, 1, 2]",
+        ),
+        (
+            WALLS + "furniture: [{box: [1, 1, 2, 0]}]\n",
+            "furniture 1 box must have length and width > 0 m, got [1, 1, 2, 0]",
+        ),
+        (WALLS + "unmapped: [{box: [1, 1, 2, x]}]\n", "unmapped 1 box must be a finite number, got 'x'"),
+        (WALLS + "furniture: [{box: [1, 1, 2, 1], movable: 1}]\n", "furniture 1 movable must be true or false, got 1"),
+        (
+            WALLS + "gone: [{box: [1, 1, 2, 1], movable: true}]\n",
+            "gone 1 has unknown key 'movable'; known are box, yaw_deg, outline, reflectance",
+        ),
+        (WALLS + "mullions: [{line: [[0, 0], [1, 0]], every: 0}]\n", "mullion 1 every must be > 0 m, got 0.0"),
+        (WALLS + "mullions: [{line: [[0, 0]]}]\n", "mullion 1 has 1 point, a mullion needs 2"),
+        (
+            WALLS + "mullions: [{every: 1}]\n",
+            "mullion 1 needs either line: [[x, y], [x, y]] with every, or points: [[x, y], ...]",
+        ),
+        (WALLS + "people: [{waypoints: [[0, 0], [1, 0]], speed: -1}]\n", "person 1 speed must be > 0 m/s, got -1.0"),
+        (WALLS + "people: [{waypoints: [[0, 0]]}]\n", "person 1 has 1 point, a person needs at least 2"),
+        (WALLS + "paths: [[0, 0], [1, 0]]\n", "paths must be name: [[x, y], ...], got [[0, 0], [1, 0]]"),
+        (WALLS + "paths:\n  short: [[0, 0]]\n", "path short has 1 point, a path needs at least 2"),
+        (WALLS + "paths:\n  still: [[1, 0], [1, 0]]\n", f"path still has no length at [1.0, 0.0]: {POINTS}"),
+        (WALLS + "paths:\n  odd: [[0, 0], [1, true]]\n", "path odd has the point [1, True], a point is [x, y] in m"),
+        (WALLS + PATHS + "tags: 3\n", "tags must be a list, got 3"),
+        (WALLS + PATHS + "tags: [{id: A}]\n", "tags: landmark 1 (A) position must be [x, y] in m, got None"),
+        (WALLS + "start: [1, 2]\n", "start must be [x, y, yaw_deg] in m, m, degrees, got [1, 2]"),
+        (WALLS + "start: [1, 2, east]\n", "start must be a finite number, got 'east'"),
+        (WALLS + PATHS + "placed: 3\n", "placed must be [x, y, yaw_deg] in m, m, degrees, got 3"),
+        (WALLS + PATHS + "seen: [[1, .inf]]\n", "seen has the point [1.0, inf], coordinates must be finite"),
+    ],
+)
 def test_what_cannot_be_meant_is_refused_in_one_line(error, text, line):
     assert error(text) == line
 

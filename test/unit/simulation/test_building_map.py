@@ -66,10 +66,14 @@ def test_double_glazing_is_drawn_as_one_surface(gap_m):
 
 
 def test_the_map_knows_what_was_there_and_not_what_came():
-    building = Building((ROOM,), things=(
-        Thing(box(1.5, 3.0, 0.5, 0.5), present=False), Thing(box(3.0, 3.0, 0.5, 0.5), mapped=False)), doors=(
-        Door(np.array([[4.0, 0.0], [4.0, 4.03]]), mapped="open", now="closed"),), mirrors=(
-        Mirror(np.array([[5.0, 1.0], [5.0, 3.0]])),), paths=PATH, start=START)
+    building = Building(
+        (ROOM,),
+        things=(Thing(box(1.5, 3.0, 0.5, 0.5), present=False), Thing(box(3.0, 3.0, 0.5, 0.5), mapped=False)),
+        doors=(Door(np.array([[4.0, 0.0], [4.0, 4.03]]), mapped="open", now="closed"),),
+        mirrors=(Mirror(np.array([[5.0, 1.0], [5.0, 3.0]])),),
+        paths=PATH,
+        start=START,
+    )
     grid = building_map.draw(building)
     assert along(grid, (0.5, 3.0), (2.5, 3.0)) == [FREE, WALL, UNKNOWN, WALL, FREE]
     assert along(grid, (2.5, 3.0), (4.6, 3.0)) == [FREE]
@@ -108,8 +112,15 @@ def test_redraw_writes_the_map_beside_the_building(tmp_path):
 
 
 def test_seven_buildings_ship():
-    assert SHIPPED == ["changed_rooms", "double_glazing", "glass_atrium", "glass_bridge", "glass_office", "glass_wedge",
-                       "opaque_office"]
+    assert SHIPPED == [
+        "changed_rooms",
+        "double_glazing",
+        "glass_atrium",
+        "glass_bridge",
+        "glass_office",
+        "glass_wedge",
+        "opaque_office",
+    ]
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -133,8 +144,9 @@ def test_paths_of_the_shipped_buildings_are_free_and_those_of_a_real_drive(name)
     for path in building.paths.values():
         legs = np.hypot(*np.diff(path, axis=0).T)
         lengths.append(legs.sum())
-        points = np.concatenate([np.linspace(a, b, int(leg / 0.05) + 2) for a, b, leg in
-                                 zip(path[:-1], path[1:], legs)])
+        points = np.concatenate(
+            [np.linspace(a, b, int(leg / 0.05) + 2) for a, b, leg in zip(path[:-1], path[1:], legs)]
+        )
         present = surfaces.present
         assert distances(points, surfaces.from_m[present], surfaces.to_m[present]).min() > 0.35
         assert grid.is_free(points).all()

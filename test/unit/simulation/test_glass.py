@@ -8,8 +8,14 @@ import pytest
 from glass_nav.simulation import glass
 
 TABLE = [  # incidence [deg], R, T squared
-    (0.0, 0.08, 0.85), (30.0, 0.08, 0.85), (45.0, 0.095, 0.82), (60.0, 0.154, 0.72), (70.0, 0.273, 0.53),
-    (75.0, 0.384, 0.38), (80.0, 0.543, 0.21)]
+    (0.0, 0.08, 0.85),
+    (30.0, 0.08, 0.85),
+    (45.0, 0.095, 0.82),
+    (60.0, 0.154, 0.72),
+    (70.0, 0.273, 0.53),
+    (75.0, 0.384, 0.38),
+    (80.0, 0.543, 0.21),
+]
 
 
 def cos(incidence_deg):
@@ -20,7 +26,7 @@ def cos(incidence_deg):
 def test_a_clear_sheet_reflects_and_passes_what_fresnel_says(incidence_deg, reflected, passed_twice):
     r, t = glass.sheet(cos(incidence_deg), 1.0, 0.0)
     assert r == pytest.approx(reflected, abs=0.006)
-    assert t ** 2 == pytest.approx(passed_twice, abs=0.012)
+    assert t**2 == pytest.approx(passed_twice, abs=0.012)
 
 
 def test_face_on_the_two_surfaces_reflect_by_the_index_alone():

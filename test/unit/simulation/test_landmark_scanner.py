@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from glass_nav.geometry import angles, se2
-from glass_nav.localization import triangulation
+from glass_nav.localization.bearings import triangulation
 from glass_nav.sensing import bearings
 from glass_nav.simulation import building_file, landmark_scanner, shipped_buildings
 from glass_nav.simulation.building import Building, Mirror, Pane, Person, Thing, Wall, box
@@ -26,8 +26,9 @@ def hall(tags: LandmarkMap = FOUR, **parts) -> Building:
 
 
 def one_tag(at=(6.0, 0.3), facing_deg=np.nan, range_m=15.0) -> LandmarkMap:
-    return LandmarkMap(("A",), np.array([at], float), np.radians([facing_deg]), np.array([np.pi / 2.0]),
-                       np.array([range_m]))
+    return LandmarkMap(
+        ("A",), np.array([at], float), np.radians([facing_deg]), np.array([np.pi / 2.0]), np.array([range_m])
+    )
 
 
 def turns(building: Building, poses, model: ScannerModel = ScannerModel(), count: int = 1):
@@ -92,23 +93,37 @@ def test_an_empty_hall_is_searched_in_coarse_moves_only():
     assert turn.bearings == () and turn.stamp_ns == pytest.approx(30 * 0.8e9)
 
 
-@pytest.mark.parametrize("parts, tag, seen", [
-    pytest.param({}, one_tag(), True, id="nothing between"),
-    pytest.param({"walls": (Wall(np.array([[3.0, -1.0], [3.0, 1.0]])),)}, one_tag(), False, id="wall"),
-    pytest.param({"things": (Thing(box(3.0, 0.1, 0.5, 0.5)),)}, one_tag(), False, id="furniture"),
-    pytest.param({"things": (Thing(box(3.0, 0.1, 0.5, 0.5), present=False),)}, one_tag(), True, id="gone furniture"),
-    pytest.param({"people": (Person(np.array([[3.0, 0.1], [3.0, 0.2]]), speed_m_s=1e-6),)}, one_tag(), False,
-                 id="somebody in the way"),
-    pytest.param({"mirrors": (Mirror(np.array([[3.0, -1.0], [3.0, 1.0]])),)}, one_tag(), False, id="mirror"),
-    pytest.param({"panes": (Pane(np.array([[3.0, -1.0], [3.0, 1.0]])),)}, one_tag(), True, id="pane"),
-    pytest.param({"panes": (Pane(np.array([[3.0, -1.0], [3.0, 1.0]])),)}, one_tag(range_m=6.2), False,
-                 id="pane, light is used up"),
-    pytest.param({}, one_tag(range_m=6.2), True, id="the same range without the pane"),
-    pytest.param({}, one_tag(range_m=5.9), False, id="out of range"),
-    pytest.param({}, one_tag(facing_deg=180.0), True, id="looks at the robot"),
-    pytest.param({}, one_tag(facing_deg=140.0), True, id="40 degrees off"),
-    pytest.param({}, one_tag(facing_deg=130.0), False, id="50 degrees off"),
-    pytest.param({}, one_tag(at=(19.9, 0.0), facing_deg=180.0, range_m=25.0), True, id="on a wall")])
+@pytest.mark.parametrize(
+    "parts, tag, seen",
+    [
+        pytest.param({}, one_tag(), True, id="nothing between"),
+        pytest.param({"walls": (Wall(np.array([[3.0, -1.0], [3.0, 1.0]])),)}, one_tag(), False, id="wall"),
+        pytest.param({"things": (Thing(box(3.0, 0.1, 0.5, 0.5)),)}, one_tag(), False, id="furniture"),
+        pytest.param(
+            {"things": (Thing(box(3.0, 0.1, 0.5, 0.5), present=False),)}, one_tag(), True, id="gone furniture"
+        ),
+        pytest.param(
+            {"people": (Person(np.array([[3.0, 0.1], [3.0, 0.2]]), speed_m_s=1e-6),)},
+            one_tag(),
+            False,
+            id="somebody in the way",
+        ),
+        pytest.param({"mirrors": (Mirror(np.array([[3.0, -1.0], [3.0, 1.0]])),)}, one_tag(), False, id="mirror"),
+        pytest.param({"panes": (Pane(np.array([[3.0, -1.0], [3.0, 1.0]])),)}, one_tag(), True, id="pane"),
+        pytest.param(
+            {"panes": (Pane(np.array([[3.0, -1.0], [3.0, 1.0]])),)},
+            one_tag(range_m=6.2),
+            False,
+            id="pane, light is used up",
+        ),
+        pytest.param({}, one_tag(range_m=6.2), True, id="the same range without the pane"),
+        pytest.param({}, one_tag(range_m=5.9), False, id="out of range"),
+        pytest.param({}, one_tag(facing_deg=180.0), True, id="looks at the robot"),
+        pytest.param({}, one_tag(facing_deg=140.0), True, id="40 degrees off"),
+        pytest.param({}, one_tag(facing_deg=130.0), False, id="50 degrees off"),
+        pytest.param({}, one_tag(at=(19.9, 0.0), facing_deg=180.0, range_m=25.0), True, id="on a wall"),
+    ],
+)
 def test_what_hides_a_tag(parts, tag, seen):
     walls = (HALL, *parts.pop("walls", ()))
     (turn,) = turns(Building(walls, tags=tag, **parts), still())
@@ -128,8 +143,9 @@ def test_a_driving_robot_takes_each_bearing_from_where_it_is_then():
 
 def test_the_simulation_tells_turns_once_in_its_own_time():
     building = hall(start=np.zeros(3))
-    simulation = Simulation(building, LidarModel(beams=3), scanner=ScannerModel(move_s=0.1),
-                            base_from_emitter=(0.2, 0.1, 0.3))
+    simulation = Simulation(
+        building, LidarModel(beams=3), scanner=ScannerModel(move_s=0.1), base_from_emitter=(0.2, 0.1, 0.3)
+    )
     for _ in range(80):
         simulation.move(0.1, np.zeros(3))
     (turn,) = simulation.take_turns()
@@ -158,13 +174,20 @@ def test_light_through_two_panes_is_the_product():
     # Fresnel, face on: r = ((n - 1) / (n + 1))^2 of each surface, R = 2 r / (1 + r), and 8 mm of glass
     r = (0.51 / 2.51) ** 2
     assert one == pytest.approx((1.0 - 2.0 * r / (1.0 + r)) * np.exp(-4.0 * 0.008), rel=1e-6)
-    assert landmark_scanner.light_between(hall(panes=panes).surfaces, origin, ahead) == pytest.approx(one ** 2)
+    assert landmark_scanner.light_between(hall(panes=panes).surfaces, origin, ahead) == pytest.approx(one**2)
 
 
-@pytest.mark.parametrize("fields, text", [
-    ({"reading_rad": np.radians(0.1)}, "a landmark scanner needs 0 < motor step <= reading step <= coarse move <= span "
-                                       "<= 360 degrees, got 0.18, 0.1, 10, 300"),
-    ({"move_s": 0.0}, "a move of a landmark scanner must take > 0 s, got 0.0")])
+@pytest.mark.parametrize(
+    "fields, text",
+    [
+        (
+            {"reading_rad": np.radians(0.1)},
+            "a landmark scanner needs 0 < motor step <= reading step <= coarse move <= span "
+            "<= 360 degrees, got 0.18, 0.1, 10, 300",
+        ),
+        ({"move_s": 0.0}, "a move of a landmark scanner must take > 0 s, got 0.0"),
+    ],
+)
 def test_a_scanner_that_cannot_be_is_refused(fields, text):
     with pytest.raises(ValueError) as caught:
         ScannerModel(**fields)

@@ -15,8 +15,16 @@ from glass_nav.simulation import glass, lidar
 from glass_nav.simulation.building import Building, Door, Mirror, Pane, Person, Thing, Wall, box
 from glass_nav.simulation.lidar import LidarModel
 
-TRANSPARENT = LidarModel(beams=3, field_of_view_rad=0.002, noise_m=0.0, dropout=0.0, specular=0.0, dirty_share=0.0,
-                         half_rad=0.0, width_rad=1e-9)
+TRANSPARENT = LidarModel(
+    beams=3,
+    field_of_view_rad=0.002,
+    noise_m=0.0,
+    dropout=0.0,
+    specular=0.0,
+    dirty_share=0.0,
+    half_rad=0.0,
+    width_rad=1e-9,
+)
 WHITE = replace(TRANSPARENT, specular=1.0, dirty_share=1.0, half_rad=np.pi)
 LASER = np.array([2.0, 5.0, 0.0])
 AHEAD_M = 17.9
@@ -48,8 +56,9 @@ def ahead(building, model=TRANSPARENT, yaw_rad=0.0, time_s=0.0, seed=0):
     """Range, case, exact and crossing of the beam in the middle, rounded to 0.1 mm; None for NaN."""
     scan = lidar.scan(model, building, LASER + [0.0, 0.0, yaw_rad], time_s, np.random.default_rng(seed))
     values = (scan.ranges_m[1], int(scan.case[1]), scan.exact_m[1], scan.crossing_m[1])
-    return tuple(None if np.isnan(value) else value if isinstance(value, int) else round(float(value), 4)
-                 for value in values)
+    return tuple(
+        None if np.isnan(value) else value if isinstance(value, int) else round(float(value), 4) for value in values
+    )
 
 
 NO_ANSWER = (np.inf, 0, None)
@@ -77,7 +86,7 @@ def test_three_panes_are_too_many():
 
 FLAT_RAD = np.deg2rad(10.0)  # 80 degrees from the normal of a pane along x
 FLAT_PANE = pane(1.0, 5.5, 19.9, 5.5)
-MET_M = round(0.5 / np.sin(FLAT_RAD), 4)   # 2.8794
+MET_M = round(0.5 / np.sin(FLAT_RAD), 4)  # 2.8794
 TABLE_M = round(9.5 / np.cos(FLAT_RAD), 4)  # 9.6466: the image of the table face at x = 11.5, y = 4.33
 
 
@@ -87,8 +96,9 @@ def test_a_flat_beam_is_mirrored():
 
 def test_what_a_mirrored_beam_ends_at_must_be_on_the_map():
     def mirrored(**flags):
-        return ahead(hall(panes=[FLAT_PANE], things=[thing(12.0, 4.3), thing(10.0, 4.55, 0.6, **flags)]),
-                     yaw_rad=FLAT_RAD)
+        return ahead(
+            hall(panes=[FLAT_PANE], things=[thing(12.0, 4.3), thing(10.0, 4.55, 0.6, **flags)]), yaw_rad=FLAT_RAD
+        )
 
     nearer_m = round(7.7 / np.cos(FLAT_RAD), 4)
     assert mirrored() == (nearer_m, 2, nearer_m, MET_M)
@@ -104,13 +114,21 @@ def test_a_beam_mirrored_behind_something_gone_is_uncertain():
 def test_mirrored_after_a_penetration_is_uncertain_and_crossed_at_the_penetration():
     """The pane across at x = 3 lets the beam through, the flat one mirrors it."""
     at_m = round(1.0 / np.cos(FLAT_RAD), 4)
-    assert ahead(hall(panes=[across(3.0), FLAT_PANE], things=[thing(12.0, 4.3)]),
-                 yaw_rad=FLAT_RAD) == (TABLE_M, 0, TABLE_M, at_m)
+    assert ahead(hall(panes=[across(3.0), FLAT_PANE], things=[thing(12.0, 4.3)]), yaw_rad=FLAT_RAD) == (
+        TABLE_M,
+        0,
+        TABLE_M,
+        at_m,
+    )
 
 
 def test_a_penetration_after_a_mirror_is_uncertain_and_crossed_at_the_mirror():
-    assert ahead(hall(panes=[pane(7.0, 0.0, 7.0, 5.4), FLAT_PANE], things=[thing(12.0, 4.3)]),
-                 yaw_rad=FLAT_RAD) == (TABLE_M, 0, TABLE_M, MET_M)
+    assert ahead(hall(panes=[pane(7.0, 0.0, 7.0, 5.4), FLAT_PANE], things=[thing(12.0, 4.3)]), yaw_rad=FLAT_RAD) == (
+        TABLE_M,
+        0,
+        TABLE_M,
+        MET_M,
+    )
 
 
 def test_a_pane_seen_in_a_mirror_is_a_mirrored_surface():
@@ -131,8 +149,8 @@ def test_at_60_degrees_the_mirrored_wall_wins_if_the_one_behind_is_5_and_a_half_
     """R = 0.154, T = 0.846: R^2 / d2^2 > T^2 / d3^2 from d3 / d2 = 5.5, both walls face on."""
     along = np.array([np.cos(np.pi / 6), np.sin(np.pi / 6)])  # the pane lies at 30 degrees to the beam
     met = np.array([4.0, 5.0])
-    mirrored = np.array([0.5, np.sqrt(3.0) / 2.0])            # the beam turned by 60 degrees
-    at = met + 0.4 * mirrored                                 # d2 = 2.4
+    mirrored = np.array([0.5, np.sqrt(3.0) / 2.0])  # the beam turned by 60 degrees
+    at = met + 0.4 * mirrored  # d2 = 2.4
     behind_m = 2.4 * ratio
     face = Thing(box(*(at + 0.5 * mirrored), 1.0, 0.6, np.pi / 3), reflectance=1.0)
     target = thing(2.0 + behind_m + 0.5)
@@ -242,14 +260,19 @@ def test_a_weak_echo_of_the_pane_is_the_first_but_not_the_strongest():
     assert ahead(hall(panes=[dirty]), replace(TRANSPARENT, echo="first"))[1] == 1
 
 
-@pytest.mark.parametrize("reflectance, incidence_deg, answers", [
-    (0.1, 0.0, True), (0.098, 0.0, False), (0.5, 77.0, True), (0.5, 79.0, False)])
+@pytest.mark.parametrize(
+    "reflectance, incidence_deg, answers",
+    [(0.1, 0.0, True), (0.098, 0.0, False), (0.5, 77.0, True), (0.5, 79.0, False)],
+)
 def test_ten_percent_face_on_at_its_largest_range_is_what_a_lidar_just_sees(reflectance, incidence_deg, answers):
     """0.5 cos 78.5 degrees = 0.1."""
     model = replace(TRANSPARENT, range_max_m=12.01)
     turn = np.deg2rad(incidence_deg)
-    target = Thing(np.array([14.0, 5.0]) + (box(0.3, 0.0, 0.6, 4.0) @ np.array(
-        [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])), reflectance=reflectance)
+    target = Thing(
+        np.array([14.0, 5.0])
+        + (box(0.3, 0.0, 0.6, 4.0) @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])),
+        reflectance=reflectance,
+    )
     assert np.isfinite(ahead(hall(things=[target]), model)[0]) == answers
 
 
@@ -313,7 +336,7 @@ def slow_scan(building, model, laser):
                 found.append((distance, index, abs(normal @ way), (b - a) / np.hypot(*(b - a))))
         found.sort(key=lambda entry: entry[0])
         ends = [n for n, entry in enumerate(found) if surfaces.kind[entry[1]] == 0]
-        return found[:ends[0]] if ends else found, found[ends[0]] if ends else None
+        return found[: ends[0]] if ends else found, found[ends[0]] if ends else None
 
     def through(panes):
         return np.prod([glass.sheet(c, model.coating, surfaces.thickness_m[i])[1] for _, i, c, _ in panes])
@@ -326,8 +349,14 @@ def slow_scan(building, model, laser):
         if end:
             passed = sum(end[0] - p[0] >= 0.1 for p in panes)
             crossing = panes[0][0] if passed else np.nan
-            echoes.append(((surfaces.reflectance[end[1]] * end[2]) * through(panes) ** 2 / end[0] ** 2, end[0],
-                           [1, 3, 4, 0, 0][passed], crossing))
+            echoes.append(
+                (
+                    (surfaces.reflectance[end[1]] * end[2]) * through(panes) ** 2 / end[0] ** 2,
+                    end[0],
+                    [1, 3, 4, 0, 0][passed],
+                    crossing,
+                )
+            )
         for n, (distance, _, cos, along) in enumerate(panes[:2]):
             mirrored = 2.0 * (way @ along) * along - way
             behind, image = meets(laser[:2] + distance * way, mirrored, 1e-6)
@@ -336,9 +365,15 @@ def slow_scan(building, model, laser):
                 light = through(panes[:n]) * glass.reflectance(cos, model.coating, 1) * through(behind)
                 passed = sum(image[0] - p[0] >= 0.1 for p in behind)
                 case = 0 if n or passed else 1 if image[0] < 0.1 else 2
-                echoes.append((surfaces.reflectance[image[1]] * image[2] * light ** 2 / total ** 2, total, case,
-                               np.nan if case == 1 else panes[0][0]))
-        echoes = [e for e in echoes if e[0] > 0.1 / model.range_max_m ** 2 and e[1] <= model.range_max_m]
+                echoes.append(
+                    (
+                        surfaces.reflectance[image[1]] * image[2] * light**2 / total**2,
+                        total,
+                        case,
+                        np.nan if case == 1 else panes[0][0],
+                    )
+                )
+        echoes = [e for e in echoes if e[0] > 0.1 / model.range_max_m**2 and e[1] <= model.range_max_m]
         lost = (0.0, np.nan, 0, panes[0][0] if panes and panes[0][0] <= model.range_max_m else np.nan)
         rows.append(max(echoes, default=lost, key=lambda echo: echo[0])[1:])
     return np.array(rows).T
@@ -380,8 +415,9 @@ def test_panes_at_every_bearing_are_met_by_every_beam():
 
 def test_the_same_seed_is_the_same_scan():
     building = hall(panes=[across(6.0)], people=[person(4.0)])
-    first, second = (lidar.scan(lidar.preset("sensitive"), building, LASER, 0.5, np.random.default_rng(7))
-                     for _ in range(2))
+    first, second = (
+        lidar.scan(lidar.preset("sensitive"), building, LASER, 0.5, np.random.default_rng(7)) for _ in range(2)
+    )
     for name in ("ranges_m", "case", "exact_m", "crossing_m"):
         assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
     assert first.case.dtype == np.uint8
@@ -412,23 +448,29 @@ def test_presets_are_known_by_name():
     assert lidar.preset("sensitive") == LidarModel()
     assert lidar.preset("weak").half_rad < np.deg2rad(5.0) < lidar.preset("sensitive").half_rad
     assert lidar.preset("coated").coating > 1.0
-    with pytest.raises(ValueError, match="^unknown lidar preset 'sensitiv', known are sensitive, weak, coated; "
-                                         "did you mean sensitive[?]$"):
+    with pytest.raises(
+        ValueError,
+        match="^unknown lidar preset 'sensitiv', known are sensitive, weak, coated; did you mean sensitive[?]$",
+    ):
         lidar.preset("sensitiv")
     with pytest.raises(ValueError, match="^unknown lidar preset 'x', known are sensitive, weak, coated$"):
         lidar.preset("x")
 
 
-@pytest.mark.parametrize("field, text", [
-    ({"beams": 1}, "lidar beams must be a whole number >= 2, got 1"),
-    ({"beams": 2.5}, "lidar beams must be a whole number >= 2, got 2.5"),
-    ({"echo": "loudest"}, "lidar echo must be one of first, strongest, last, got 'loudest'"),
-    ({"visibility": "none"}, "lidar visibility must be one of logistic, lobe, got 'none'"),
-    ({"field_of_view_rad": 7.0}, "lidar field_of_view_rad must be > 0 and <= 2 pi, got 7.0"),
-    ({"range_min_m": 30.0}, "lidar ranges must be 0 <= range_min_m < range_max_m, finite, got 30.0 and 25.0"),
-    ({"dropout": 1.1}, "lidar dropout must be 0 to 1, got 1.1"),
-    ({"noise_m": -0.1}, "lidar noise_m must be >= 0, got -0.1"),
-    ({"width_rad": 0.0}, "lidar width_rad must be > 0, got 0.0")])
+@pytest.mark.parametrize(
+    "field, text",
+    [
+        ({"beams": 1}, "lidar beams must be a whole number >= 2, got 1"),
+        ({"beams": 2.5}, "lidar beams must be a whole number >= 2, got 2.5"),
+        ({"echo": "loudest"}, "lidar echo must be one of first, strongest, last, got 'loudest'"),
+        ({"visibility": "none"}, "lidar visibility must be one of logistic, lobe, got 'none'"),
+        ({"field_of_view_rad": 7.0}, "lidar field_of_view_rad must be > 0 and <= 2 pi, got 7.0"),
+        ({"range_min_m": 30.0}, "lidar ranges must be 0 <= range_min_m < range_max_m, finite, got 30.0 and 25.0"),
+        ({"dropout": 1.1}, "lidar dropout must be 0 to 1, got 1.1"),
+        ({"noise_m": -0.1}, "lidar noise_m must be >= 0, got -0.1"),
+        ({"width_rad": 0.0}, "lidar width_rad must be > 0, got 0.0"),
+    ],
+)
 def test_a_lidar_that_cannot_be_is_refused(field, text):
     with pytest.raises(ValueError) as caught:
         LidarModel(**field)

@@ -51,8 +51,10 @@ def test_exact_wheels_tell_the_truth(office_drive):
 def test_an_ordinary_drive_drifts_by_one_to_three_percent(office_drive):
     kind, twists, length_m = office_drive
     truth = true_pose(twists)
-    drifts = [np.hypot(*(told(OdometryParams(), kind, twists, seed).odom_from_base - truth)[:2]) / length_m
-              for seed in range(12)]
+    drifts = [
+        np.hypot(*(told(OdometryParams(), kind, twists, seed).odom_from_base - truth)[:2]) / length_m
+        for seed in range(12)
+    ]
     assert 0.005 < np.median(drifts) < 0.03
     assert max(drifts) < 0.08
 
@@ -128,10 +130,14 @@ def test_a_seed_is_a_robot():
     assert ends[0] == ends[1] != ends[2]
 
 
-@pytest.mark.parametrize("values, text", [
-    ({"wheel_base_m": 0.0}, "wheel_base_m of the odometry must be > 0 m, got 0.0"),
-    ({"wheel_radius_sigma": -0.1}, "wheel_radius_sigma of the odometry must be >= 0 and finite, got -0.1"),
-    ({"slip_event_per_m": math.inf}, "slip_event_per_m of the odometry must be >= 0 and finite, got inf")])
+@pytest.mark.parametrize(
+    "values, text",
+    [
+        ({"wheel_base_m": 0.0}, "wheel_base_m of the odometry must be > 0 m, got 0.0"),
+        ({"wheel_radius_sigma": -0.1}, "wheel_radius_sigma of the odometry must be >= 0 and finite, got -0.1"),
+        ({"slip_event_per_m": math.inf}, "slip_event_per_m of the odometry must be >= 0 and finite, got inf"),
+    ],
+)
 def test_impossible_wheels_are_refused(values, text):
     with pytest.raises(ValueError) as caught:
         OdometryParams(**values)

@@ -43,7 +43,7 @@ def off_path(points, waypoints):
     waypoints = np.array(waypoints, float)
     start, along = waypoints[:-1], np.diff(waypoints, axis=0)
     offset = points[:, None] - start
-    share = np.clip((offset * along).sum(-1) / (along ** 2).sum(-1), 0, 1)
+    share = np.clip((offset * along).sum(-1) / (along**2).sum(-1), 0, 1)
     return np.linalg.norm(offset - share[..., None] * along, axis=-1).min(axis=1)
 
 
@@ -88,12 +88,16 @@ def test_the_start_looks_along_the_path():
     np.testing.assert_allclose(follower.start, [1.0, 2.0, math.pi / 2])
 
 
-@pytest.mark.parametrize("waypoints, text", [
-    ([[1.0, 1.0]], "a path needs 2 different waypoints, got 1"),
-    ([[1.0, 1.0], [1.0, 1.0]], "a path needs 2 different waypoints, got 1"),
-    (np.zeros((0, 2)), "a path needs 2 different waypoints, got 0"),
-    ([[1.0, 1.0], [math.nan, 1.0]], "waypoint 2 of the path is not finite: [nan, 1.0]"),
-    ([1.0, 2.0], "a path needs waypoints (W, 2), got (2,)")])
+@pytest.mark.parametrize(
+    "waypoints, text",
+    [
+        ([[1.0, 1.0]], "a path needs 2 different waypoints, got 1"),
+        ([[1.0, 1.0], [1.0, 1.0]], "a path needs 2 different waypoints, got 1"),
+        (np.zeros((0, 2)), "a path needs 2 different waypoints, got 0"),
+        ([[1.0, 1.0], [math.nan, 1.0]], "waypoint 2 of the path is not finite: [nan, 1.0]"),
+        ([1.0, 2.0], "a path needs waypoints (W, 2), got (2,)"),
+    ],
+)
 def test_what_is_no_path_is_refused(waypoints, text):
     with pytest.raises(PathError) as caught:
         PathFollower(np.array(waypoints), RobotParams())
@@ -106,30 +110,43 @@ def test_a_speed_of_nothing_is_refused():
     assert str(caught.value) == "speed_m_s of the path follower must be > 0 m/s and finite, got 0.0"
 
 
-@pytest.mark.parametrize("name, text", [
-    ("p.csv", "0,1\n2.5,3\n"), ("p.txt", "# x y\n0 1\n\n2.5 3  # the door\n"), ("p.yaml", "- [0, 1]\n- [2.5, 3]\n"),
-    ("p.yml", "[[0, 1], [0, 1], [2.5, 3]]")])
+@pytest.mark.parametrize(
+    "name, text",
+    [
+        ("p.csv", "0,1\n2.5,3\n"),
+        ("p.txt", "# x y\n0 1\n\n2.5 3  # the door\n"),
+        ("p.yaml", "- [0, 1]\n- [2.5, 3]\n"),
+        ("p.yml", "[[0, 1], [0, 1], [2.5, 3]]"),
+    ],
+)
 def test_a_file_of_waypoints(tmp_path, name, text):
     (tmp_path / name).write_text(text)
     np.testing.assert_array_equal(path_follower.load(tmp_path / name), [[0.0, 1.0], [2.5, 3.0]])
 
 
 def test_a_path_is_found_by_name_by_order_and_as_a_file(tmp_path):
-    building = Building((Wall(np.array([[0.0, 9.0], [9.0, 9.0]])),), name="hall",
-                        paths={"round": np.array([[0.0, 0.0], [1.0, 0.0]]), "a.b": np.array([[0.0, 0.0], [2.0, 0.0]])})
+    building = Building(
+        (Wall(np.array([[0.0, 9.0], [9.0, 9.0]])),),
+        name="hall",
+        paths={"round": np.array([[0.0, 0.0], [1.0, 0.0]]), "a.b": np.array([[0.0, 0.0], [2.0, 0.0]])},
+    )
     (tmp_path / "way").write_text("0 0\n3 0\n")
     for wanted, end in (("round", 1.0), ("first", 1.0), ("a.b", 2.0), (str(tmp_path / "way"), 3.0)):
         np.testing.assert_array_equal(path_follower.find(wanted, building), [[0.0, 0.0], [end, 0.0]])
     named_first = replace(building, paths={"other": building.paths["round"], "first": building.paths["a.b"]})
     assert path_follower.find("first", named_first)[1, 0] == 2.0
-    for wanted, text in (("rond", "hall: no path 'rond', it has round, a.b; did you mean round?"),
-                         ("x", "hall: no path 'x', it has round, a.b"),
-                         ("no.csv", "no.csv: cannot be read: No such file or directory")):
+    for wanted, text in (
+        ("rond", "hall: no path 'rond', it has round, a.b; did you mean round?"),
+        ("x", "hall: no path 'x', it has round, a.b"),
+        ("no.csv", "no.csv: cannot be read: No such file or directory"),
+    ):
         with pytest.raises(PathError) as caught:
             path_follower.find(wanted, building)
         assert str(caught.value) == text
-    for wanted, text in (("first", "hall: has no path; give a file of waypoints"),
-                         ("x", "hall: no path 'x', it has none")):
+    for wanted, text in (
+        ("first", "hall: has no path; give a file of waypoints"),
+        ("x", "hall: no path 'x', it has none"),
+    ):
         with pytest.raises(PathError) as caught:
             path_follower.find(wanted, replace(building, paths={}))
         assert str(caught.value) == text
@@ -142,14 +159,18 @@ def test_the_way_back_is_the_same_path():
     assert np.abs(follower.command(follower.start)).max() == pytest.approx(0.2)
 
 
-@pytest.mark.parametrize("name, text, reason", [
-    ("p.csv", "", "a path needs 2 different waypoints, got 0"),
-    ("p.csv", "0,1\n2\n", "waypoint 2 must be x and y in m, got ['2']"),
-    ("p.csv", "x,y\n0,1\n2,1\n", "waypoint 1 must be x and y in m, got ['x', 'y']"),
-    ("p.csv", "0,1\n2,inf\n", "waypoint 2 of the path is not finite: [2.0, inf]"),
-    ("p.yaml", "path: 1\n", "must be a list of waypoints [x, y] in m, got dict"),
-    ("p.yaml", "[[0, 1], 7]", "waypoint 2 must be x and y in m, got 7"),
-    ("p.yaml", "[[0, 1", "is no yaml: ")])
+@pytest.mark.parametrize(
+    "name, text, reason",
+    [
+        ("p.csv", "", "a path needs 2 different waypoints, got 0"),
+        ("p.csv", "0,1\n2\n", "waypoint 2 must be x and y in m, got ['2']"),
+        ("p.csv", "x,y\n0,1\n2,1\n", "waypoint 1 must be x and y in m, got ['x', 'y']"),
+        ("p.csv", "0,1\n2,inf\n", "waypoint 2 of the path is not finite: [2.0, inf]"),
+        ("p.yaml", "path: 1\n", "must be a list of waypoints [x, y] in m, got dict"),
+        ("p.yaml", "[[0, 1], 7]", "waypoint 2 must be x and y in m, got 7"),
+        ("p.yaml", "[[0, 1", "is no yaml: "),
+    ],
+)
 def test_a_file_that_holds_no_path_is_refused(tmp_path, name, text, reason):
     (tmp_path / name).write_text(text)
     with pytest.raises(PathError) as caught:

@@ -10,9 +10,21 @@ FAR = np.array([100.0, 100.0])
 CORNER = Person(np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0]]), speed_m_s=2.0, radius_m=0.3)  # 7 m, 3.5 s
 
 
-@pytest.mark.parametrize("time_s, place", [
-    (0.0, (0.0, 0.0)), (1.0, (2.0, 0.0)), (1.5, (3.0, 0.0)), (2.5, (3.0, 2.0)), (3.5, (3.0, 4.0)),
-    (4.5, (3.0, 2.0)), (6.5, (1.0, 0.0)), (7.0, (0.0, 0.0)), (8.0, (2.0, 0.0)), (-1.0, (2.0, 0.0))])
+@pytest.mark.parametrize(
+    "time_s, place",
+    [
+        (0.0, (0.0, 0.0)),
+        (1.0, (2.0, 0.0)),
+        (1.5, (3.0, 0.0)),
+        (2.5, (3.0, 2.0)),
+        (3.5, (3.0, 4.0)),
+        (4.5, (3.0, 2.0)),
+        (6.5, (1.0, 0.0)),
+        (7.0, (0.0, 0.0)),
+        (8.0, (2.0, 0.0)),
+        (-1.0, (2.0, 0.0)),
+    ],
+)
 def test_somebody_walks_along_the_waypoints_and_back(time_s, place):
     np.testing.assert_allclose(people.position(CORNER, time_s), place, atol=1e-9)
 

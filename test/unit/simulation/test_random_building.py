@@ -6,7 +6,7 @@ import pytest
 from glass_nav.simulation import building_map, random_building
 from glass_nav.simulation.building import OPAQUE, PANE
 from glass_nav.simulation.random_building import FloorParams
-from glass_nav.topology import voronoi_graph
+from glass_nav.topology.atlas import voronoi_graph
 
 
 def test_a_seed_gives_the_same_floor_again_and_another_seed_another():
@@ -36,14 +36,20 @@ def test_glass_is_as_frequent_as_asked_for():
 
 
 def test_a_floor_of_other_blocks_has_another_size():
-    small, large = (np.ptp(random_building.build(2, FloorParams(blocks=blocks)).surfaces.from_m, axis=0).max()
-                    for blocks in ((2, 2), (5, 4)))
+    small, large = (
+        np.ptp(random_building.build(2, FloorParams(blocks=blocks)).surfaces.from_m, axis=0).max()
+        for blocks in ((2, 2), (5, 4))
+    )
     assert large > 1.4 * small
 
 
-@pytest.mark.parametrize("values, text", [
-    ({"blocks": (1, 3)}, "a random floor needs at least 2 x 2 blocks, got 1 x 3"),
-    ({"glass": 1.5}, "the share of glass must be 0 to 1, got 1.5")])
+@pytest.mark.parametrize(
+    "values, text",
+    [
+        ({"blocks": (1, 3)}, "a random floor needs at least 2 x 2 blocks, got 1 x 3"),
+        ({"glass": 1.5}, "the share of glass must be 0 to 1, got 1.5"),
+    ],
+)
 def test_what_makes_no_floor_is_refused(values, text):
     with pytest.raises(ValueError, match=text):
         FloorParams(**values)

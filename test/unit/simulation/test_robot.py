@@ -19,8 +19,18 @@ def driven(robot, command, seconds, dt_s=0.02):
     return robot
 
 
-@pytest.mark.parametrize("twist", [[1.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.3, -0.2, 1.1], [0.0, 0.0, 2.0],
-                                   [1.0, 1.0, 1e-7], [0.5, 0.1, 1.00001e-6], [2.0, 0.0, -6.0]])
+@pytest.mark.parametrize(
+    "twist",
+    [
+        [1.0, 0.0, 0.0],
+        [0.0, 0.5, 0.0],
+        [0.3, -0.2, 1.1],
+        [0.0, 0.0, 2.0],
+        [1.0, 1.0, 1e-7],
+        [0.5, 0.1, 1.00001e-6],
+        [2.0, 0.0, -6.0],
+    ],
+)
 def test_an_arc_is_the_sum_of_many_short_straight_steps(twist):
     twist, parts = np.array(twist), 3000
     pose = np.zeros(3)
@@ -118,16 +128,20 @@ def test_what_it_made_adds_up_to_where_it_is_also_at_a_wall():
 def test_the_nearest_segment_counts_and_a_point_is_one_too():
     obstacles = Obstacles(np.array([[[0.0, 2.0], [4.0, 2.0]], [[6.0, 0.0], [6.0, 0.0]]]))
     assert obstacles.clearance(np.array([1.0, 0.5])) == pytest.approx(1.5)
-    assert obstacles.clearance(np.array([7.0, 6.0])) == pytest.approx(5.0)   # 3, 4, 5 from the end
+    assert obstacles.clearance(np.array([7.0, 6.0])) == pytest.approx(5.0)  # 3, 4, 5 from the end
     assert obstacles.clearance(np.array([5.0, 0.0])) == pytest.approx(1.0)
     assert NOTHING.clearance(np.zeros(2)) == math.inf
 
 
-@pytest.mark.parametrize("values, text", [
-    ({"kind": "tank"}, "robot must be diff or omni, got 'tank'"),
-    ({"radius_m": 0.0}, "radius_m of the robot must be > 0 and finite, got 0.0"),
-    ({"max_speed_m_s": math.nan}, "max_speed_m_s of the robot must be > 0 and finite, got nan"),
-    ({"max_turn_rad_s": math.inf}, "max_turn_rad_s of the robot must be > 0 and finite, got inf")])
+@pytest.mark.parametrize(
+    "values, text",
+    [
+        ({"kind": "tank"}, "robot must be diff or omni, got 'tank'"),
+        ({"radius_m": 0.0}, "radius_m of the robot must be > 0 and finite, got 0.0"),
+        ({"max_speed_m_s": math.nan}, "max_speed_m_s of the robot must be > 0 and finite, got nan"),
+        ({"max_turn_rad_s": math.inf}, "max_turn_rad_s of the robot must be > 0 and finite, got inf"),
+    ],
+)
 def test_impossible_robots_are_refused(values, text):
     with pytest.raises(ValueError) as caught:
         RobotParams(**values)

@@ -39,8 +39,9 @@ def test_what_is_not_there_is_said_with_what_is(tmp_path):
     known = ", ".join(shipped_buildings.shipped())
     with pytest.raises(BuildingError) as caught:
         shipped_buildings.find("glas_office")
-    assert str(caught.value) == ("glas_office: no such file, nor a building of the package, which are "
-                                 f"{known}; did you mean glass_office?")
+    assert str(caught.value) == (
+        f"glas_office: no such file, nor a building of the package, which are {known}; did you mean glass_office?"
+    )
     with pytest.raises(BuildingError, match=f"^{tmp_path}: a folder without building.yaml$"):
         shipped_buildings.find(str(tmp_path))
 
@@ -63,8 +64,9 @@ def test_without_any_the_list_is_empty(monkeypatch):
 
 
 @pytest.mark.long_run
-@pytest.mark.parametrize("name, kind", [*((name, "diff") for name in shipped_buildings.shipped()),
-                                        ("glass_office", "omni")])
+@pytest.mark.parametrize(
+    "name, kind", [*((name, "diff") for name in shipped_buildings.shipped()), ("glass_office", "omni")]
+)
 def test_every_path_can_be_driven_also_when_all_furniture_has_moved(name, kind):
     building = building_file.load(shipped_buildings.find(name)).changed(1.0, np.random.default_rng(1))
     assert building.paths
@@ -94,8 +96,10 @@ def test_the_landmark_file_beside_a_building_is_that_of_its_tags(name):
 
 
 def test_redrawing_a_building_writes_its_landmarks_too(tmp_path):
-    (tmp_path / "building.yaml").write_text("walls: [{line: [[0, 0], [4, 0], [4, 3], [0, 3], [0, 0]]}]\n"
-                                            "start: [1, 1, 0]\ntags: [{id: A, position: [0.2, 1]}]\n")
+    (tmp_path / "building.yaml").write_text(
+        "walls: [{line: [[0, 0], [4, 0], [4, 3], [0, 3], [0, 0]]}]\n"
+        "start: [1, 1, 0]\ntags: [{id: A, position: [0.2, 1]}]\n"
+    )
     building_map.redraw(tmp_path)
     assert landmark_file.load(tmp_path / "landmarks.yaml").ids == ("A",)
     assert (tmp_path / "map.yaml").is_file()

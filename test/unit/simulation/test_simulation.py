@@ -22,12 +22,18 @@ FORWARD = np.array([0.5, 0.0, 0.0])
 def hall(**changes):
     """6 x 4 m with its lower left inner corner at (0, 0), a pane across the middle but for 1.4 m, furniture behind."""
     walls = (Wall(np.array([[-0.1, -0.1], [6.1, -0.1], [6.1, 4.1], [-0.1, 4.1], [-0.1, -0.1]], float)),)
-    values = dict(walls=walls, panes=(Pane(np.array([[3.0, 1.4], [3.0, 4.0]])),),
-                  things=tuple(Thing(box(4.5, 2.2 + 0.5 * index, 0.3, 0.3), movable=True) for index in range(3)),
-                  paths={"round": np.array([[1.0, 1.0], [1.0, 3.0], [2.0, 3.0]]),
-                         "into the wall": np.array([[1.0, 1.0], [8.0, 1.0]]),
-                         "through the pane": np.array([[1.0, 3.0], [5.0, 3.0]])},
-                  start=np.array([1.0, 1.0, 0.0]), name="hall")
+    values = dict(
+        walls=walls,
+        panes=(Pane(np.array([[3.0, 1.4], [3.0, 4.0]])),),
+        things=tuple(Thing(box(4.5, 2.2 + 0.5 * index, 0.3, 0.3), movable=True) for index in range(3)),
+        paths={
+            "round": np.array([[1.0, 1.0], [1.0, 3.0], [2.0, 3.0]]),
+            "into the wall": np.array([[1.0, 1.0], [8.0, 1.0]]),
+            "through the pane": np.array([[1.0, 3.0], [5.0, 3.0]]),
+        },
+        start=np.array([1.0, 1.0, 0.0]),
+        name="hall",
+    )
     values.update(changes)
     return Building(**values)
 
@@ -37,10 +43,21 @@ def simulation(model=LIDAR, **options):
 
 
 def as_bytes(frames):
-    return [b"".join([str(frame.stamp_ns).encode(), frame.map_from_base.tobytes(), frame.odom_from_base.tobytes(),
-                      frame.scan.ranges_m.tobytes(), frame.truth.case.tobytes(), frame.truth.exact_m.tobytes(),
-                      frame.truth.crossing_m.tobytes(), *(reading.velocity.tobytes() for reading in frame.odometry)])
-            for frame in frames]
+    return [
+        b"".join(
+            [
+                str(frame.stamp_ns).encode(),
+                frame.map_from_base.tobytes(),
+                frame.odom_from_base.tobytes(),
+                frame.scan.ranges_m.tobytes(),
+                frame.truth.case.tobytes(),
+                frame.truth.exact_m.tobytes(),
+                frame.truth.crossing_m.tobytes(),
+                *(reading.velocity.tobytes() for reading in frame.odometry),
+            ]
+        )
+        for frame in frames
+    ]
 
 
 @pytest.mark.parametrize("kind", ["diff", "omni"])
@@ -129,7 +146,7 @@ def test_a_step_moves_and_looks():
     run = simulation(odometry=EXACT)
     frame = run.step(1.0, FORWARD)
     assert frame.stamp_ns == run.stamp_ns == START_NS + 10**9
-    assert frame.map_from_base[0] == pytest.approx(1.0 + 0.5 - 0.5 ** 2 / 0.8 / 2)  # it accelerates at 0.8 m/s^2
+    assert frame.map_from_base[0] == pytest.approx(1.0 + 0.5 - 0.5**2 / 0.8 / 2)  # it accelerates at 0.8 m/s^2
     assert len(frame.odometry) == 51
     assert not run.blocked
     for _ in range(20):
@@ -150,38 +167,52 @@ def test_two_looks_at_one_time_are_two_scans():
 
 def test_furniture_that_moved_is_where_the_seed_puts_it_and_stays_on_the_map():
     moved = [simulation(changed_share=0.67, seed=seed).building for seed in (1, 1, 2)]
-    outlines = [np.concatenate([thing.outline_m for thing in building.things if not thing.mapped]).tobytes()
-                for building in moved]
+    outlines = [
+        np.concatenate([thing.outline_m for thing in building.things if not thing.mapped]).tobytes()
+        for building in moved
+    ]
     assert outlines[0] == outlines[1] != outlines[2]
     assert [sum(not thing.present for thing in building.things) for building in moved] == [2, 2, 2]
     assert simulation().building is not moved[0]
 
 
 def test_the_wheels_do_not_depend_on_the_lidar():
-    ways = [[frame.odom_from_base.tobytes() for frame in islice(simulation(model, seed=5).drive("round"), 20)]
-            for model in (LIDAR, replace(LIDAR, beams=11), PRESETS["weak"])]
+    ways = [
+        [frame.odom_from_base.tobytes() for frame in islice(simulation(model, seed=5).drive("round"), 20)]
+        for model in (LIDAR, replace(LIDAR, beams=11), PRESETS["weak"])
+    ]
     assert ways[0] == ways[1] == ways[2]
 
 
-@pytest.mark.parametrize("options, text", [
-    (dict(seed=-1), "seed must be a whole number >= 0, got -1"),
-    (dict(seed=1.5), "seed must be a whole number >= 0, got 1.5"),
-    (dict(scan_rate_hz=0.0), "scan rate must be 0.1 to 1000 Hz, got 0.0"),
-    (dict(base_from_laser=(0.0, 0.0)), "the laser's pose on the robot must be finite x, y, yaw, got (0.0, 0.0)"),
-    (dict(start=np.array([0.1, 2.0, 0.0])), "hall: no room for the robot at x 0.10 m, y 2.00 m: its radius is 0.22 m, "
-                                            "the nearest obstacle 0.10 m away"),
-    (dict(start=np.array([np.nan, 2.0, 0.0])), "the robot's start must be finite x, y, yaw, got [nan, 2.0, 0.0]"),
-    (dict(changed_share=2.0), "changed share must be 0 to 1, got 2.0")])
+@pytest.mark.parametrize(
+    "options, text",
+    [
+        (dict(seed=-1), "seed must be a whole number >= 0, got -1"),
+        (dict(seed=1.5), "seed must be a whole number >= 0, got 1.5"),
+        (dict(scan_rate_hz=0.0), "scan rate must be 0.1 to 1000 Hz, got 0.0"),
+        (dict(base_from_laser=(0.0, 0.0)), "the laser's pose on the robot must be finite x, y, yaw, got (0.0, 0.0)"),
+        (
+            dict(start=np.array([0.1, 2.0, 0.0])),
+            "hall: no room for the robot at x 0.10 m, y 2.00 m: its radius is 0.22 m, the nearest obstacle 0.10 m away",
+        ),
+        (dict(start=np.array([np.nan, 2.0, 0.0])), "the robot's start must be finite x, y, yaw, got [nan, 2.0, 0.0]"),
+        (dict(changed_share=2.0), "changed share must be 0 to 1, got 2.0"),
+    ],
+)
 def test_what_cannot_be_simulated_is_refused(options, text):
     with pytest.raises(ValueError) as caught:
         simulation(**options)
     assert str(caught.value) == text
 
 
-@pytest.mark.parametrize("path, text", [
-    ("rund", "hall: no path 'rund', it has round, into the wall, through the pane; did you mean round?"),
-    ("xyz", "hall: no path 'xyz', it has round, into the wall, through the pane"),
-    (np.array([[1.0, 1.0]]), "a path needs 2 different waypoints, got 1")])
+@pytest.mark.parametrize(
+    "path, text",
+    [
+        ("rund", "hall: no path 'rund', it has round, into the wall, through the pane; did you mean round?"),
+        ("xyz", "hall: no path 'xyz', it has round, into the wall, through the pane"),
+        (np.array([[1.0, 1.0]]), "a path needs 2 different waypoints, got 1"),
+    ],
+)
 def test_what_is_no_path_is_refused(path, text):
     with pytest.raises(PathError) as caught:
         next(simulation().drive(path))

@@ -38,8 +38,9 @@ def test_who_stands_sees_what_a_lidar_of_one_moment_sees(office):
 
 def test_a_robot_that_turns_sees_each_beam_later_than_the_one_before(office):
     pose, rate_rad_s = office.start, 1.5
-    track = Trajectory(np.array([START_NS, START_NS + TURN_NS]),
-                       np.array([pose, pose + [0.0, 0.0, rate_rad_s * TURN_NS * 1e-9]]))
+    track = Trajectory(
+        np.array([START_NS, START_NS + TURN_NS]), np.array([pose, pose + [0.0, 0.0, rate_rad_s * TURN_NS * 1e-9]])
+    )
     turned = turning.scan(QUIET, office, track, TURN_NS, START_NS, np.random.default_rng(0))
     for beam in (0, 45, 90, 135, 180):
         late = pose + np.array([0.0, 0.0, rate_rad_s * TURN_NS * 1e-9 * beam / 180])
@@ -59,8 +60,20 @@ def test_a_frame_is_of_its_first_beam_and_odometry_straightens_it(office):
         np.testing.assert_allclose(frame.odom_from_base, odometry.at(np.int64(frame.stamp_ns)), atol=1e-9)
         scans = deskew.straightened(frame.scan, odometry), frame.scan
         map_from_laser = se2.compose(frame.map_from_base, frame.scan.base_from_laser)
-        off_m.append([np.nanmean(np.minimum(np.abs(np.where(scan.answered, scan.ranges_m, np.nan) - caster.cast(
-            map_from_laser[None], scan.angles_rad, 25.0)[0]), 0.5)) for scan in scans])
+        off_m.append(
+            [
+                np.nanmean(
+                    np.minimum(
+                        np.abs(
+                            np.where(scan.answered, scan.ranges_m, np.nan)
+                            - caster.cast(map_from_laser[None], scan.angles_rad, 25.0)[0]
+                        ),
+                        0.5,
+                    )
+                )
+                for scan in scans
+            ]
+        )
     straight_m, raw_m = np.mean(off_m[5:], axis=0)
     assert straight_m < 0.5 * raw_m
     assert frames[0].scan.time_increment_s == 0.0  # there was no time for a turn before

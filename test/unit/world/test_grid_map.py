@@ -7,9 +7,11 @@ import pytest
 
 from glass_nav.world.grid_map import GridMap
 
-ORIGINS = [pytest.param((0.0, 0.0, 0.0), id="at the origin"),
-           pytest.param((-3.2, 7.5, 0.0), id="moved"),
-           pytest.param((4.0, -1.0, 2.1), id="moved and turned")]
+ORIGINS = [
+    pytest.param((0.0, 0.0, 0.0), id="at the origin"),
+    pytest.param((-3.2, 7.5, 0.0), id="moved"),
+    pytest.param((4.0, -1.0, 2.1), id="moved and turned"),
+]
 
 
 def grid(occupancy, origin=(0.0, 0.0, 0.0), resolution_m=0.1):
@@ -27,8 +29,14 @@ def test_a_digest_tells_maps_apart_and_is_the_same_for_the_same_one():
     cells = np.zeros((3, 4))
     other = cells.copy()
     other[1, 2] = 100
-    maps = [grid(cells), grid(other), grid(cells.T), grid(cells, (1.0, 0.0, 0.0)), grid(cells, (0.0, 0.0, 0.1)),
-            grid(cells, resolution_m=0.05)]
+    maps = [
+        grid(cells),
+        grid(other),
+        grid(cells.T),
+        grid(cells, (1.0, 0.0, 0.0)),
+        grid(cells, (0.0, 0.0, 0.1)),
+        grid(cells, resolution_m=0.05),
+    ]
     assert len({each.digest for each in maps}) == len(maps)
     assert grid(cells, (-0.0, 0.0, 1e-9), float(np.float32(0.1))).digest == grid(cells).digest  # by a message
 
@@ -81,18 +89,34 @@ def test_outside_the_map_nothing_is_free():
     assert not there.is_free(np.array([[-0.05, 0.05], [0.05, -0.05], [0.25, 0.05], [0.05, 0.25]])).any()
 
 
-@pytest.mark.parametrize("occupancy, resolution_m, origin, text", [
-    (np.zeros((3,), np.int8), 0.1, np.zeros(3),
-     "a map needs occupancy (H, W) with at least one cell, got shape (3,)"),
-    (np.zeros((0, 4), np.int8), 0.1, np.zeros(3),
-     "a map needs occupancy (H, W) with at least one cell, got shape (0, 4)"),
-    (np.zeros((2, 2)), 0.1, np.zeros(3), "a map needs occupancy of int8, got float64"),
-    (np.zeros((2, 2), np.int8), 0.0, np.zeros(3), "a map needs resolution > 0 m, got 0.0"),
-    (np.zeros((2, 2), np.int8), np.nan, np.zeros(3), "a map needs resolution > 0 m, got nan"),
-    (np.zeros((2, 2), np.int8), np.inf, np.zeros(3), "a map needs resolution > 0 m, got inf"),
-    (np.zeros((2, 2), np.int8), 0.1, np.zeros(2), "a map needs an origin of x, y, yaw, all finite, got [0. 0.]"),
-    (np.zeros((2, 2), np.int8), 0.1, np.array([0.0, np.inf, 0.0]),
-     "a map needs an origin of x, y, yaw, all finite, got [ 0. inf  0.]")])
+@pytest.mark.parametrize(
+    "occupancy, resolution_m, origin, text",
+    [
+        (
+            np.zeros((3,), np.int8),
+            0.1,
+            np.zeros(3),
+            "a map needs occupancy (H, W) with at least one cell, got shape (3,)",
+        ),
+        (
+            np.zeros((0, 4), np.int8),
+            0.1,
+            np.zeros(3),
+            "a map needs occupancy (H, W) with at least one cell, got shape (0, 4)",
+        ),
+        (np.zeros((2, 2)), 0.1, np.zeros(3), "a map needs occupancy of int8, got float64"),
+        (np.zeros((2, 2), np.int8), 0.0, np.zeros(3), "a map needs resolution > 0 m, got 0.0"),
+        (np.zeros((2, 2), np.int8), np.nan, np.zeros(3), "a map needs resolution > 0 m, got nan"),
+        (np.zeros((2, 2), np.int8), np.inf, np.zeros(3), "a map needs resolution > 0 m, got inf"),
+        (np.zeros((2, 2), np.int8), 0.1, np.zeros(2), "a map needs an origin of x, y, yaw, all finite, got [0. 0.]"),
+        (
+            np.zeros((2, 2), np.int8),
+            0.1,
+            np.array([0.0, np.inf, 0.0]),
+            "a map needs an origin of x, y, yaw, all finite, got [ 0. inf  0.]",
+        ),
+    ],
+)
 def test_what_is_no_map_is_refused_in_one_line(occupancy, resolution_m, origin, text):
     with pytest.raises(ValueError) as err:
         GridMap(occupancy, resolution_m, origin)
@@ -103,8 +127,12 @@ def test_a_fingerprint_is_of_cells_and_place_and_outlives_a_message():
     cells = [[0, 100, -1], [0, 0, 0]]
     here = grid(cells, (1.5, -2.0, 0.1), 0.05)
     assert here.fingerprint == grid(cells, (1.5, -2.0, 0.1 + 1e-9), float(np.float32(0.05))).fingerprint
-    others = [grid([[0, 100, -1], [0, 0, 1]], (1.5, -2.0, 0.1), 0.05), grid(cells, (1.5, -2.0, 0.2), 0.05),
-              grid(cells, (1.6, -2.0, 0.1), 0.05), grid(cells, (1.5, -2.0, 0.1), 0.1),
-              grid(np.reshape(cells, (3, 2)), (1.5, -2.0, 0.1), 0.05)]
+    others = [
+        grid([[0, 100, -1], [0, 0, 1]], (1.5, -2.0, 0.1), 0.05),
+        grid(cells, (1.5, -2.0, 0.2), 0.05),
+        grid(cells, (1.6, -2.0, 0.1), 0.05),
+        grid(cells, (1.5, -2.0, 0.1), 0.1),
+        grid(np.reshape(cells, (3, 2)), (1.5, -2.0, 0.1), 0.05),
+    ]
     assert len({each.fingerprint for each in [here, *others]}) == 6
     assert grid(cells, (-0.0, 0.0, 0.0)).fingerprint == grid(cells, (0.0, 0.0, 0.0)).fingerprint

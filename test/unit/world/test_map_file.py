@@ -14,18 +14,26 @@ from glass_nav.world.grid_map import GridMap
 from glass_nav.world.map_file import MapError
 
 MRPT_MAPS = Path(__file__).resolve().parents[2] / "data" / "mrpt"
-FIELDS = {"image": "map.png", "resolution": "0.1", "origin": "[1.0, 2.0, 0.5]", "negate": "0",
-          "occupied_thresh": "0.65", "free_thresh": "0.2"}
+FIELDS = {
+    "image": "map.png",
+    "resolution": "0.1",
+    "origin": "[1.0, 2.0, 0.5]",
+    "negate": "0",
+    "occupied_thresh": "0.65",
+    "free_thresh": "0.2",
+}
 
 
 @pytest.fixture
 def write(tmp_path):
     """write(pixels, mode of PIL or None, key=text, ...): a map of one row of pixels; text None leaves the key out."""
+
     def write_map(pixels, kind=None, name="map.png", **fields):
         array = np.asarray(pixels, np.uint8)[None]
         Image.fromarray(array, kind).save(tmp_path / name)
-        text = "".join(f"{key}: {value}\n" for key, value in {**FIELDS, "image": name, **fields}.items()
-                       if value is not None)
+        text = "".join(
+            f"{key}: {value}\n" for key, value in {**FIELDS, "image": name, **fields}.items() if value is not None
+        )
         (tmp_path / "map.yaml").write_text(text)
         return tmp_path / "map.yaml"
 
@@ -49,8 +57,9 @@ def test_trinary_is_free_unknown_or_occupied(write):
 @pytest.mark.parametrize("suffix", ["png", "pgm", "bmp"])
 def test_the_first_row_of_the_map_is_the_last_of_the_image(tmp_path, suffix):
     Image.fromarray(np.array([[0, 255], [255, 255]], np.uint8)).save(tmp_path / f"map.{suffix}")
-    (tmp_path / "map.yaml").write_text("".join(f"{key}: {value}\n" for key, value in
-                                               {**FIELDS, "image": f"map.{suffix}"}.items()))
+    (tmp_path / "map.yaml").write_text(
+        "".join(f"{key}: {value}\n" for key, value in {**FIELDS, "image": f"map.{suffix}"}.items())
+    )
     assert map_file.load(tmp_path / "map.yaml").occupancy.tolist() == [[0, 0], [100, 0]]
 
 
@@ -120,25 +129,35 @@ def error(path):
 NEEDS = "a map needs image, resolution, origin, negate, occupied_thresh, free_thresh"
 
 
-@pytest.mark.parametrize("fields, text", [
-    ({"mode": "trinery"}, "map.yaml: mode must be trinary, scale or raw, got 'trinery'"),
-    ({"resolution": "0"}, "map.yaml: resolution must be > 0 m, got 0.0"),
-    ({"resolution": "-0.05"}, "map.yaml: resolution must be > 0 m, got -0.05"),
-    ({"resolution": ".nan"}, "map.yaml: resolution must be a finite number, got nan"),
-    ({"resolution": "fine"}, "map.yaml: resolution must be a finite number, got 'fine'"),
-    ({"resolution": None}, f"map.yaml: missing resolution; {NEEDS}"),
-    ({"negate": None, "free_thresh": None}, f"map.yaml: missing negate, free_thresh; {NEEDS}"),
-    ({"negate": "2"}, "map.yaml: negate must be 0 or 1, got 2"),
-    ({"negate": "'no'"}, "map.yaml: negate must be 0 or 1, got 'no'"),
-    ({"origin": "[0, 0]"}, "map.yaml: origin must be [x, y, yaw] in m, m, rad, got [0, 0]"),
-    ({"origin": "[0, .inf, 0]"}, "map.yaml: origin must be [x, y, yaw] in m, m, rad, got [0, inf, 0]"),
-    ({"origin": "corner"}, "map.yaml: origin must be [x, y, yaw] in m, m, rad, got 'corner'"),
-    ({"free_thresh": "0.7"}, "map.yaml: thresholds must be 0 <= free_thresh < occupied_thresh <= 1, "
-                             "got free_thresh 0.7 and occupied_thresh 0.65"),
-    ({"occupied_thresh": "65"}, "map.yaml: thresholds must be 0 <= free_thresh < occupied_thresh <= 1, "
-                                "got free_thresh 0.2 and occupied_thresh 65.0"),
-    ({"image": "''"}, "map.yaml: image must be the name of a file, got ''"),
-    ({"image": "7"}, "map.yaml: image must be the name of a file, got 7")])
+@pytest.mark.parametrize(
+    "fields, text",
+    [
+        ({"mode": "trinery"}, "map.yaml: mode must be trinary, scale or raw, got 'trinery'"),
+        ({"resolution": "0"}, "map.yaml: resolution must be > 0 m, got 0.0"),
+        ({"resolution": "-0.05"}, "map.yaml: resolution must be > 0 m, got -0.05"),
+        ({"resolution": ".nan"}, "map.yaml: resolution must be a finite number, got nan"),
+        ({"resolution": "fine"}, "map.yaml: resolution must be a finite number, got 'fine'"),
+        ({"resolution": None}, f"map.yaml: missing resolution; {NEEDS}"),
+        ({"negate": None, "free_thresh": None}, f"map.yaml: missing negate, free_thresh; {NEEDS}"),
+        ({"negate": "2"}, "map.yaml: negate must be 0 or 1, got 2"),
+        ({"negate": "'no'"}, "map.yaml: negate must be 0 or 1, got 'no'"),
+        ({"origin": "[0, 0]"}, "map.yaml: origin must be [x, y, yaw] in m, m, rad, got [0, 0]"),
+        ({"origin": "[0, .inf, 0]"}, "map.yaml: origin must be [x, y, yaw] in m, m, rad, got [0, inf, 0]"),
+        ({"origin": "corner"}, "map.yaml: origin must be [x, y, yaw] in m, m, rad, got 'corner'"),
+        (
+            {"free_thresh": "0.7"},
+            "map.yaml: thresholds must be 0 <= free_thresh < occupied_thresh <= 1, "
+            "got free_thresh 0.7 and occupied_thresh 0.65",
+        ),
+        (
+            {"occupied_thresh": "65"},
+            "map.yaml: thresholds must be 0 <= free_thresh < occupied_thresh <= 1, "
+            "got free_thresh 0.2 and occupied_thresh 65.0",
+        ),
+        ({"image": "''"}, "map.yaml: image must be the name of a file, got ''"),
+        ({"image": "7"}, "map.yaml: image must be the name of a file, got 7"),
+    ],
+)
 def test_a_value_that_cannot_be_meant_is_refused_in_one_line(write, fields, text):
     path = write([0])
     path.write_text("".join(f"{key}: {value}\n" for key, value in {**FIELDS, **fields}.items() if value is not None))
@@ -157,10 +176,12 @@ def test_an_image_with_too_few_data_is_refused(tmp_path, suffix):
     path_image = tmp_path / f"map.{suffix}"
     Image.fromarray(noise).save(path_image)
     path_image.write_bytes(path_image.read_bytes()[:-150])
-    (tmp_path / "map.yaml").write_text("".join(f"{key}: {value}\n" for key, value in
-                                               {**FIELDS, "image": path_image.name}.items()))
-    assert error(tmp_path / "map.yaml") == (f"map.yaml: the data of its image map.{suffix} do not fit its "
-                                            "20 x 30 pixels: the file is cut short or damaged")
+    (tmp_path / "map.yaml").write_text(
+        "".join(f"{key}: {value}\n" for key, value in {**FIELDS, "image": path_image.name}.items())
+    )
+    assert error(tmp_path / "map.yaml") == (
+        f"map.yaml: the data of its image map.{suffix} do not fit its 20 x 30 pixels: the file is cut short or damaged"
+    )
 
 
 def test_an_image_that_is_none_is_refused(write, tmp_path):
@@ -171,12 +192,19 @@ def test_an_image_that_is_none_is_refused(write, tmp_path):
 
 def test_files_that_are_no_maps_are_refused(tmp_path):
     for name, content, text in [
-            ("map.txt", "", "map.txt: a map is a map_server .yaml or an MRPT .gridmap[.gz]"),
-            ("map.yaml", "- 1\n", "map.yaml: is no map: expected the keys "
-                                  "image, resolution, origin, negate, occupied_thresh, free_thresh"),
-            ("map.yaml", "", "map.yaml: is no map: expected the keys "
-                             "image, resolution, origin, negate, occupied_thresh, free_thresh"),
-            ("map.gridmap", "words", "map.gridmap: is no MRPT grid map")]:
+        ("map.txt", "", "map.txt: a map is a map_server .yaml or an MRPT .gridmap[.gz]"),
+        (
+            "map.yaml",
+            "- 1\n",
+            "map.yaml: is no map: expected the keys image, resolution, origin, negate, occupied_thresh, free_thresh",
+        ),
+        (
+            "map.yaml",
+            "",
+            "map.yaml: is no map: expected the keys image, resolution, origin, negate, occupied_thresh, free_thresh",
+        ),
+        ("map.gridmap", "words", "map.gridmap: is no MRPT grid map"),
+    ]:
         (tmp_path / name).write_text(content)
         assert error(tmp_path / name).startswith(text)
     (tmp_path / "map.yaml").write_text("a: [1\nb: }")
@@ -196,15 +224,17 @@ def test_a_grid_map_of_mrpt_comes_with_its_place_and_unknown_cells():
 
 def test_a_rawlog_is_no_grid_map(tmp_path):
     (tmp_path / "map.gridmap.gz").write_bytes((MRPT_MAPS / "no_scans.rawlog").read_bytes())
-    assert error(tmp_path / "map.gridmap.gz") == ("map.gridmap.gz: holds mrpt::obs::CObservationComment, "
-                                                  "a grid map is COccupancyGridMap2D")
+    assert error(tmp_path / "map.gridmap.gz") == (
+        "map.gridmap.gz: holds mrpt::obs::CObservationComment, a grid map is COccupancyGridMap2D"
+    )
     (tmp_path / "map.gridmap.gz").write_bytes(b"")
     assert error(tmp_path / "map.gridmap.gz") == "map.gridmap.gz: is empty or cut short"
 
 
 @pytest.mark.parametrize("seed", range(10))
-@pytest.mark.parametrize("values", [pytest.param([-1, 0, 100], id="trinary"),
-                                    pytest.param([*range(-1, 99), 100], id="percent")])
+@pytest.mark.parametrize(
+    "values", [pytest.param([-1, 0, 100], id="trinary"), pytest.param([*range(-1, 99), 100], id="percent")]
+)
 def test_a_saved_map_comes_back_equal(tmp_path, seed, values):
     rng = np.random.default_rng(seed)
     occupancy = rng.choice(np.array(values, np.int8), size=rng.integers(1, 40, 2))

@@ -68,7 +68,7 @@ def test_a_dotted_wall_behind_unknown_cells_is_a_wall():
 @pytest.mark.parametrize("gap_cells, pieces", [(3, 1), (20, 2)])
 def test_a_wall_goes_on_behind_a_small_gap_of_unknown_cells_only(gap_cells, pieces):
     occupancy = room()
-    occupancy[-2, 40:40 + gap_cells] = UNKNOWN
+    occupancy[-2, 40 : 40 + gap_cells] = UNKNOWN
     found = wall_segments.extract(grid(occupancy)).segments_m
     assert (np.abs(found[:, [1, 3]] - 3.125).max(axis=1) < 0.02).sum() == pieces
 
@@ -106,7 +106,9 @@ def test_outlines_run_around_a_piece_and_its_hole_with_the_piece_to_the_left():
     cells[2:4, 2:4] = False
     around = sorted(wall_segments.outlines(cells), key=len)
     assert [len(line) for line in around] == [8, 18]
+
     def area(line):
         x, y = line.T
         return 0.5 * (np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+
     assert [area(line) for line in around] == [-4.0, 20.0]  # counter-clockwise around the piece, clockwise the hole

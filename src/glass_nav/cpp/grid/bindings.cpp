@@ -1,0 +1,213 @@
+/// The Python module _mrpt_grid. Private: docstrings, checks and defaults are in sensing/raycast.py and
+/// hypotheses/scan_matcher.py.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include "grid_raycaster.hpp"
+#include "scan_matcher.hpp"
+
+namespace py = pybind11;
+
+namespace glass_nav {
+namespace {
+
+template <class T>
+using Array = py::array_t<T, py::array::c_style | py::array::forcecast>;
+
+RayBatch batch_of(const Array<double>& poses, const Array<double>& angles, double max_range_m, int threads) {
+  if (poses.ndim() != 2 || poses.shape(1) != 3) throw std::invalid_argument("poses must be (P, 3)");
+  if (angles.ndim() != 1) throw std::invalid_argument("angles must be (B,)");
+  if (!(max_range_m > 0.0)) throw std::invalid_argument("max_range must be > 0 m");
+  if (threads < 1) throw std::invalid_argument("threads must be >= 1");
+  return {poses.data(), static_cast<std::size_t>(poses.shape(0)), angles.data(),
+          static_cast<std::size_t>(angles.shape(0)), max_range_m, threads};
+}
+
+template <class T>
+py::array_t<T> result_for(const RayBatch& rays) {
+  return py::array_t<T>({rays.pose_count, rays.angle_count});
+}
+
+std::unique_ptr<GridRaycaster> make_grid(const Array<std::int8_t>& occupancy, double resolution_m,
+                                         int occupied_percent, const std::string& backend, bool unknown_stops) {
+  if (occupancy.ndim() != 2) throw std::invalid_argument("occupancy must be (H, W)");
+  constexpr py::ssize_t kMost = std::numeric_limits<int>::max();
+  if (occupancy.shape(0) > kMost || occupancy.shape(1) > kMost) throw std::invalid_argument("occupancy is too large");
+  const auto height = static_cast<int>(occupancy.shape(0)), width = static_cast<int>(occupancy.shape(1));
+  const std::int8_t* cells = occupancy.data();
+  const Backend chosen = backend_from_name(backend);
+  py::gil_scoped_release unlocked;
+  return std::make_unique<GridRaycaster>(cells, height, width, resolution_m, occupied_percent, chosen, unknown_stops);
+}
+
+py::array_t<double> cast(const GridRaycaster& grid, const Array<double>& poses, const Array<double>& angles,
+                         double max_range_m, int threads) {
+  const RayBatch rays = batch_of(poses, angles, max_range_m, threads);
+  auto range_m = result_for<double>(rays);
+  double* to = range_m.mutable_data();
+  py::gil_scoped_release unlocked;
+  grid.cast_first(rays, to, nullptr);
+  return range_m;
+}
+
+py::tuple cast_first(const GridRaycaster& grid, const Array<double>& poses, const Array<double>& angles,
+                     double max_range_m, int threads) {
+  const RayBatch rays = batch_of(poses, angles, max_range_m, threads);
+  auto range_m = result_for<double>(rays);
+  auto cell = result_for<std::int32_t>(rays);
+  double* range_to = range_m.mutable_data();
+  std::int32_t* cell_to = cell.mutable_data();
+  {
+    py::gil_scoped_release unlocked;
+    grid.cast_first(rays, range_to, cell_to);
+  }
+  return py::make_tuple(range_m, cell);
+}
+
+py::dict cast_surfaces(const GridRaycaster& grid, const Array<double>& poses, const Array<double>& angles,
+                       double max_range_m, double max_thickness_m, double min_linearity, double min_gap_m,
+                       int threads) {
+  const RayBatch rays = batch_of(poses, angles, max_range_m, threads);
+  py::dict result;
+  const auto real = [&](const char* name) {
+    auto array = result_for<double>(rays);
+    result[name] = array;
+    return array.mutable_data();
+  };
+  const auto index = [&](const char* name) {
+    auto array = result_for<std::int32_t>(rays);
+    result[name] = array;
+    return array.mutable_data();
+  };
+  const SurfaceArrays out{{real("first_m"), real("second_m"), real("third_m")},
+                          {index("first_cell"), index("second_cell"), index("third_cell")},
+                          {real("first_thickness_m"), real("second_thickness_m")},
+                          real("normal_rad"), real("linearity"), real("mirrored_m"), index("mirrored_cell")};
+  {
+    py::gil_scoped_release unlocked;
+    grid.cast_surfaces(rays, {max_thickness_m, min_linearity, min_gap_m}, out);
+  }
+  return result;
+}
+
+py::tuple cast_paths(const GridRaycaster& grid, const Array<double>& poses, const Array<double>& angles,
+                     const Array<double>& reach_m, double max_thickness_m, double min_linearity, double min_gap_m,
+                     int threads) {
+  constexpr double kUnused = 1.0;
+  const RayBatch rays = batch_of(poses, angles, kUnused, threads);
+  if (reach_m.ndim() != 1 || reach_m.shape(0) != angles.shape(0)) throw std::invalid_argument("reach must be (B,)");
+  const std::vector<py::ssize_t> shape{4, poses.shape(0), angles.shape(0)};
+  py::array_t<double> range_m(shape), cos(shape);
+  py::array_t<std::int32_t> cell(shape);
+  PathArrays out{};
+  for (std::size_t path = 0; path < 4; ++path) {
+    const std::size_t from = path * rays.pose_count * rays.angle_count;
+    out.range_m[path] = range_m.mutable_data() + from;
+    out.cos[path] = cos.mutable_data() + from;
+    out.cell[path] = cell.mutable_data() + from;
+  }
+  {
+    const double* reach = reach_m.data();
+    py::gil_scoped_release unlocked;
+    grid.cast_paths(rays, reach, {max_thickness_m, min_linearity, min_gap_m}, out);
+  }
+  return py::make_tuple(range_m, cos, cell);
+}
+
+py::array_t<double> simulate_scan_ray_raw(const GridRaycaster& grid, const Array<double>& poses,
+                                          const Array<double>& angles, double max_range_m) {
+  const RayBatch rays = batch_of(poses, angles, max_range_m, 1);
+  auto range_m = result_for<double>(rays);
+  double* to = range_m.mutable_data();
+  py::gil_scoped_release unlocked;
+  grid.simulate_scan_ray_raw(rays, to);
+  return range_m;
+}
+
+py::tuple normals(const GridRaycaster& grid) {
+  const WallNormals* walls = nullptr;
+  {
+    py::gil_scoped_release unlocked;
+    walls = &grid.normals();
+  }
+  const auto count = static_cast<py::ssize_t>(grid.width()) * grid.height();
+  const std::vector<py::ssize_t> shape{count};  // not the bare number: pybind11 2.10 makes that an array of stride 0
+  py::array_t<float> normal_rad(shape), linearity(shape), offset_m(shape);
+  float *angle_to = normal_rad.mutable_data(), *linearity_to = linearity.mutable_data();
+  float* offset_to = offset_m.mutable_data();
+  std::fill(angle_to, angle_to + count, std::numeric_limits<float>::quiet_NaN());
+  std::fill(linearity_to, linearity_to + count, 0.0F);
+  std::fill(offset_to, offset_to + count, std::numeric_limits<float>::quiet_NaN());
+  for (const std::int32_t cell : walls->cells()) {
+    const WallNormals::Normal normal = walls->at(cell);
+    angle_to[cell] = std::atan2(normal.y, normal.x);
+    linearity_to[cell] = normal.linearity;
+    offset_to[cell] = static_cast<float>(normal.offset * grid.resolution_m());
+  }
+  return py::make_tuple(normal_rad, linearity, offset_m);
+}
+
+std::unique_ptr<ScanMatcher> make_matcher(const Array<std::uint8_t>& scores, const Array<std::uint8_t>& allowed) {
+  if (scores.ndim() != 2 || allowed.ndim() != 2 || scores.shape(0) != allowed.shape(0) ||
+      scores.shape(1) != allowed.shape(1)) {
+    throw std::invalid_argument("scores and allowed must be (H, W)");
+  }
+  const auto height = static_cast<int>(scores.shape(0)), width = static_cast<int>(scores.shape(1));
+  const std::uint8_t *score = scores.data(), *may = allowed.data();
+  py::gil_scoped_release unlocked;
+  return std::make_unique<ScanMatcher>(score, may, height, width);
+}
+
+py::tuple search(const ScanMatcher& matcher, const Array<double>& points, const Array<double>& headings_rad,
+                 std::size_t keep) {
+  if (points.ndim() != 2 || points.shape(1) != 2) throw std::invalid_argument("points must be (B, 2)");
+  if (headings_rad.ndim() != 1) throw std::invalid_argument("headings must be (A,)");
+  std::vector<Match> found;
+  {
+    const double *point = points.data(), *heading = headings_rad.data();
+    const auto count = static_cast<std::size_t>(points.shape(0));
+    const auto headings = static_cast<std::size_t>(headings_rad.shape(0));
+    py::gil_scoped_release unlocked;
+    found = matcher.search(point, count, heading, headings, keep);
+  }
+  const std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(found.size())};
+  py::array_t<std::int32_t> row(shape), column(shape), turn(shape);
+  py::array_t<float> score(shape);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    row.mutable_data()[i] = found[i].row;
+    column.mutable_data()[i] = found[i].column;
+    turn.mutable_data()[i] = found[i].heading;
+    score.mutable_data()[i] = found[i].score;
+  }
+  return py::make_tuple(row, column, turn, score);
+}
+
+}  // namespace
+}  // namespace glass_nav
+
+PYBIND11_MODULE(_mrpt_grid, module) {
+  using namespace glass_nav;
+  py::class_<GridRaycaster>(module, "Grid")
+      .def(py::init(&make_grid), py::arg("occupancy"), py::arg("resolution_m"), py::arg("occupied_percent"),
+           py::arg("backend"), py::arg("unknown_stops"))
+      .def("cast", &cast, py::arg("poses"), py::arg("angles"), py::arg("max_range_m"), py::arg("threads"))
+      .def("cast_first", &cast_first, py::arg("poses"), py::arg("angles"), py::arg("max_range_m"), py::arg("threads"))
+      .def("cast_surfaces", &cast_surfaces, py::arg("poses"), py::arg("angles"), py::arg("max_range_m"),
+           py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"), py::arg("threads"))
+      .def("cast_paths", &cast_paths, py::arg("poses"), py::arg("angles"), py::arg("reach_m"),
+           py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"), py::arg("threads"))
+      .def("simulate_scan_ray_raw", &simulate_scan_ray_raw, py::arg("poses"), py::arg("angles"),
+           py::arg("max_range_m"))
+      .def("normals", &normals);
+  py::class_<ScanMatcher>(module, "ScanMatcher")
+      .def(py::init(&make_matcher), py::arg("scores"), py::arg("allowed"))
+      .def("search", &search, py::arg("points"), py::arg("headings_rad"), py::arg("keep"));
+}

@@ -1,0 +1,184 @@
+#include "grid_raycaster.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "first_hits.hpp"
+#include "ray_stream.hpp"
+#include "surfaces.hpp"
+
+namespace glass_nav {
+namespace {
+
+/// Deals the batch out in chunks: work(index of the first ray, how many, stream of them).
+template <class Work>
+void for_each_chunk(const RayBatch& batch, double resolution_m, const Work& work) {
+  constexpr std::ptrdiff_t kPoses = 16;
+  const Beams beams(batch.angles, batch.angle_count);
+  const auto pose_count = static_cast<std::ptrdiff_t>(batch.angle_count > 0 ? batch.pose_count : 0);
+#pragma omp parallel for num_threads(batch.threads) if (batch.threads > 1) schedule(dynamic)
+  for (std::ptrdiff_t first = 0; first < pose_count; first += kPoses) {
+    const std::ptrdiff_t poses = std::min(kPoses, pose_count - first);
+    RayStream rays(batch.poses + 3 * first, beams, resolution_m);
+    work(static_cast<std::size_t>(first) * beams.count(), static_cast<std::size_t>(poses) * beams.count(), rays);
+  }
+}
+
+/// Calls work(index, ray) for every ray of the batch, index in the order of the result arrays.
+template <class Work>
+void for_each_ray(const RayBatch& batch, double resolution_m, const Work& work) {
+  for_each_chunk(batch, resolution_m, [&](std::size_t first, std::size_t count, RayStream& rays) {
+    for (std::size_t i = 0; i < count; ++i) work(first + i, rays.next());
+  });
+}
+
+constexpr float kFree = 1.0F, kUnknown = 0.5F, kOccupied = 0.0F;  // MRPT keeps the probability of being free
+
+}  // namespace
+
+Backend backend_from_name(const std::string& name) {
+  if (name == "exact") return Backend::exact;
+  if (name == "mrpt") return Backend::mrpt;
+  throw std::invalid_argument("backend must be 'exact' or 'mrpt', got '" + name + "'");
+}
+
+GridRaycaster::GridRaycaster(const std::int8_t* occupancy, int height, int width, double resolution_m,
+                             int occupied_percent, Backend backend, bool unknown_stops)
+    : width_(width), height_(height), resolution_m_(resolution_m), backend_(backend) {
+  if (width < 1 || height < 1) throw std::invalid_argument("a grid needs at least one cell");
+  if (!(resolution_m > 0.0 && std::isfinite(resolution_m))) throw std::invalid_argument("resolution must be > 0 m");
+  const std::int64_t count = static_cast<std::int64_t>(width) * height;
+  if (count > std::numeric_limits<std::int32_t>::max()) throw std::invalid_argument("a grid has at most 2^31 - 1 cells");
+  // At the origin: setSize() would round any other place to whole cells.
+  map_.setSize(0.0F, static_cast<float>(width * resolution_m), 0.0F, static_cast<float>(height * resolution_m),
+               static_cast<float>(resolution_m));
+  if (map_.getSizeX() != static_cast<unsigned>(width) || map_.getSizeY() != static_cast<unsigned>(height)) {
+    throw std::invalid_argument("MRPT made " + std::to_string(map_.getSizeX()) + " x " +
+                                std::to_string(map_.getSizeY()) + " cells of a grid of " + std::to_string(width) +
+                                " x " + std::to_string(height));
+  }
+  std::vector<std::uint8_t> blocked(count);
+  for (std::int64_t cell = 0; cell < count; ++cell) {
+    const bool unknown = occupancy[cell] < 0;
+    const bool occupied = !unknown && occupancy[cell] >= occupied_percent;
+    blocked[cell] = occupied || (unknown && unknown_stops) ? 1 : 0;
+    map_.setCell(static_cast<int>(cell % width), static_cast<int>(cell / width),
+                 occupied ? kOccupied : (unknown ? kUnknown : kFree));
+  }
+  chessboard_distance_ = std::make_unique<const ChessboardDistance>(blocked, width, height);
+}
+
+const WallNormals& GridRaycaster::normals() const {
+  std::call_once(normals_once_, [this] {
+    const GridCells grid = cells();
+    std::vector<std::uint8_t> occupied(map_.getRawMap().size());
+    for (std::size_t i = 0; i < occupied.size(); ++i) occupied[i] = grid.occupied(static_cast<std::int32_t>(i)) ? 1 : 0;
+    normals_ = std::make_unique<const WallNormals>(occupied, width_, height_);
+  });
+  return *normals_;
+}
+
+GridCells GridRaycaster::cells() const { return {width_, height_, map_.getRawMap().data(), chessboard_distance_.get()}; }
+
+template <class Use>
+void GridRaycaster::with_ray_marcher(const Use& use) const {
+  const GridCells grid = cells();
+  if (backend_ == Backend::exact) {
+    use(grid, ExactRayMarcher(grid));
+  } else {
+    use(grid, MrptRayMarcher(grid, map_, resolution_m_));
+  }
+}
+
+void GridRaycaster::cast_first(const RayBatch& batch, double* range_m, std::int32_t* cell) const {
+  const double t_max = batch.max_range_m / resolution_m_;
+  const GridCells grid = cells();
+  const auto store = [&](std::size_t i, double t, std::int32_t met) {
+    range_m[i] = met < 0 ? kInfinity : t * resolution_m_;
+    if (cell != nullptr) cell[i] = met;
+  };
+  if (backend_ == Backend::exact) {
+    const FirstHits first_hits(grid);
+    for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
+      first_hits.along_all(count, t_max, rays,
+                           [&](std::size_t i, double t, std::int32_t met) { store(first + i, t, met); });
+    });
+    return;
+  }
+  const MrptRayMarcher marcher(grid, map_, resolution_m_);
+  for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
+    const auto start = [&](std::size_t) {
+      const Ray ray = rays.next();
+      return Search{ray, GridWalk(ray, grid.width, grid.height, t_max)};
+    };
+    marcher.march_all(count, start, NothingIgnored{}, [&](std::size_t i, const GridWalk& walk, std::int32_t met) {
+      store(first + i, walk.t(), met);
+    });
+  });
+}
+
+template <class Reach, class Store>
+void GridRaycaster::find_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const Reach& t_max,
+                                  const Store& store) const {
+  const SurfaceRules rules{limits.max_thickness_m / resolution_m_, limits.min_linearity,
+                           limits.min_gap_m / resolution_m_};
+  const WallNormals& wall_normals = normals();  // before the threads start
+  with_ray_marcher([&](const GridCells& grid, const auto& marcher) {
+    const SurfaceFinder finder(grid, marcher, wall_normals, rules);
+    for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
+      constexpr std::size_t kTogether = 512;  // their state fits the level 2 cache
+      for (std::size_t done = 0; done < count; done += kTogether) {
+        finder.along_all(std::min(kTogether, count - done), t_max, rays,
+                         [&](std::size_t i, const Surfaces& found, const Ray& ray) {
+                           store(first + done + i, finder, found, ray);
+                         });
+      }
+    });
+  });
+}
+
+void GridRaycaster::cast_surfaces(const RayBatch& batch, const SurfaceLimits& limits,
+                                  const SurfaceArrays& out) const {
+  const auto reach = [t_max = batch.max_range_m / resolution_m_](std::size_t) { return t_max; };
+  find_surfaces(batch, limits, reach, [&](std::size_t i, const auto&, const Surfaces& found, const Ray&) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      out.range_m[k][i] = found.range[k] * resolution_m_;
+      out.cell[k][i] = found.cell[k];
+    }
+    for (std::size_t k = 0; k < 2; ++k) out.thickness_m[k][i] = found.thickness[k] * resolution_m_;
+    out.normal_rad[i] = std::atan2(found.normal.y, found.normal.x);
+    out.linearity[i] = found.normal.linearity;
+    out.mirrored_m[i] = found.mirrored * resolution_m_;
+    out.mirrored_cell[i] = found.mirrored_cell;
+  });
+}
+
+void GridRaycaster::cast_paths(const RayBatch& batch, const double* reach_m, const SurfaceLimits& limits,
+                               const PathArrays& out) const {
+  const auto reach = [&](std::size_t beam) { return reach_m[beam] / resolution_m_; };
+  find_surfaces(batch, limits, reach, [&](std::size_t i, const auto& finder, const Surfaces& found, const Ray& ray) {
+    const Incidences incidences = finder.incidences(found, ray);
+    constexpr std::size_t kMirrored = 1;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t path = k == 0 ? 0 : k + 1;
+      out.range_m[path][i] = found.range[k] * resolution_m_;
+      out.cos[path][i] = incidences.cos[k];
+      out.cell[path][i] = found.cell[k];
+    }
+    out.range_m[kMirrored][i] = found.mirrored * resolution_m_;
+    out.cos[kMirrored][i] = incidences.mirrored_cos;
+    out.cell[kMirrored][i] = found.mirrored_cell;
+  });
+}
+
+void GridRaycaster::simulate_scan_ray_raw(const RayBatch& batch, double* range_m) const {
+  const MrptRayMarcher marcher(cells(), map_, resolution_m_);
+  const double t_max = batch.max_range_m / resolution_m_;
+  for_each_ray(batch, resolution_m_, [&](std::size_t i, const Ray& ray) {
+    range_m[i] = marcher.free_cells(ray, 0.0, t_max) * resolution_m_;
+  });
+}
+
+}  // namespace glass_nav

@@ -1,0 +1,108 @@
+/// Casts rays on an occupancy grid held by MRPT.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include <mrpt/maps/COccupancyGridMap2D.h>
+
+#include "chessboard_distance.hpp"
+#include "ray_marching.hpp"
+#include "wall_normals.hpp"
+
+namespace glass_nav {
+
+enum class Backend {
+  exact,  // leaps from free square to free square, exact to the cell boundary
+  mrpt,   // COccupancyGridMap2D::simulateScanRay says where to look; see MrptRayMarcher
+};
+
+/// "exact" or "mrpt"; std::invalid_argument for any other name.
+Backend backend_from_name(const std::string& name);
+
+/// A batch of rays: every pose looks along every angle. Row-major arrays, owned by the caller.
+struct RayBatch {
+  const double* poses;   // pose_count * 3: x [m], y [m], yaw [rad] in the frame of the grid
+  std::size_t pose_count;
+  const double* angles;  // angle_count: directions in the frame of the pose [rad]
+  std::size_t angle_count;
+  double max_range_m;
+  int threads;  // 1: the caller's thread, no OpenMP
+};
+
+/// What ends a surface, and what is taken for one.
+struct SurfaceLimits {
+  double max_thickness_m;  // along the normal; a thicker run ends the ray
+  double min_linearity;    // below it a cell has no normal
+  double min_gap_m;        // a shorter free gap on the ray does not part two surfaces
+};
+
+/// Where the results of cast_surfaces go: arrays of pose_count * angle_count.
+struct SurfaceArrays {
+  double* range_m[3];      // first, second, third surface; inf where none
+  std::int32_t* cell[3];   // -1 where none
+  double* thickness_m[2];  // of the first and the second; inf where the ray was not followed through
+  double* normal_rad;      // of the first, facing the origin of the ray; NaN where none
+  double* linearity;       // of the first
+  double* mirrored_m;      // path by way of the first surface; inf where none
+  std::int32_t* mirrored_cell;  // where that ends; -1 where none
+};
+
+/// Where the results of cast_paths go: arrays of pose_count * angle_count for each way that a beam may take: to the
+/// first surface, mirrored there, and to the second and the third.
+struct PathArrays {
+  double* range_m[4];  // whole length; inf where none
+  double* cos[4];      // of the incidence where it ends; 1 without a normal
+  std::int32_t* cell[4];  // where it ends; -1 where none
+};
+
+/// An occupancy grid and the rays on it. Frame of the grid: cell [0, 0] starts at (0, 0), no rotation.
+class GridRaycaster {
+ public:
+  /// @param occupancy  height * width, row by row, 0 .. 100 percent or -1 unknown
+  /// @param occupied_percent  from here on a cell ends a beam
+  /// @param unknown_stops  a ray ends, without a hit, at the first unknown cell; otherwise it passes
+  GridRaycaster(const std::int8_t* occupancy, int height, int width, double resolution_m, int occupied_percent,
+                Backend backend, bool unknown_stops);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  double resolution_m() const { return resolution_m_; }
+
+  /// First occupied cell along every ray: range_m inf and cell -1 where there is none. `cell` may be null.
+  void cast_first(const RayBatch& batch, double* range_m, std::int32_t* cell) const;
+
+  /// First, second and third surface along every ray, with what lies between.
+  void cast_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const SurfaceArrays& out) const;
+
+  /// The same for comparison with measured ranges, without what lies between; beam b is followed up to reach_m[b].
+  void cast_paths(const RayBatch& batch, const double* reach_m, const SurfaceLimits& limits,
+                  const PathArrays& out) const;
+
+  /// What simulateScanRay itself answers, faults included, asked to look to max_range_m: for comparison only.
+  void simulate_scan_ray_raw(const RayBatch& batch, double* range_m) const;
+
+  /// Computed when first asked for; any thread may ask.
+  const WallNormals& normals() const;
+
+ private:
+  GridCells cells() const;
+  template <class Use>
+  void with_ray_marcher(const Use& use) const;  // use(GridCells, marcher of the backend)
+  template <class Reach, class Store>
+  void find_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const Reach& t_max, const Store& store) const;
+
+  int width_, height_;
+  double resolution_m_;
+  Backend backend_;
+  mrpt::maps::COccupancyGridMap2D map_;
+  std::unique_ptr<const ChessboardDistance> chessboard_distance_;  // between the cells where a ray may end
+  mutable std::once_flag normals_once_;
+  mutable std::unique_ptr<const WallNormals> normals_;
+};
+
+}  // namespace glass_nav

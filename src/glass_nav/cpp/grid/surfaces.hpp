@@ -1,0 +1,223 @@
+/// What lies along one ray: up to three surfaces, what was passed between them, and the mirrored path.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "grid_walk.hpp"
+#include "ray_marching.hpp"
+#include "wall_normals.hpp"
+
+namespace glass_nav {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Lengths in cells.
+struct SurfaceRules {
+  double max_thickness;  // along the normal; a thicker run ends the ray
+  double min_linearity;  // below it a cell has no normal
+  double min_gap;        // a shorter free gap on the ray does not part two surfaces
+};
+
+struct Surfaces {
+  std::array<double, 3> range{kInfinity, kInfinity, kInfinity};
+  std::array<std::int32_t, 3> cell{-1, -1, -1};
+  std::array<double, 2> thickness{kInfinity, kInfinity};
+  WallNormals::Normal normal{std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::quiet_NaN(),
+                             0.0F, std::numeric_limits<float>::quiet_NaN()};  // of the first, towards the origin
+  double mirrored = kInfinity;
+  std::int32_t mirrored_cell = -1;
+};
+
+/// |cos| of the incidence where the first, second and third surface and the mirrored path were met; 1 without a normal.
+struct Incidences {
+  std::array<double, 3> cos{1.0, 1.0, 1.0};
+  double mirrored_cos = 1.0;
+};
+
+/// Looks along rays and through what they meet.
+template <class RayMarcher>
+class SurfaceFinder {
+ public:
+  SurfaceFinder(const GridCells& cells, const RayMarcher& marcher, const WallNormals& normals, const SurfaceRules& rules)
+      : cells_(cells), marcher_(marcher), normals_(normals), rules_(rules) {}
+
+  /// Follows `count` rays of the stream `rays`, each up to t_max(beam); found(i, Surfaces, Ray) for each. All rays go
+  /// from surface to surface together, since the marcher is fastest with many.
+  template <class Rays, class Reach, class Found>
+  void along_all(std::size_t count, const Reach& t_max, Rays& rays, const Found& found) const {
+    std::vector<Search> searches(count);
+    std::vector<Surfaces> surfaces(count);
+    std::vector<std::size_t> going(count);  // rays that are not at their end
+    for (std::size_t i = 0; i < count; ++i) {
+      const double reach = t_max(rays.beam());
+      const Ray ray = rays.next();
+      searches[i] = {ray, GridWalk(ray, cells_.width, cells_.height, reach)};
+      going[i] = i;
+    }
+    for (std::size_t k = 0; k < 3 && !going.empty(); ++k) {
+      seek_surface(k, going, searches, surfaces);
+      if (k == 0) mirror(going, searches, surfaces);
+      if (k < 2) pass_surface(k, going, searches, surfaces);  // what is behind the third is nobody's business
+    }
+    for (std::size_t i = 0; i < count; ++i) found(i, surfaces[i], searches[i].ray);
+  }
+
+  /// How flatly the ray and its mirrored path met what they met.
+  Incidences incidences(const Surfaces& at, const Ray& ray) const {
+    Incidences result;
+    if (at.cell[0] < 0) return result;
+    if (usable(at.normal)) result.cos[0] = std::abs(projection(at.normal, ray));
+    for (std::size_t k = 1; k < 3; ++k) result.cos[k] = cos_at(at.cell[k], ray);
+    if (at.mirrored_cell >= 0) result.mirrored_cos = cos_at(at.mirrored_cell, reflected(ray, 0.0, at.normal));
+    return result;
+  }
+
+ private:
+  /// The line of a wall through one of its cells; with a normal of NaN no cell is on it.
+  struct WallLine {
+    int width;
+    std::int32_t cell;
+    double nx, ny;
+
+    bool has(std::int32_t other) const {
+      return std::abs(nx * columns_to(other) + ny * rows_to(other)) <= kHalfThickness;
+    }
+    bool has_nearby(std::int32_t other, int radius) const {
+      return std::max(std::abs(columns_to(other)), std::abs(rows_to(other))) <= radius && has(other);
+    }
+
+   private:
+    static constexpr double kHalfThickness = 1.5;  // cells to either side; a wall drawn one to two cells thick
+
+    int columns_to(std::int32_t other) const { return other % width - cell % width; }
+    int rows_to(std::int32_t other) const { return other / width - cell / width; }
+  };
+
+  /// Sends the rays on to their surface number k; `going` keeps those that meet one.
+  void seek_surface(std::size_t k, std::vector<std::size_t>& going, std::vector<Search>& searches,
+                    std::vector<Surfaces>& surfaces) const {
+    const auto search = [&](std::size_t j) -> const Search& { return searches[going[j]]; };
+    const auto found = [&](std::size_t j, const GridWalk& walk, std::int32_t met) {
+      searches[going[j]].walk = walk;
+      surfaces[going[j]].cell[k] = met;
+      if (met >= 0) surfaces[going[j]].range[k] = walk.t();
+    };
+    if (k == 0) {
+      marcher_.march_all(going.size(), search, NothingIgnored{}, found);
+    } else {
+      std::vector<WallLine> passed;  // a flat ray would meet the posts and steps of the wall it has passed again
+      for (const std::size_t i : going) passed.push_back(wall_line(surfaces[i].cell[k - 1]));
+      const auto on_passed = [&](std::size_t j, std::int32_t cell) { return passed[j].has(cell); };
+      marcher_.march_all(going.size(), search, on_passed, found);
+    }
+    const auto ended = [&](std::size_t i) { return surfaces[i].cell[k] < 0; };
+    going.erase(std::remove_if(going.begin(), going.end(), ended), going.end());
+  }
+
+  /// Takes the rays through their surface number k; `going` keeps those that come out.
+  void pass_surface(std::size_t k, std::vector<std::size_t>& going, std::vector<Search>& searches,
+                    std::vector<Surfaces>& surfaces) const {
+    const auto ends = [&](std::size_t i) {
+      Search& search = searches[i];
+      const WallNormals::Normal normal =
+          k == 0 ? surfaces[i].normal : facing(normals_.at(surfaces[i].cell[k]), search.ray);
+      const double cos_incidence = usable(normal) ? -projection(normal, search.ray) : 1.0;
+      const double length = pass_run(search.walk, rules_.max_thickness / cos_incidence);
+      surfaces[i].thickness[k] = length == kInfinity ? kInfinity : length * cos_incidence;
+      return length == kInfinity || !search.walk.inside();
+    };
+    going.erase(std::remove_if(going.begin(), going.end(), ends), going.end());
+  }
+
+  /// Finds the normals of the first surfaces and follows the rays mirrored there: along u - 2 (u . n) n.
+  void mirror(const std::vector<std::size_t>& hits, const std::vector<Search>& searches,
+              std::vector<Surfaces>& surfaces) const {
+    std::vector<std::size_t> mirrored;
+    std::vector<WallLine> mirrors;
+    for (const std::size_t i : hits) {
+      surfaces[i].normal = facing(normals_.at(surfaces[i].cell[0]), searches[i].ray);
+      if (!usable(surfaces[i].normal)) continue;
+      mirrored.push_back(i);
+      mirrors.push_back({cells_.width, surfaces[i].cell[0], surfaces[i].normal.x, surfaces[i].normal.y});
+    }
+    marcher_.march_all(
+        mirrored.size(),
+        [&](std::size_t j) {
+          const double t = surfaces[mirrored[j]].range[0];
+          const Ray ray = reflected(searches[mirrored[j]].ray, t, surfaces[mirrored[j]].normal);
+          const double t_max = searches[mirrored[j]].walk.t_max();
+          return Search{ray, GridWalk(ray, cells_.width, cells_.height, t_max - t)};
+        },
+        // Cells of the mirror itself, within the patch that gave its normal: the staircase of a slanted wall.
+        [&](std::size_t j, std::int32_t cell) { return mirrors[j].has_nearby(cell, WallNormals::kRadiusCells); },
+        [&](std::size_t j, const GridWalk& walk, std::int32_t met) {
+          Surfaces& at = surfaces[mirrored[j]];
+          at.mirrored_cell = met;
+          if (met >= 0) at.mirrored = at.range[0] + walk.t();
+        });
+  }
+
+  double cos_at(std::int32_t cell, const Ray& ray) const {
+    if (cell < 0) return 1.0;
+    const WallNormals::Normal normal = normals_.at(cell);
+    return usable(normal) ? std::abs(projection(normal, ray)) : 1.0;
+  }
+
+  WallLine wall_line(std::int32_t cell) const {
+    const WallNormals::Normal normal = normals_.at(cell);
+    if (!usable(normal)) return {cells_.width, cell, std::nan(""), std::nan("")};
+    return {cells_.width, cell, normal.x, normal.y};
+  }
+
+  static Ray reflected(const Ray& ray, double t, const WallNormals::Normal& normal) {
+    const double into = projection(normal, ray);
+    return {ray.x + t * ray.dx, ray.y + t * ray.dy, ray.dx - 2.0 * into * normal.x, ray.dy - 2.0 * into * normal.y};
+  }
+
+  bool usable(const WallNormals::Normal& normal) const {
+    return normal.linearity > 0.0F && normal.linearity >= rules_.min_linearity;
+  }
+
+  static double projection(const WallNormals::Normal& normal, const Ray& ray) {
+    return normal.x * ray.dx + normal.y * ray.dy;
+  }
+
+  static WallNormals::Normal facing(WallNormals::Normal normal, const Ray& ray) {
+    if (projection(normal, ray) <= 0.0) return normal;  // also if it is NaN
+    return {-normal.x, -normal.y, normal.linearity, -normal.offset};
+  }
+
+  /// Leaves the run of occupied cells in which the walk stands, gaps too short to count included.
+  ///
+  /// Returns its length along the ray. inf if it is longer than max_length, or the ray ends in it.
+  double pass_run(GridWalk& walk, double max_length) const {
+    const double min_gap = std::max(rules_.min_gap, GridWalk::kCorner);
+    const double t_in = walk.t();
+    double t_out = t_in;
+    for (;;) {
+      const bool occupied = cells_.occupied(walk.cell());
+      walk.leap(1);
+      if (occupied) t_out = walk.t();
+      if (t_out - t_in > max_length || t_out > walk.t_max()) return kInfinity;
+      if (!walk.inside() || walk.t() - t_out >= min_gap) return t_out - t_in;
+      if (cells_.met(walk, NothingIgnored{}) >= 0) {
+        t_out = walk.t();
+      } else if (cells_.stops(walk.cell())) {
+        return kInfinity;
+      }
+    }
+  }
+
+  const GridCells& cells_;
+  const RayMarcher& marcher_;
+  const WallNormals& normals_;
+  SurfaceRules rules_;
+};
+
+}  // namespace glass_nav

@@ -1,0 +1,36 @@
+/// The soft vote on what each beam met, summed over the samples. The formulation is in localization/beam_classification/case_votes.py.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace glass_nav {
+
+constexpr std::size_t kPaths = 4;  // to the first surface, mirrored there, to the second and the third
+
+/// What the samples offer and the beams measured. Row-major arrays of kPaths * samples * beams, or beams.
+struct Offers {
+  std::size_t samples, beams;
+  const double* measured_m;  // beams; not finite: no answer
+  const double* range_m;     // where the near boundary of the wall is met; inf: nowhere
+  const double* cos;         // of the incidence there
+  const float* thickness_m;  // of the wall there
+};
+
+/// How a beam may end.
+struct Chances {
+  const double* prior;  // (kPaths + 1) * beams: of the cases in the order of the paths; last, see gone
+  double nothing;       // to meet what is on no map
+  double depth_share;   // of the thickness of a wall: where in it beams end
+  double sigma_m;       // around that, across the wall
+  double gate_m;        // farther across from a reference a beam does not belong to it
+  double least_cos;     // a surface seen flatter counts as one seen like that
+  double temper;        // of a sample's evidence
+};
+
+/// Writes shares of the vote, (kPaths + 1) * beams: nothing on the map, then the cases in the order of the paths; the
+/// shares of each beam add up to 1. The last prior is that of a beam to end at the second surface where the first is
+/// gone, which is on no map either.
+void count_case_votes(const Offers& offers, const Chances& chances, double* share);
+
+}  // namespace glass_nav

@@ -1,0 +1,1 @@
+"""Trajectories, cases and runs -> figures."""

@@ -1,0 +1,1 @@
+"""Figures as pictures, by matplotlib without a display."""

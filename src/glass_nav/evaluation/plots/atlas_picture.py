@@ -1,0 +1,194 @@
+"""Pictures of an atlas over its map, by matplotlib without a display."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Optional, Sequence
+
+import numpy as np
+
+from glass_nav.evaluation.plots.run_pictures import UNKNOWN_GREY, MapImage, draw_map
+
+MARGIN_M = 1.0
+MAX_NUMBERS = 250  # nodes; more numbers than these nobody can read
+MIN_NUMBERED_M = 0.8
+EDGE_COLOUR, CHOSEN_COLOUR, WALL_COLOUR = "#1f77b4", "#d62728", "#009e73"
+NODE_COLOURS = {1: "#ff8c00", 2: "#9467bd", 3: "#d62728", 4: "#2ca02c", 5: "#111111"}  # 5 and more
+NODE_NAMES = {1: "dead end", 2: "ring marker", 3: "meetpoint of 3", 4: "of 4", 5: "of 5 and more"}
+
+
+@dataclass(frozen=True)
+class AtlasDrawing:
+    """What is drawn of an atlas, in the frame map [m]. N nodes, E edges."""
+
+    position_m: np.ndarray  # (N, 2)
+    r_m: np.ndarray  # (N,)
+    degree: np.ndarray  # (N,)
+    lines_m: Sequence[np.ndarray]  # (E) arrays (n, 2)
+    seen_there_m: Sequence[np.ndarray]  # (E) arrays (k, 4): wall segments seen on the way of the line
+    seen_back_m: Sequence[np.ndarray]  # (E) arrays (k, 4): and on the way back
+
+
+def draw_atlas(path: Path, grid: Optional[MapImage], atlas: AtlasDrawing, title: str) -> None:
+    """One above the other: nodes and edges with their numbers; the segments seen on each edge there; and back."""
+    low, high = _bounds(atlas, range(len(atlas.lines_m)))
+    figure, panels = _panels(low, high, 3)
+    figure.suptitle(f"{title}\n{_counts(atlas)}", fontsize=11)
+    for axes in panels:
+        _draw_ground(axes, grid, low, high)
+    _draw_edges(panels[0], atlas)
+    _draw_nodes(panels[0], atlas)
+    panels[0].legend(loc="best", fontsize=8, framealpha=0.9)
+    for axes, seen, which in zip(panels[1:], (atlas.seen_there_m, atlas.seen_back_m), ("there", "back")):
+        _draw_views(axes, atlas, seen, which)
+    figure.savefig(path)
+
+
+def draw_edge(path: Path, grid: Optional[MapImage], atlas: AtlasDrawing, edge: int, title: str) -> None:
+    """One edge with the segments seen on it, there and back."""
+    low, high = _bounds(atlas, [edge])
+    figure, panels = _panels(low, high, 2)
+    figure.suptitle(f"{title}: edge {edge}", fontsize=11)
+    for axes, seen, way in zip(panels, (atlas.seen_there_m, atlas.seen_back_m), (1, -1)):
+        _draw_ground(axes, grid, low, high)
+        _draw_edges(axes, atlas)
+        _draw_nodes(axes, atlas)
+        _draw_segments(axes, seen[edge], WALL_COLOUR, 3.0)
+        line = atlas.lines_m[edge][::way]
+        axes.plot(line[:, 0], line[:, 1], color=CHOSEN_COLOUR, linewidth=2.0)
+        _draw_arrow(axes, line, CHOSEN_COLOUR)
+        axes.set_title(f"{'there' if way == 1 else 'back'}: {len(seen[edge])} segments", fontsize=10)
+    figure.savefig(path)
+
+
+def _panels(low: np.ndarray, high: np.ndarray, count: int) -> Any:
+    """A figure and its axes, in a column for a floor that is wide, else in a row."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    width, height = high - low
+    column = width > 1.4 * height
+    side = 13.0 if column else 8.0
+    size = (side, side * float(np.clip(height / width, 0.1, 3.0)) + 0.4)
+    figure = Figure(
+        figsize=(size[0], count * size[1] + 0.8) if column else (count * size[0], size[1] + 0.8),
+        dpi=110,
+        constrained_layout=True,
+    )
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(count, 1) if column else figure.subplots(1, count)
+    for each in axes:
+        each.set_xlim(low[0], high[0])
+        each.set_ylim(low[1], high[1])
+        each.set_aspect("equal")
+        each.tick_params(labelsize=7)
+    return figure, axes
+
+
+def _bounds(atlas: AtlasDrawing, edges: Sequence[int]) -> "tuple[np.ndarray, np.ndarray]":
+    parts = [atlas.position_m] if len(edges) == len(atlas.lines_m) else []
+    for edge in edges:
+        parts += [atlas.lines_m[edge], atlas.seen_there_m[edge].reshape(-1, 2), atlas.seen_back_m[edge].reshape(-1, 2)]
+    points = np.concatenate(parts)
+    return points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
+
+
+def _draw_ground(axes: Any, grid: Optional[MapImage], low: np.ndarray, high: np.ndarray) -> None:
+    if grid is not None:
+        draw_map(axes, grid, low, high)
+    else:
+        axes.set_facecolor(str(UNKNOWN_GREY))
+
+
+def _draw_edges(axes: Any, atlas: AtlasDrawing) -> None:
+    from matplotlib.collections import LineCollection
+
+    axes.add_collection(LineCollection(list(atlas.lines_m), colors=EDGE_COLOUR, linewidths=1.3, zorder=2))
+    if len(atlas.lines_m) <= MAX_NUMBERS:
+        for edge, line in enumerate(atlas.lines_m):
+            if np.hypot(*np.ptp(line, axis=0)) < MIN_NUMBERED_M:
+                continue  # its number would hide it
+            axes.text(
+                *line[len(line) // 2],
+                str(edge),
+                color=EDGE_COLOUR,
+                fontsize=5.5,
+                ha="center",
+                va="center",
+                zorder=4,
+                clip_on=True,
+                bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.7},
+            )
+
+
+def _draw_nodes(axes: Any, atlas: AtlasDrawing) -> None:
+    from matplotlib.collections import PatchCollection
+    from matplotlib.patches import Circle
+
+    if len(atlas.r_m) <= MAX_NUMBERS:
+        circles = [Circle(tuple(point), r_m) for point, r_m in zip(atlas.position_m, atlas.r_m)]
+        axes.add_collection(
+            PatchCollection(circles, facecolors="none", edgecolors="#bbbbbb", linewidths=0.4, zorder=1.5)
+        )
+    shown = np.minimum(atlas.degree, max(NODE_COLOURS))
+    for degree, colour in NODE_COLOURS.items():
+        chosen = shown == degree
+        if chosen.any():
+            axes.plot(
+                atlas.position_m[chosen, 0],
+                atlas.position_m[chosen, 1],
+                "o",
+                color=colour,
+                markersize=4.5,
+                label=f"{chosen.sum()} {NODE_NAMES[degree]}",
+                zorder=3,
+            )
+    if len(atlas.r_m) <= MAX_NUMBERS:
+        for node, point in enumerate(atlas.position_m):
+            axes.annotate(
+                str(node),
+                point,
+                textcoords="offset points",
+                xytext=(3, 3),
+                fontsize=6,
+                zorder=4,
+                clip_on=True,
+                annotation_clip=True,
+            )
+
+
+def _draw_views(axes: Any, atlas: AtlasDrawing, seen: Sequence[np.ndarray], which: str) -> None:
+    from matplotlib import cm
+
+    colours = cm.tab20.colors
+    for edge, (line, segments) in enumerate(zip(atlas.lines_m, seen)):
+        colour = colours[edge % len(colours)]
+        _draw_segments(axes, segments, colour, 1.6)
+        line = line if which == "there" else line[::-1]
+        axes.plot(line[:, 0], line[:, 1], color=colour, linewidth=1.0)
+        _draw_arrow(axes, line, colour)
+    axes.set_title(f"segments seen {which}: {sum(map(len, seen))}, in the colour of the edge last drawn", fontsize=10)
+
+
+def _draw_segments(axes: Any, segments: np.ndarray, colour: Any, width: float) -> None:
+    from matplotlib.collections import LineCollection
+
+    axes.add_collection(LineCollection(segments.reshape(-1, 2, 2), colors=[colour], linewidths=width, zorder=2.5))
+
+
+def _draw_arrow(axes: Any, line: np.ndarray, colour: Any) -> None:
+    """In the middle of a line, along it."""
+    middle = len(line) // 2
+    axes.annotate(
+        "",
+        line[middle],
+        line[middle - 1],
+        annotation_clip=True,
+        arrowprops={"arrowstyle": "-|>", "color": colour, "mutation_scale": 9, "shrinkA": 0, "shrinkB": 0},
+    )
+
+
+def _counts(atlas: AtlasDrawing) -> str:
+    way_m = sum(float(np.hypot(*np.diff(line, axis=0).T).sum()) for line in atlas.lines_m)
+    return f"{len(atlas.r_m)} nodes, {len(atlas.lines_m)} edges, {way_m:.0f} m of ways"

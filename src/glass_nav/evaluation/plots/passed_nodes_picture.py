@@ -1,0 +1,112 @@
+"""Picture of a drive over map and atlas: nodes seen green, missed red, invented orange. By matplotlib."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Sequence
+
+import numpy as np
+
+from glass_nav.evaluation.metrics.passed_nodes import INVENTED, MISSED, SEEN, TopologyScore
+from glass_nav.evaluation.plots.run_pictures import MapImage, draw_map
+
+MARGIN_M = 2.0
+COLOURS = {SEEN: "#2ca02c", MISSED: "#d62728", INVENTED: "#ff8c00"}
+_MARKS = {SEEN: "o", MISSED: "X", INVENTED: "D"}
+_SIZES = {SEEN: 9.0, MISSED: 5.0, INVENTED: 5.0}  # a node seen once and missed once shows both
+_WAY_COLOUR, _EDGE_COLOUR, _NODE_COLOUR = "#1f77b4", "#b9b9b9", "#8a8a8a"
+
+
+def draw(
+    path: Path, grid: MapImage, lines_m: Sequence[np.ndarray], way_m: np.ndarray, score: TopologyScore, title: str
+) -> None:
+    """One map.
+
+    Args:
+        path: of the PNG.
+        grid: the map.
+        lines_m: (E) arrays (n, 2): edges of the atlas.
+        way_m: (S, 2) of the robot, NaN where it is not known.
+        score: what it saw.
+        title: first line above it.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.collections import LineCollection
+    from matplotlib.figure import Figure
+
+    known_way = way_m[np.isfinite(way_m).all(axis=1)]
+    shown = known_way if len(known_way) else score.known.position_m
+    low, high = shown.min(axis=0) - MARGIN_M, shown.max(axis=0) + MARGIN_M
+    size = np.maximum(high - low, 0.7 * float((high - low).max()))  # a corridor is not to become a ribbon
+    low, high = 0.5 * (low + high - size), 0.5 * (low + high + size)
+    width, height = 12.0 * size / size.max()
+    figure = Figure(figsize=(width, height + 1.0), dpi=110, constrained_layout=True)
+    FigureCanvasAgg(figure)
+    axes = figure.subplots()
+    draw_map(axes, grid, low, high)
+    axes.add_collection(LineCollection(list(lines_m), colors=_EDGE_COLOUR, linewidths=0.8, zorder=2))
+    axes.plot(*score.known.position_m.T, ".", color=_NODE_COLOUR, markersize=3.0, zorder=2.5)
+    axes.plot(*way_m.T, color=_WAY_COLOUR, linewidth=0.9, alpha=0.8, zorder=3, label="way of the robot")
+    for verdict in COLOURS:
+        _draw_meetings(axes, score, verdict)
+    axes.legend(loc="best", fontsize=8, framealpha=0.9)
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_aspect("equal")
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    figures = score.metrics()
+    axes.set_title(
+        f"{title}\n{figures['passed']} nodes passed: {figures['seen']} seen, {figures['missed']} missed; "
+        f"{figures['invented']} invented",
+        fontsize=11,
+    )
+    figure.savefig(path)
+
+
+def _draw_meetings(axes: Any, score: TopologyScore, verdict: str) -> None:
+    """Where they are in the map: seen and missed ones as the atlas has them, with a line to what was seen."""
+    meetings = score.of_kind(verdict)
+    if not meetings:
+        return
+    places = np.array(
+        [
+            score.known.position_m[each.visit.node] if each.visit is not None else score.seen[each.seen].position_m
+            for each in meetings  # type: ignore[index]
+        ]
+    )
+    axes.plot(
+        *places.T,
+        _MARKS[verdict],
+        color=COLOURS[verdict],
+        markersize=_SIZES[verdict],
+        markeredgecolor="white",
+        markeredgewidth=0.5,
+        linestyle="none",
+        zorder=4 + (verdict != SEEN),
+        label=f"{len(meetings)} {verdict}",
+    )
+    for place, each in zip(places, meetings):
+        if each.visit is None or each.seen is None:
+            continue
+        seen = score.seen[each.seen]
+        axes.plot(
+            [place[0], seen.position_m[0]],
+            [place[1], seen.position_m[1]],
+            color=COLOURS[verdict],
+            linewidth=1.0,
+            zorder=4,
+        )
+        degree = int(score.known.degree[each.visit.node])
+        if seen.degree != degree:
+            axes.annotate(
+                f"{seen.degree} of {degree}",
+                place,
+                textcoords="offset points",
+                xytext=(4, 4),
+                fontsize=6,
+                color="#333333",
+                zorder=6,
+                clip_on=True,
+                annotation_clip=True,
+            )

@@ -1,0 +1,79 @@
+"""GridMap, scan -> all places where the scan may have been taken: nothing is known of the pose.
+
+Correlative scan matching (Olson (2009)) of the beams' end points against a likelihood field, over every position
+and heading, by branch and bound (Hess, Kohler, Rapp, Andor (2016)): the face of ScanMatcher in the compiled module
+_mrpt_grid. It asks neither what was passed on the way nor which wall was met, so it proposes places and judges none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Optional
+
+import numpy as np
+
+from glass_nav import _mrpt_grid
+from glass_nav.geometry import angles, se2
+from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.world.grid_map import GridMap
+
+_CELL_M = 0.1  # of the positions that are tried
+_SCALE_M = 0.15  # a point that ends this far from a wall scores by one half
+_HEADINGS = 180  # 2 degrees apart
+_HIGHEST = 255
+
+
+@dataclass(frozen=True)
+class Places:
+    """K places, the best first; neighbouring ones may belong to one and the same."""
+
+    poses: np.ndarray  # (K, 3) in map
+    score: np.ndarray  # (K,) mean over the points of how near to a wall they lie, 0..1
+
+
+class ScanMatcher:
+    """Looks for a scan everywhere in the free cells of one map."""
+
+    def __init__(self, grid_map: GridMap, field: DistanceField, area: Optional[np.ndarray] = None) -> None:
+        """Args:
+            grid_map: the robot is in one of its free cells.
+            field: of that map.
+            area: (H, W) bool: in one of these cells, None: anywhere.
+
+        Raises:
+            ValueError: there is no free cell to be in.
+        """
+        free = grid_map.free if area is None else grid_map.free & area
+        if not free.any():
+            raise ValueError("the map has no free cell to be in" if area is None else "no free cell lies in the area")
+        self._per_cell = max(1, int(round(_CELL_M / grid_map.resolution_m)))
+        self._cell_m = self._per_cell * grid_map.resolution_m
+        self._map_from_grid = grid_map.map_from_grid
+        allowed = _any_in_blocks(free, self._per_cell)
+        centres = np.stack(np.meshgrid(np.arange(allowed.shape[1]) + 0.5, np.arange(allowed.shape[0]) + 0.5), axis=-1)
+        points = se2.transform_points(self._map_from_grid, centres * self._cell_m)
+        distance = field.distance(points[..., 0], points[..., 1])
+        scores = np.rint(_HIGHEST * _SCALE_M**2 / (_SCALE_M**2 + distance**2)).astype(np.uint8)
+        self._matcher = _mrpt_grid.ScanMatcher(scores, allowed)
+
+    def search(self, points_m: np.ndarray, keep: int) -> Places:
+        """At most so many places, one for each square of 0.8 m and each of the headings.
+
+        Args:
+            points_m: (B, 2) finite end points of beams in the robot's frame.
+            keep: >= 1.
+        """
+        headings = np.arange(_HEADINGS) * (2.0 * np.pi / _HEADINGS)
+        row, column, heading, score = self._matcher.search(points_m / self._cell_m, headings, keep)
+        grid_from_base = np.stack([(column + 0.5) * self._cell_m, (row + 0.5) * self._cell_m, headings[heading]], -1)
+        poses = se2.compose(self._map_from_grid, grid_from_base)
+        poses[:, 2] = angles.wrap(poses[:, 2])
+        return Places(poses, score.astype(float) / _HIGHEST)
+
+
+def _any_in_blocks(cells: np.ndarray, size: int) -> np.ndarray:
+    """(ceil(H / size), ceil(W / size)) bool: some cell of the square is set."""
+    height, width = (-(-length // size) * size for length in cells.shape)
+    padded = np.zeros((height, width), bool)
+    padded[: cells.shape[0], : cells.shape[1]] = cells
+    return padded.reshape(height // size, size, width // size, size).any(axis=(1, 3))

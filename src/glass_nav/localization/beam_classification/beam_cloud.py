@@ -1,0 +1,40 @@
+"""Scan, cases -> coloured points: what rviz' Select tool shows of each beam that answered. B beams, N answers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from glass_nav.localization.beam_classification.case_votes import BeamCases
+from glass_nav.sensing.scan import Scan
+
+FIELDS = ("x", "y", "z", "rgb", "case", "range", "expected", "residual", "weight")
+
+# (5, 3) red, green, blue of cases 0 to 4: grey, green, magenta, light blue, dark blue. The hues of Okabe
+# and Ito, which stay apart for colour-blind eyes; blues are beams that went through.
+CASE_COLOURS = np.array(
+    [[150, 150, 150], [0, 158, 115], [204, 121, 167], [86, 180, 233], [0, 114, 178]], dtype=np.uint32
+)
+
+
+def points(scan: Scan, cases: BeamCases, height_m: float = 0.0) -> np.ndarray:
+    """(N, 9) float32, little-endian: FIELDS of each beam that answered, in the robot's frame.
+
+    Args:
+        scan: a lidar's turn.
+        cases: of its beams.
+        height_m: of the lidar above the robot's frame.
+    """
+    answered = scan.answered
+    red, green, blue = CASE_COLOURS[cases.case[answered]].T
+    ends = replace(scan, ranges_m=scan.ranges_m[answered], angles_rad=scan.angles_rad[answered], origins_m=None)
+    rows = np.empty((len(ends), len(FIELDS)), dtype="<f4")
+    rows[:, :2] = ends.points_in_base()
+    rows[:, 2] = height_m
+    rows[:, 3] = (red << 16 | green << 8 | blue).astype("<u4").view("<f4")  # PCL's packing
+    for column, values in enumerate(
+        (cases.case, scan.ranges_m, cases.expected_m, cases.residual_m, cases.weight), start=4
+    ):
+        rows[:, column] = values[answered]
+    return rows

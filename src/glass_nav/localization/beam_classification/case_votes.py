@@ -1,0 +1,294 @@
+"""Scan, references -> cases, by vote: what did each beam meet?
+
+Seed document glass_localization.txt, sec. III.A, eq. (1) and steps 3 and 4: each preliminary sample
+votes for the reference nearest to the measured range, and the case with the highest vote wins. What the
+document leaves open (it breaks off at step 1) is ours: the gate, ties, and the soft vote, in which a
+sample votes with shares, and the more the better it explains the whole scan; in which the chance of each
+case before the beam is looked at follows from how glassy its walls proved and from the physics of a pane;
+and in which neighbouring beams pull each other. N samples, B beams.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Tuple
+
+import numpy as np
+
+from glass_nav import _beam_vote
+from glass_nav.localization.beam_classification import glass_return_model
+from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, ExpectedRanges
+from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
+
+UNCERTAIN, DIFFUSE, SPECULAR, FIRST_PENETRATION, SECOND_PENETRATION = range(5)
+VOTE_MODES = ("soft", "paper")
+_TIE_ORDER = (DIFFUSE, FIRST_PENETRATION, SECOND_PENETRATION, SPECULAR)
+_GATE_SIGMAS = 3.0
+_OTHER_SURFACE_M = 0.3  # of two expected ranges: an edge lies between them
+_TOLD_GATES = 2.0  # the samples that won the vote may stand one gate away from the pose told
+_PANE_INDEX = 1.51  # of soda-lime glass
+_WALL_OVER_DARK = 5.0  # reflectance of a wall over that of the darkest that is seen at the largest range
+_UNSEEN_SIDE = 0.002  # chance of a wall to be met from a side that no mapper saw, over that from the other
+_MIN_SEEN_THROUGH = 0.05  # a cell may hold a post and the edge of the pane beside it
+_TEMPER = 0.2  # of a sample's evidence: beams err together, and the best sample shall not vote alone
+_REACH, _ROUNDS = 2, 3  # of the pull between neighbouring beams
+_BY_SAMPLE = ("range_m", "cos_incidence", "thickness_m")  # fields of references that tell of all samples
+
+
+@dataclass(frozen=True)
+class BeamCases:
+    """What each beam of a scan met (B beams)."""
+
+    case: np.ndarray  # (B,) uint8: 1 diffuse, 2 specular, 3 first penetration, 4 second, 0 uncertain
+    expected_m: np.ndarray  # (B,) reference range of that case at the estimated pose, NaN for case 0
+    residual_m: np.ndarray  # (B,) measured minus expected, NaN for case 0
+    weight: np.ndarray  # (B,) share of the vote that the case won, 0..1
+
+    def share(self) -> "dict[int, float]":
+        """Share of the beams in each case 0..4."""
+        counts = np.bincount(self.case, minlength=5)
+        return {case: float(counts[case]) / max(len(self.case), 1) for case in range(5)}
+
+
+@dataclass(frozen=True)
+class CaseVote:
+    """How beams are told apart."""
+
+    vote_mode: str = "soft"
+    case_gate_m: float = 0.15  # a reference farther from the measured range gets no vote
+    case_min_share: float = 0.5  # of the vote; a case with less is uncertain
+    glass_max_thickness_m: float = 0.2  # a thicker run of occupied cells ends the beam
+    normal_min_linearity: float = 0.9
+    prior_uncertain: float = 0.1  # chance to meet what is not on the map
+    prior_uncertain_behind: float = 0.2  # the same behind a pane: rooms that nobody mapped again, and outdoors
+    mirror_gain: float = 2.0  # how much more light panes mirror than clear glass does
+    neighbour_pull: float = 1.5  # log odds that equal cases of all neighbouring beams add
+
+    def __post_init__(self) -> None:
+        if self.vote_mode not in VOTE_MODES:
+            raise ValueError(f"~vote_mode must be one of {', '.join(VOTE_MODES)}, got {self.vote_mode!r}")
+        for name in ("case_gate_m", "glass_max_thickness_m"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"~{name} must be > 0 m, got {getattr(self, name)}")
+        for name in ("case_min_share", "normal_min_linearity"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ValueError(f"~{name} must be in [0, 1], got {getattr(self, name)}")
+        for name in ("prior_uncertain", "prior_uncertain_behind"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise ValueError(f"~{name} must be in (0, 1), got {getattr(self, name)}")
+        for name in ("mirror_gain", "neighbour_pull"):
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise ValueError(f"~{name} must be finite and >= 0, got {getattr(self, name)}")
+
+
+def classify(
+    measured_m: np.ndarray,
+    references: ExpectedRanges,
+    residuals: RangeResiduals,
+    vote: CaseVote,
+    glass: np.ndarray,
+    max_range_m: float,
+) -> BeamCases:
+    """Cases of the beams of one scan.
+
+    Args:
+        measured_m: (B,) ranges by REP 117; beams without an answer are uncertain.
+        references: of the preliminary samples; sample 0 is the pose that expected_m is told for, and for a beam that
+            passes an edge there, the sample that explains it best.
+        residuals: where in a wall beams end, and how widely.
+        vote: mode, gate and priors.
+        glass: (2, 2, B) chances to be seen through, and if so to be there, of the first and of the second surface
+            at sample 0; of the soft vote.
+        max_range_m: of the lidar: what it can still see; of the soft vote.
+    """
+    answered = np.isfinite(measured_m)
+    if vote.vote_mode == "paper":
+        share = _paper_votes(measured_m, references, residuals, vote)  # (5, B), column sums 1
+    else:
+        prior = _priors(_inside_walls(_of_sample_0(references), residuals), glass, max_range_m, vote)
+        share = _pulled(_soft_votes(measured_m, references, residuals, vote, prior), answered, vote.neighbour_pull)
+    share[:, ~answered] = np.array([1.0, 0.0, 0.0, 0.0, 0.0])[:, None]
+    won, beam = _winner(share), np.arange(len(measured_m))
+    case = np.where(answered & (share[won, beam] >= vote.case_min_share), won, UNCERTAIN)
+    offered_m, across_m = (values[0] for values in _offered(case, measured_m, _of_sample_0(references), residuals))
+    elsewhere = np.flatnonzero((case > 0) & ~(across_m <= gate_m(residuals, vote)))
+    if len(elsewhere):
+        offered_there_m, across_there_m = _offered(
+            case[elsewhere], measured_m[elsewhere], _of_beams(references, elsewhere), residuals
+        )
+        nearest = np.argmin(across_there_m, axis=0), np.arange(len(elsewhere))
+        offered_m[elsewhere], across_m[elsewhere] = offered_there_m[nearest], across_there_m[nearest]
+    return _told(case, share[case, beam], measured_m, offered_m, np.isfinite(across_m))
+
+
+def as_seen_from(
+    cases: BeamCases, measured_m: np.ndarray, references: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote
+) -> BeamCases:
+    """The same cases from a pose nearby, with the ranges expected at sample 0 of its references.
+
+    A beam that passes an edge from there keeps its range; one that ends farther from its surface is uncertain.
+    """
+    offered_m, across_m = _offered(cases.case, measured_m, _of_sample_0(references), residuals)
+    other = np.abs(np.nan_to_num(offered_m[0] - cases.expected_m)) > _OTHER_SURFACE_M  # also where there is none
+    fits = across_m[0] <= _TOLD_GATES * gate_m(residuals, vote)
+    return _told(cases.case, cases.weight, measured_m, np.where(fits, offered_m[0], cases.expected_m), fits | other)
+
+
+def _of_sample_0(references: ExpectedRanges) -> ExpectedRanges:
+    return replace(references, **{name: getattr(references, name)[:, :1] for name in _BY_SAMPLE})
+
+
+def _of_beams(references: ExpectedRanges, beams: np.ndarray) -> ExpectedRanges:
+    return replace(references, **{name: getattr(references, name)[:, :, beams] for name in _BY_SAMPLE})
+
+
+def _offered(
+    case: np.ndarray, measured_m: np.ndarray, references: ExpectedRanges, residuals: RangeResiduals
+) -> Tuple[np.ndarray, np.ndarray]:
+    """(N, B) ranges that the samples offer for the case of each beam, and how far across the surface it ended."""
+    references = _inside_walls(references, residuals)
+    row, beam = np.maximum(case.astype(int) - 1, 0), np.arange(len(case))
+    offered_m = references.range_m[row, :, beam].T
+    with np.errstate(invalid="ignore"):
+        across_m = np.abs(measured_m - offered_m) * references.cos_incidence[row, :, beam].T
+    return offered_m, np.where(np.isnan(across_m), np.inf, across_m)
+
+
+def _told(
+    case: np.ndarray, weight: np.ndarray, measured_m: np.ndarray, expected_m: np.ndarray, known: np.ndarray
+) -> BeamCases:
+    known = known & (case > 0)
+    with np.errstate(invalid="ignore"):
+        residual_m = np.where(known, measured_m - expected_m, np.nan)
+    return BeamCases(
+        np.where(known, case, UNCERTAIN).astype(np.uint8), np.where(known, expected_m, np.nan), residual_m, weight
+    )
+
+
+def _inside_walls(references: ExpectedRanges, residuals: RangeResiduals) -> ExpectedRanges:
+    """References where beams end, not at the near boundary of the wall's cells."""
+    depth = residuals.depth_share * references.thickness_m
+    shift = depth / np.maximum(references.cos_incidence, MIN_COS)
+    shift[SPECULAR - 1] += 2.0 * depth[DIFFUSE - 1] * references.cos_incidence[DIFFUSE - 1]  # so much deeper a mirror
+    return replace(references, range_m=references.range_m + shift)
+
+
+def _winner(share: np.ndarray) -> np.ndarray:
+    """(B,) case with the highest share; equal shares by _TIE_ORDER, uncertain last."""
+    order = np.array(_TIE_ORDER + (UNCERTAIN,))
+    return order[np.argmax(share[order], axis=0)]
+
+
+def _paper_votes(
+    measured_m: np.ndarray, references: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote
+) -> np.ndarray:
+    """(5, B) share of the samples whose nearest reference is that case; equal votes."""
+    references = _inside_walls(references, residuals)
+    with np.errstate(invalid="ignore"):
+        off = np.abs(measured_m - references.range_m)  # (4, N, B)
+    off[np.isnan(off)] = np.inf
+    order = np.array(_TIE_ORDER) - 1
+    nearest = order[np.argmin(off[order], axis=0)]  # first of equals
+    near = np.take_along_axis(off, nearest[None], axis=0)[0] <= gate_m(residuals, vote)
+    voted = np.where(near, nearest + 1, UNCERTAIN)
+    return np.stack([np.mean(voted == case, axis=0) for case in range(5)])
+
+
+def _soft_votes(
+    measured_m: np.ndarray, references: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote, prior: np.ndarray
+) -> np.ndarray:
+    """(5, B) posterior over the cases; samples count by how well each explains the scan.
+
+    A reference has a normal density of width residuals.sigma_m, cut at the gate, across the surface; each case has its
+    prior, (5, B) of _priors(), times the density of its reference. The samples are summed before the cases compete: a
+    corner that some of them graze and others miss is no surface to explain the beam by, if without it a likelier case
+    does. The evidence of a sample is the product over the beams that answered, to the power of _TEMPER over the root of
+    their number.
+    """
+    temper = _TEMPER / np.sqrt(max(np.count_nonzero(np.isfinite(measured_m)), 1))
+    return _beam_vote.case_votes(
+        measured_m,
+        references.range_m,
+        references.cos_incidence,
+        references.thickness_m,
+        prior,
+        vote.prior_uncertain,
+        residuals.depth_share,
+        residuals.sigma_m,
+        gate_m(residuals, vote),
+        MIN_COS,
+        temper,
+    )
+
+
+def reach_m(residuals: RangeResiduals, vote: CaseVote) -> float:
+    """How far behind the end of a beam a reference may be that still is voted for."""
+    return gate_m(residuals, vote) / MIN_COS
+
+
+def gate_m(residuals: RangeResiduals, vote: CaseVote) -> float:
+    """How far across the surface a beam may end from it: a map that fits badly everywhere needs a wider gate."""
+    return max(vote.case_gate_m, _GATE_SIGMAS * residuals.sigma_m)
+
+
+def _priors(references: ExpectedRanges, glass: np.ndarray, max_range_m: float, vote: CaseVote) -> np.ndarray:
+    """(5, B) chance of cases 1 to 4, and last to end at the second surface where the first is gone (case 0).
+
+    From how glassy the walls proved and how a pane answers at that incidence.
+    """
+    incidence = references.pane_incidence[0]
+    (first, second), (there, _) = glass
+    first = np.clip(first, _MIN_SEEN_THROUGH, 1.0)
+    passes = first * there * (1.0 - glass_return_model.least(incidence))
+    mirrored = passes * _chance_of_a_mirror(references, max_range_m, vote.mirror_gain)
+    behind = (passes - mirrored) * (1.0 - vote.prior_uncertain_behind)
+    passes_again = second * (1.0 - glass_return_model.least(np.full(len(first), np.nan)))
+    gone = first * (1.0 - there)
+    prior = np.stack([1.0 - passes - gone, mirrored, behind * (1.0 - passes_again), behind * passes_again, gone])
+    prior[1:4] *= np.where(references.seen_side[1:], 1.0, _UNSEEN_SIDE)
+    return (1.0 - vote.prior_uncertain) * prior
+
+
+def _chance_of_a_mirror(references: ExpectedRanges, max_range_m: float, gain: float) -> np.ndarray:
+    """(B,) chance that a mirrored echo is the strongest one, at sample 0; 0 where nothing can mirror.
+
+    Echo powers as in the lidar equation for diffuse targets: T^2 / d3^2 behind the pane, R^2 / d2^2 by way of the
+    mirror (Fresnel, unpolarised, two surfaces); one must be above what the lidar still sees of a dark wall at its
+    largest range. Reflectances of walls differ by factors: the chance rises over one decade.
+    """
+    incidence = np.nan_to_num(references.pane_incidence[0])
+    inside = np.arcsin(np.sin(incidence) / _PANE_INDEX)
+    parallel, across = np.cos(incidence), np.cos(inside)
+    r_s = ((parallel - _PANE_INDEX * across) / (parallel + _PANE_INDEX * across)) ** 2
+    r_p = ((across - _PANE_INDEX * parallel) / (across + _PANE_INDEX * parallel)) ** 2
+    surface = 0.5 * (r_s + r_p)
+    reflected = np.minimum(gain * 2.0 * surface / (1.0 + surface), 0.9)
+    behind_m, mirrored_m = references.range_m[FIRST_PENETRATION - 1, 0], references.range_m[SPECULAR - 1, 0]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        wins = (reflected * behind_m / ((1.0 - reflected) * mirrored_m)) ** 2
+        seen = (reflected * max_range_m / mirrored_m) ** 2 * _WALL_OVER_DARK
+        chance = 1.0 / (1.0 + 1.0 / wins) / (1.0 + 1.0 / seen)
+    return np.where(np.isfinite(mirrored_m), np.nan_to_num(chance, nan=0.0), 0.0)
+
+
+def _pulled(share: np.ndarray, answered: np.ndarray, pull: float) -> np.ndarray:
+    """(5, B) shares after neighbouring beams have pulled each other: mean field of a chain, a few rounds.
+
+    Neighbours mostly meet the same wall the same way; a single beam that fits a farther wall is mostly chance.
+    """
+    log_share = np.log(share + 1e-6)
+    belief = share
+    for _ in range(_ROUNDS):
+        around = _mean_of_neighbours(np.where(answered, belief, 0.0), answered)
+        belief = np.exp(log_share + pull * around)
+        belief /= belief.sum(axis=0)
+    return belief
+
+
+def _mean_of_neighbours(belief: np.ndarray, answered: np.ndarray) -> np.ndarray:
+    """(5, B) mean over the answering ones of the _REACH beams to either side."""
+    width = 2 * _REACH + 1
+    padded = np.pad(np.vstack([belief, answered]), ((0, 0), (_REACH + 1, _REACH)))
+    running = np.cumsum(padded, axis=1)
+    around = running[:, width:] - running[:, :-width] - np.vstack([belief, answered])
+    return around[:5] / np.maximum(around[5], 1.0)

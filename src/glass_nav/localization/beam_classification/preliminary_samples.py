@@ -1,0 +1,68 @@
+"""Predicted pose -> preliminary samples around it: the voters of the five cases.
+
+Seed document glass_localization.txt, step 1, eq. (5): poses at regular angular intervals around the
+predicted pose. The document breaks off before it says how wide; radius and heading spread come from
+the filter's own covariance here, with a floor. N samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glass_nav.geometry import angles
+
+_RINGS = (1.0, 2.0)  # of the standard deviation
+_WIDEST = 2.0  # headings reach as far, in standard deviations
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)  # multiples of it fill an interval evenly, however many there are
+
+
+@dataclass(frozen=True)
+class PreliminarySamples:
+    """How many voters, and how far they stand from the predicted pose at least and at most."""
+
+    sample_count: int = 37
+    sample_min_radius_m: float = 0.02
+    sample_min_heading_rad: float = 0.005
+    sample_max_radius_m: float = 0.5
+    sample_max_heading_rad: float = 0.35
+
+    def __post_init__(self) -> None:
+        if not self.sample_count >= 1:
+            raise ValueError(f"~sample_count must be >= 1, got {self.sample_count}")
+        if not 0.0 < self.sample_min_radius_m <= self.sample_max_radius_m:
+            raise ValueError(
+                f"~sample_min_radius_m must be in (0, sample_max_radius_m = "
+                f"{self.sample_max_radius_m}] m, got {self.sample_min_radius_m}"
+            )
+        if not 0.0 < self.sample_min_heading_rad <= self.sample_max_heading_rad:
+            raise ValueError(
+                f"~sample_min_heading_rad must be in (0, sample_max_heading_rad = "
+                f"{self.sample_max_heading_rad}] rad, got {self.sample_min_heading_rad}"
+            )
+
+
+def around(map_from_base: np.ndarray, covariance: np.ndarray, shape: PreliminarySamples) -> np.ndarray:
+    """The predicted pose and rings around it at regular angular intervals.
+
+    Args:
+        map_from_base: (3,) predicted pose.
+        covariance: (3, 3) of it; its axes shape the rings into ellipses.
+        shape: count and limits.
+
+    Returns:
+        (N, 3) poses in map; the first is the predicted pose itself.
+    """
+    variance, axes = np.linalg.eigh(covariance[:2, :2])
+    radii = np.clip(np.sqrt(np.maximum(variance, 0.0)), shape.sample_min_radius_m, shape.sample_max_radius_m)
+    heading = np.clip(np.sqrt(max(covariance[2, 2], 0.0)), shape.sample_min_heading_rad, shape.sample_max_heading_rad)
+    count = shape.sample_count - 1
+    bearing = 2.0 * np.pi * np.arange(count) / max(count, 1)
+    ring = np.resize(_RINGS, count)
+    on_circle = np.stack([np.cos(bearing), np.sin(bearing)], axis=-1) * ring[:, None]
+    samples = np.tile(np.asarray(map_from_base, float), (shape.sample_count, 1))
+    samples[1:, :2] += (on_circle * radii) @ axes.T
+    samples[1:, 2] += _WIDEST * (2.0 * np.mod(_GOLDEN * np.arange(1, count + 1), 1.0) - 1.0) * heading
+    samples[:, 2] = angles.wrap(samples[:, 2])
+    return samples

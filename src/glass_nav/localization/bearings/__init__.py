@@ -1,0 +1,1 @@
+"""Bearings to landmarks and a landmark map -> pose, with its error."""

@@ -1,0 +1,115 @@
+"""How far off will a position from bearings be?  Step angle -> limits of the error, covariance, sigma over a map.
+
+Seed document landmark_bearings.txt (Tsukiyama 2009), sec. 3: an emitter that turns in steps reads the angle between two
+landmarks wrong by up to one step; Tables 1 and 2 are the position errors of one triple at the limits and half way to
+them. To first order every error of a bearing moves the position the more, the farther the landmarks are, the narrower
+they stand and the nearer the robot is to the circle through them. M points, N landmarks.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glass_nav.localization.bearings import inscribed_circles
+from glass_nav.sensing import bearing_model, bearings
+from glass_nav.world.landmark_map import LandmarkMap
+
+STEPS = (-1.0, -0.5, 0.0, 0.5, 1.0)  # of the document's tables
+
+
+def step_sigma(step_rad: float) -> float:
+    """Standard deviation [rad] of a bearing read in steps: anywhere within half a step to either side."""
+    return step_rad / float(np.sqrt(12.0))
+
+
+def limits_of_error(landmarks_m: np.ndarray, point_m: np.ndarray, step_rad: float) -> np.ndarray:
+    """The document's table: position errors when the two angles between three landmarks are read wrong.
+
+    Args:
+        landmarks_m: (3, 2) in map.
+        point_m: (2,) where the robot is.
+        step_rad: the largest error of an angle between two landmarks.
+
+    Returns:
+        (5, 5) [m]: by rows the angle between the first two is off by STEPS of step_rad, by columns the one between the
+        last two.
+    """
+    landmarks_m = np.asarray(landmarks_m, float)
+    way = landmarks_m - point_m
+    first, second = np.meshgrid(np.array(STEPS) * step_rad, np.array(STEPS) * step_rad, indexing="ij")
+    direction = np.arctan2(way[:, 1], way[:, 0]) + np.stack([-first, np.zeros_like(first), second], axis=-1)
+    poses, _ = inscribed_circles.intersect(np.broadcast_to(landmarks_m, (25, 3, 2)), direction.reshape(25, 3))
+    return np.hypot(*(poses[:, :2] - point_m).T).reshape(5, 5)
+
+
+def covariance(landmarks: LandmarkMap, map_from_base: np.ndarray, sigma_rad: float) -> np.ndarray:
+    """(3, 3) of x [m], y [m], yaw [rad] of a robot that stands at a pose (3,) and sees all of the landmarks.
+
+    To first order: the inverse of the information of the bearings, which includes how unsure the landmarks are.
+
+    Raises:
+        ValueError: the landmarks do not fix the pose.
+    """
+    way = landmarks.positions_m - map_from_base[:2]
+    seen = bearing_model.sightings(
+        bearings.standing(landmarks.ids, np.arctan2(way[:, 1], way[:, 0]), sigma_rad), landmarks
+    )
+    by_pose = bearing_model.jacobian(seen, np.asarray(map_from_base, float), way)
+    information = (by_pose / bearing_model.variances(seen, way)[:, None]).T @ by_pose
+    if np.linalg.matrix_rank(information) < 3:
+        raise ValueError(
+            f"{len(landmarks)} landmarks do not fix the pose at x {map_from_base[0]:.2f} m, "
+            f"y {map_from_base[1]:.2f} m: three are needed that are not on one circle with it"
+        )
+    return np.linalg.inv(information)
+
+
+def information_sums(
+    points_m: np.ndarray, positions_m: np.ndarray, visible: np.ndarray, sigma_rad: float, place_sigma_m: float = 0.0
+) -> np.ndarray:
+    """What sigma_from_sums() needs, as a sum over landmarks: maps with one more landmark are an addition.
+
+    Args:
+        points_m: (M, 2).
+        positions_m: (N, 2) of landmarks.
+        visible: (M, N) bool.
+        sigma_rad: of a bearing.
+        place_sigma_m: of the landmarks' positions.
+
+    Returns:
+        (M, N, 6): weight, weighted gradient gx, gy of the bearing by x and y, and gx gx, gx gy, gy gy; 0 where hidden.
+    """
+    way = positions_m - points_m[:, None]
+    range2 = np.maximum((way**2).sum(axis=-1), 1e-4)
+    gradient = np.stack([way[..., 1], -way[..., 0]], axis=-1) / range2[..., None]
+    weight = np.where(visible, 1.0 / (sigma_rad**2 + place_sigma_m**2 / range2), 0.0)
+    gx, gy = gradient[..., 0], gradient[..., 1]
+    return np.stack([weight, weight * gx, weight * gy, weight * gx * gx, weight * gx * gy, weight * gy * gy], axis=-1)
+
+
+def sigma_from_sums(sums: np.ndarray) -> np.ndarray:
+    """(...) largest standard deviation of the position [m] from information_sums() (..., 6), summed over the landmarks.
+
+    inf where the landmarks do not fix a position. The heading is worked out as well as it can be: its share of the
+    information is taken off (Schur complement).
+    """
+    total = np.where(sums[..., 0] > 0.0, sums[..., 0], 1.0)
+    xx = sums[..., 3] - sums[..., 1] * sums[..., 1] / total
+    xy = sums[..., 4] - sums[..., 1] * sums[..., 2] / total
+    yy = sums[..., 5] - sums[..., 2] * sums[..., 2] / total
+    least = 0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy)  # eigenvalue of the position's information
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(least > 1e-9 * np.maximum(xx + yy, 1e-30), 1.0 / np.sqrt(least), np.inf)
+
+
+def expected_sigma(landmarks: LandmarkMap, points_m: np.ndarray, visible: np.ndarray, sigma_rad: float) -> np.ndarray:
+    """(M,) standard deviation [m] of the position along its worst direction at points (M, 2); inf without a fix.
+
+    Args:
+        landmarks: N of them.
+        points_m: (M, 2).
+        visible: (M, N) bool: the landmark is seen from the point.
+        sigma_rad: of a bearing.
+    """
+    sums = information_sums(points_m, landmarks.positions_m, visible, sigma_rad, landmarks.sigma_m).sum(axis=1)
+    return np.where(visible.sum(axis=1) >= 3, sigma_from_sums(sums), np.inf)

@@ -1,0 +1,75 @@
+"""All parameters of the filter, a struct per model: names, units, and what is allowed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from glass_nav.hypotheses.bearing_weights import BearingMixture
+from glass_nav.hypotheses.global_search import SearchParams
+from glass_nav.localization.beam_classification.case_votes import CaseVote
+from glass_nav.localization.beam_classification.glass_map import GlassEvidence
+from glass_nav.localization.beam_classification.preliminary_samples import PreliminarySamples
+from glass_nav.localization.integrity.pose_state import QualityLimits
+from glass_nav.localization.particle_filter.importance_weights import BeamMixture
+from glass_nav.localization.particle_filter.motion import OdometryNoise
+from glass_nav.localization.particle_filter.proposal import Proposal
+from glass_nav.localization.particle_filter.resampling import ParticleCount
+from glass_nav.localization.segments.segment_polish import Polish
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """When a scan moves the particles; the names and meanings are AMCL's."""
+
+    update_min_d: float = 0.1  # way since the last update [m]
+    update_min_a: float = 0.1  # turn since the last update [rad]
+    resample_interval: int = 1  # updates between resamplings
+    selective_resampling: bool = False  # only when fewer than half of the particles count
+    raycast_threads: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("update_min_d", "update_min_a"):
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"~{name} must be >= 0, got {getattr(self, name)}")
+        for name in ("resample_interval", "raycast_threads"):
+            if not getattr(self, name) >= 1:
+                raise ValueError(f"~{name} must be >= 1, got {getattr(self, name)}")
+
+
+@dataclass(frozen=True)
+class LaserLimits:
+    """Ranges that are looked at; the names and meanings are AMCL's."""
+
+    laser_min_range: float = -1.0  # [m] nearer ranges are no answers; < 0: as the scan says
+    laser_max_range: float = -1.0  # [m] farther ones neither; < 0: as the scan says
+
+    def __post_init__(self) -> None:
+        for name in ("laser_min_range", "laser_max_range"):
+            if not np.isfinite(getattr(self, name)):
+                raise ValueError(f"~{name} must be finite, got {getattr(self, name)}")
+        if 0.0 <= self.laser_max_range <= max(self.laser_min_range, 0.0):
+            raise ValueError(
+                "~laser_max_range must be above 0 and ~laser_min_range, or < 0 for the scan's own, "
+                f"got {self.laser_max_range}"
+            )
+
+
+@dataclass(frozen=True)
+class GlassMclParams:
+    """All parameters of the filter, a struct per model."""
+
+    schedule: Schedule = field(default_factory=Schedule)
+    limits: LaserLimits = field(default_factory=LaserLimits)
+    count: ParticleCount = field(default_factory=ParticleCount)
+    odometry: OdometryNoise = field(default_factory=OdometryNoise)
+    proposal: Proposal = field(default_factory=Proposal)
+    samples: PreliminarySamples = field(default_factory=PreliminarySamples)
+    vote: CaseVote = field(default_factory=CaseVote)
+    glass: GlassEvidence = field(default_factory=GlassEvidence)
+    mixture: BeamMixture = field(default_factory=BeamMixture)
+    quality: QualityLimits = field(default_factory=QualityLimits)
+    search: SearchParams = field(default_factory=SearchParams)
+    bearings: BearingMixture = field(default_factory=BearingMixture)
+    polish: Polish = field(default_factory=Polish)

@@ -1,0 +1,1 @@
+"""MOTION -> PROPOSAL -> WEIGHTS -> RESAMPLING -> POSE: the Monte Carlo filter."""

@@ -1,0 +1,137 @@
+"""Cases -> weights: how well does each particle explain the scan, by the beams that are understood?
+
+Two modes. "ranges" is the document's (seed glass_localization.txt; Thrun et al. (2005), sec. 6.3.1): the sum
+over beams with case c > 0 of log(z_hit exp(-r^2 / (2 s^2)) + z_rand), r the residual to the reference of
+case c by a ray cast from the particle, measured across the surface. "field" takes for r how far the beam
+ends from the nearest wall, for the beams whose case says that they ended at one (1, 3 and 4): no ray is
+cast, all beams of a scan can be used, and what was mirrored or is not understood cannot attract anything,
+which is what misleads a plain likelihood field among glass. P particles, B beams; weights are natural
+logarithms, not normalised. Neighbouring beams err together, so that B of them weigh as
+laser_independent_beams.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glass_nav.geometry import angles
+from glass_nav.localization.beam_classification.case_votes import DIFFUSE, SPECULAR, UNCERTAIN
+from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, cos_incidence
+from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
+from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.raycast import RayCaster
+
+WEIGHT_MODES = ("field", "ranges")
+
+
+@dataclass(frozen=True)
+class BeamMixture:
+    """How often a beam ends where its case says, and how sharply; AMCL's names where it has them."""
+
+    weight_mode: str = "field"
+    laser_max_beams: int = 720
+    laser_z_hit: float = 0.95
+    laser_z_rand: float = 0.05
+    laser_sigma_hit: float = 0.04  # [m] across the surface, lidar and map together; at least
+    laser_sigma_hit_max: float = 0.2  # [m] at most: the filter learns how well map and lidar agree
+    laser_independent_beams: float = 80.0
+
+    def __post_init__(self) -> None:
+        if self.weight_mode not in WEIGHT_MODES:
+            raise ValueError(f"~weight_mode must be one of {', '.join(WEIGHT_MODES)}, got {self.weight_mode!r}")
+        if not self.laser_max_beams >= 2:
+            raise ValueError(f"~laser_max_beams must be >= 2, got {self.laser_max_beams}")
+        for name in ("laser_z_hit", "laser_z_rand", "laser_sigma_hit", "laser_independent_beams"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"~{name} must be > 0, got {getattr(self, name)}")
+        if not self.laser_sigma_hit_max >= self.laser_sigma_hit:
+            raise ValueError(
+                f"~laser_sigma_hit_max must be >= ~laser_sigma_hit = {self.laser_sigma_hit}, "
+                f"got {self.laser_sigma_hit_max}"
+            )
+
+
+def by_ranges(
+    caster: RayCaster,
+    thickness_m: np.ndarray,
+    map_from_laser: np.ndarray,
+    angles_rad: np.ndarray,
+    measured_m: np.ndarray,
+    case: np.ndarray,
+    residuals: RangeResiduals,
+    mixture: BeamMixture,
+    max_range_m: float,
+    max_thickness_m: float,
+    min_linearity: float,
+) -> np.ndarray:
+    """Log likelihood of the chosen beams for every particle.
+
+    Args:
+        caster: of the map.
+        thickness_m: (H * W,) of the map's walls, sensing/wall_thickness.py.
+        map_from_laser: (P, 3) the lidar's pose for every particle.
+        angles_rad, measured_m, case: (B,) the beams to use, all of case > 0 with finite ranges.
+        residuals: where in a wall beams end, and how widely.
+        mixture: how sharply.
+        max_range_m: how far to look.
+        max_thickness_m, min_linearity: as for the references of the cases.
+
+    Returns:
+        (P,) log likelihoods; all 0 if there is no beam.
+    """
+    log_w = np.zeros(len(map_from_laser))
+    if not len(case):
+        return log_w
+    for chosen in (case == DIFFUSE, case != DIFFUSE):
+        if not chosen.any():
+            continue
+        angle, z = angles_rad[chosen], measured_m[chosen]
+        if case[chosen][0] == DIFFUSE:
+            hits = caster.cast_first(map_from_laser, angle, max_range_m)
+            expected, cell = hits.range_m, hits.cell
+        else:
+            surfaces = caster.cast_surfaces(
+                map_from_laser, angle, max_range_m, max_thickness_m=max_thickness_m, min_linearity=min_linearity
+            )
+            rows = (case[chosen] - 2, slice(None), np.arange(len(angle)))
+            expected = np.stack([surfaces.mirrored_m, surfaces.second_m, surfaces.third_m])[rows].T
+            cell = np.stack([surfaces.first_cell, surfaces.second_cell, surfaces.third_cell])[rows].T
+        cos = np.maximum(cos_incidence(caster, map_from_laser[:, 2:3] + angle, cell, min_linearity), MIN_COS)
+        across = (z - expected) * cos - residuals.depth_share * thickness_m[cell]
+        log_w += _log_density(across, residuals, mixture)
+    return log_w * min(1.0, independent_beams(residuals, mixture) / len(case))
+
+
+def by_field(
+    field: DistanceField, map_from_base: np.ndarray, ends_m: np.ndarray, residuals: RangeResiduals, mixture: BeamMixture
+) -> np.ndarray:
+    """(P,) log likelihoods of particles (P, 3) from end points (B, 2) in the robot's frame that lie on walls."""
+    log_w = np.zeros(len(map_from_base))
+    if not len(ends_m):
+        return log_w
+    cos, sin = angles.cos_sin(map_from_base[:, 2:3])
+    distance_m = field.distance(
+        map_from_base[:, 0:1] + cos * ends_m[:, 0] - sin * ends_m[:, 1],
+        map_from_base[:, 1:2] + sin * ends_m[:, 0] + cos * ends_m[:, 1],
+    )
+    return _log_density(distance_m, residuals, mixture) * min(1.0, independent_beams(residuals, mixture) / len(ends_m))
+
+
+def known_ends(case: np.ndarray) -> np.ndarray:
+    """(B,) bool: the beam ended at a surface of the map, by a straight way."""
+    return (case != UNCERTAIN) & (case != SPECULAR)
+
+
+def _log_density(across_m: np.ndarray, residuals: RangeResiduals, mixture: BeamMixture) -> np.ndarray:
+    square = np.minimum((across_m / residuals.sigma_m) ** 2, 100.0)
+    return np.log(mixture.laser_z_hit * np.exp(-0.5 * square) + mixture.laser_z_rand).sum(axis=1)
+
+
+def independent_beams(residuals: RangeResiduals, mixture: BeamMixture) -> float:
+    """As how many independent beams the chosen ones count.
+
+    A spread wider than the lidar's is the map's fault, and the map errs the same way along a whole wall.
+    """
+    return mixture.laser_independent_beams * min(1.0, (mixture.laser_sigma_hit / residuals.sigma_m) ** 2)

@@ -1,0 +1,103 @@
+"""Odometry and scan -> where to put the particles.
+
+A lidar tells the pose far more sharply than odometry does, so particles drawn from odometry alone
+mostly land where the scan rules them out. Part of them is therefore drawn around the poses at which the
+scan fits (the improved proposal of Grisetti, Stachniss, Burgard (2007), as a mixture as in Thrun et al.
+(2005), sec. 8.3.5), and every particle carries the ratio of target to proposal density, so that the
+answer stays the filter's and not the aligner's. P particles, K alignments.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Tuple
+
+import numpy as np
+
+from glass_nav.geometry import angles
+from glass_nav.hypotheses.scan_alignment import Alignment
+from glass_nav.localization.particle_filter import resampling
+from glass_nav.localization.particle_filter.pose_estimate import PoseEstimate
+
+_MIN_DEVIATION = np.array([0.01, 0.01, np.radians(0.2)])  # of odometry: m, m, rad
+_SLIP_DEVIATION = np.array([0.3, 0.3, np.radians(30.0)])  # a wheel that slipped, a robot that was pushed
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """How particles are shared between odometry and scan."""
+
+    proposal_scan_share: float = 0.5  # of the particles drawn around aligned poses; 0 turns it off
+    proposal_max_beams: int = 90
+    proposal_min_cluster_share: float = 0.5  # below it the cloud has no one place to align from
+    odom_slip_probability: float = 0.001  # that a step of odometry is worth nothing
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.proposal_scan_share < 1.0:
+            raise ValueError(f"~proposal_scan_share must be in [0, 1), got {self.proposal_scan_share}")
+        if not self.proposal_max_beams >= 2:
+            raise ValueError(f"~proposal_max_beams must be >= 2, got {self.proposal_max_beams}")
+        if not 0.0 <= self.proposal_min_cluster_share <= 1.0:
+            raise ValueError(f"~proposal_min_cluster_share must be in [0, 1], got {self.proposal_min_cluster_share}")
+        if not 0.0 <= self.odom_slip_probability < 1.0:
+            raise ValueError(f"~odom_slip_probability must be in [0, 1), got {self.odom_slip_probability}")
+
+
+def draw(
+    predicted: np.ndarray,
+    weights: np.ndarray,
+    best: PoseEstimate,
+    aligned: Alignment,
+    beam_information: float,
+    proposal: Proposal,
+    rng: np.random.Generator,
+) -> Tuple[np.ndarray, np.ndarray]:
+    """Particles from both sources, and what their weights have to be multiplied with.
+
+    Args:
+        predicted: (P, 3) particles moved by odometry.
+        weights: (P,) of them, sum 1.
+        best: their best cluster, which the scan was aligned from.
+        aligned: K poses at which the scan fits.
+        beam_information: what one aligned beam says across the wall [1/m2].
+        proposal: shares and deviations.
+        rng: source of all randomness.
+
+    Returns:
+        (P, 3) particles and (P,) log of target over proposal density.
+    """
+    count = int(round(proposal.proposal_scan_share * len(predicted)))
+    if not count or not len(aligned.poses):
+        return predicted, np.log(weights + 1e-300)
+    near = best.covariance + np.diag(_MIN_DEVIATION**2)
+    slipped = near + np.diag(_SLIP_DEVIATION**2)
+    # Directions that no wall constrains keep odometry's spread.
+    around = np.linalg.inv(aligned.information * beam_information + np.linalg.inv(slipped))
+    which = rng.integers(len(aligned.poses), size=count)
+    noise = np.einsum("pij,pj->pi", np.linalg.cholesky(around)[which], rng.standard_normal((count, 3)))
+    drawn = aligned.poses[which] + noise
+    drawn[:, 2] = angles.wrap(drawn[:, 2])
+    kept = resampling.low_variance(weights, len(predicted) - count, rng)
+    poses = np.concatenate([predicted[kept], drawn])
+    by_odometry = _log_normal(poses, best.map_from_base, near)
+    by_slip = _log_normal(poses, best.map_from_base, slipped)
+    by_scan = np.logaddexp.reduce(
+        [_log_normal(poses, pose, spread) for pose, spread in zip(aligned.poses, around)]
+    ) - np.log(len(aligned.poses))
+    share = proposal.proposal_scan_share
+    eps = proposal.odom_slip_probability
+    target = np.logaddexp(np.log1p(-eps) + by_odometry, np.log(eps + 1e-300) + by_slip)
+    source = np.logaddexp(np.log1p(-share) + by_odometry, np.log(share) + by_scan)
+    log_ratio = target - source
+    # What odometry itself put there, in another cluster or in a tail that is fatter than normal, has its density.
+    log_ratio[: len(kept)] = np.minimum(log_ratio[: len(kept)], -np.log1p(-share))
+    return poses, log_ratio
+
+
+def _log_normal(poses: np.ndarray, mean: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """(P,) log density of a normal distribution over planar poses."""
+    off = poses - mean
+    off[:, 2] = angles.wrap(off[:, 2])
+    root = np.linalg.cholesky(covariance)
+    z = np.linalg.solve(root, off.T)
+    return -0.5 * np.sum(z**2, axis=0) - np.log(np.diag(root)).sum() - 1.5 * np.log(2.0 * np.pi)

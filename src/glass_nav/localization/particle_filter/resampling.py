@@ -1,0 +1,92 @@
+"""Weights -> which particles live on, and how many are enough.
+
+Low-variance resampling: Thrun, Burgard, Fox, Probabilistic Robotics (2005), table 4.4. Number of
+particles: KLD sampling, Fox, Adapting the Sample Size in Particle Filters (2003). P particles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+_BIN = np.array([0.5, 0.5, np.radians(10.0)])  # AMCL's: m, m, rad
+
+
+@dataclass(frozen=True)
+class ParticleCount:
+    """How many particles; the names and meanings are AMCL's."""
+
+    min_particles: int = 300
+    max_particles: int = 5000
+    kld_err: float = 0.01  # largest error between the true and the estimated distribution
+    kld_z: float = 0.99  # upper normal quantile of the probability that the error is below kld_err
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.min_particles <= self.max_particles:
+            raise ValueError(
+                f"~min_particles must be in [1, max_particles = {self.max_particles}], got {self.min_particles}"
+            )
+        if not self.kld_err > 0.0:
+            raise ValueError(f"~kld_err must be > 0, got {self.kld_err}")
+        if not self.kld_z >= 0.0:
+            raise ValueError(f"~kld_z must be >= 0, got {self.kld_z}")
+
+
+def normalised(log_w: np.ndarray) -> np.ndarray:
+    """(P,) weights that sum to 1 from log weights of any offset; equal if none is finite."""
+    top = np.max(log_w)
+    if not np.isfinite(top):
+        return np.full(len(log_w), 1.0 / len(log_w))
+    w = np.exp(log_w - top)
+    return w / w.sum()
+
+
+def effective_count(weights: np.ndarray) -> float:
+    """Number of equal particles that would be worth as much, 1..P."""
+    return float(1.0 / np.sum(weights**2))
+
+
+def tempered(log_w: np.ndarray, least_effective: float = 20.0) -> np.ndarray:
+    """(P,) weights that sum to 1, flattened until that many particles count.
+
+    A scan that one particle alone explains says more about the model of the errors than about the pose.
+    """
+    weights = normalised(log_w)
+    least_effective = min(least_effective, 0.5 * len(weights))
+    if effective_count(weights) >= least_effective:
+        return weights
+    low, high = 0.0, 1.0
+    for _ in range(20):
+        power = 0.5 * (low + high)
+        enough = effective_count(normalised(power * log_w)) >= least_effective
+        low, high = (power, high) if enough else (low, power)
+    return normalised(low * log_w)
+
+
+def low_variance(weights: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+    """(count,) indices of the particles drawn: one random number, then equal strides."""
+    strides = (np.arange(count) + rng.uniform()) / count
+    return np.minimum(np.searchsorted(np.cumsum(weights), strides, side="right"), len(weights) - 1)
+
+
+def bins(poses: np.ndarray) -> np.ndarray:
+    """(P, 3) int cells of the histogram over poses: 0.5 m, 0.5 m, 10 degrees."""
+    return np.floor(poses / _BIN).astype(np.int64)
+
+
+def enough_particles(poses: np.ndarray, limits: ParticleCount) -> int:
+    """Particles needed so that the KL distance to the truth stays below kld_err (Fox, eq. 7).
+
+    Args:
+        poses: (P, 3) particles with equal weights; only how many bins they fill counts.
+    """
+    cells = bins(poses)
+    off = cells - cells.min(axis=0)
+    span = off.max(axis=0) + 1
+    filled = len(np.unique((off[:, 0] * span[1] + off[:, 1]) * span[2] + off[:, 2]))
+    if filled <= 1:
+        return limits.min_particles
+    share = 2.0 / (9.0 * (filled - 1))
+    needed = (filled - 1) / (2.0 * limits.kld_err) * (1.0 - share + np.sqrt(share) * limits.kld_z) ** 3
+    return int(np.clip(np.ceil(needed), limits.min_particles, limits.max_particles))

@@ -1,0 +1,136 @@
+"""Predicted particles, scan -> the poses nearby where the scan fits: where the cases are voted on.
+
+The seed document assumes a good prediction (assumption i). Real odometry breaks it: wheels slip, an old
+log steps a metre and 10 degrees between scans, a turn of 80 degrees goes unnoticed. So the scan is
+aligned from preliminary samples over the predicted spread first. When it fits much worse there than
+scans did lately, wider spreads are tried; a place that odometry did not lead to is only believed when
+the next scan fits there too, and still not where odometry leads: a crowd around the robot may look like
+another room once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Optional
+
+import numpy as np
+
+from glass_nav.geometry import angles, se2
+from glass_nav.hypotheses import scan_alignment
+from glass_nav.hypotheses.scan_alignment import Alignment
+from glass_nav.localization.beam_classification import preliminary_samples
+from glass_nav.localization.beam_classification.preliminary_samples import PreliminarySamples
+from glass_nav.sensing.distance_field import DistanceField
+
+_MIN_STARTS, _MAX_STARTS = 37, 360
+_START_GRID = np.array([0.12, 0.12, 0.05])  # [m, m, rad] of spread that the least starts cover
+_ALIGNED_STARTS = 60  # the best of more starts
+_LEVELS = (  # limits of the starts' spread: as predicted, a bad step of odometry, a spin that went unnoticed
+    PreliminarySamples(
+        sample_min_radius_m=0.12, sample_min_heading_rad=0.05, sample_max_radius_m=0.5, sample_max_heading_rad=0.35
+    ),
+    PreliminarySamples(
+        sample_min_radius_m=0.25, sample_min_heading_rad=0.4, sample_max_radius_m=0.5, sample_max_heading_rad=0.4
+    ),
+    PreliminarySamples(
+        sample_min_radius_m=0.4,
+        sample_min_heading_rad=0.5 * np.pi,
+        sample_max_radius_m=0.5,
+        sample_max_heading_rad=0.5 * np.pi,
+    ),
+)
+_POOR_FIT = 0.75  # of the usual fit: odometry is not believed
+_REACH = 3.0  # deviations: farther away a poor fit is chance
+_CONVINCING_FIT = 0.9  # of the usual fit: a place that odometry did not lead to
+_MEMORY = 0.9
+_MIN_SCALE_M, _MAX_SCALE_M = 0.06, 0.3  # of the kernel; follows how well the map fits
+_SCALE_MEDIANS = 2.0
+
+
+class ScanRegistration:
+    """Finds the aligned poses and remembers how well scans fit lately."""
+
+    def __init__(self, field: DistanceField) -> None:
+        self.fits = True  # the last scan fitted about as well as scans usually do
+        self._field = field
+        self._usual_fit = float("nan")
+        self._scale_m = _MIN_SCALE_M
+        self._suspect: Optional[np.ndarray] = None  # (3,) map_from_odom of a place that needs a second scan
+
+    def find(
+        self, mean: np.ndarray, covariance: np.ndarray, odom_from_base: np.ndarray, points_m: np.ndarray
+    ) -> Alignment:
+        """At most 4 distinct poses, the best first.
+
+        Args:
+            mean, covariance: (3,), (3, 3) of the predicted cluster.
+            odom_from_base: (3,) odometry at the scan.
+            points_m: (B, 2) finite end points of beams in the robot's frame, B >= 1.
+        """
+        found = self._align_around(mean, covariance, _LEVELS[0], points_m)
+        suspect, self._suspect = self._suspect, None
+        self.fits = not found.fit[0] < _POOR_FIT * self._usual_fit
+        if not self.fits:
+            farther = self._confirmed(suspect, odom_from_base, points_m)
+            if farther is not None:
+                self.fits = True
+                return farther
+            self._suspect = self._search(mean, covariance, odom_from_base, points_m)
+            near = _within_reach(found.poses, mean, covariance)
+            if not near.any():  # the scan says nothing about the place that odometry leads to
+                return Alignment(mean[None], np.zeros((1, 3, 3)), scan_alignment.fit(self._field, points_m, mean[None]))
+            found = Alignment(found.poses[near], found.information[near], found.fit[near])
+        self._remember(found, points_m)
+        return found
+
+    def _confirmed(
+        self, suspect: Optional[np.ndarray], odom_from_base: np.ndarray, points_m: np.ndarray
+    ) -> Optional[Alignment]:
+        """Poses around the place that the last scan suggested, if this one fits there too."""
+        if suspect is None:
+            return None
+        again = self._align_around(se2.compose(suspect, odom_from_base), np.zeros((3, 3)), _LEVELS[0], points_m)
+        return again if again.fit[0] > _CONVINCING_FIT * self._usual_fit else None
+
+    def _search(
+        self, mean: np.ndarray, covariance: np.ndarray, odom_from_base: np.ndarray, points_m: np.ndarray
+    ) -> Optional[np.ndarray]:
+        """map_from_odom of a farther place where the scan fits as scans usually do."""
+        for level in _LEVELS[1:]:
+            farther = self._align_around(mean, covariance, level, points_m)
+            if farther.fit[0] > _CONVINCING_FIT * self._usual_fit:
+                return se2.compose(farther.poses[0], se2.inverse(odom_from_base))
+        return None
+
+    def _remember(self, found: Alignment, points_m: np.ndarray) -> None:
+        past = found.fit[0] if np.isnan(self._usual_fit) else self._usual_fit
+        self._usual_fit = _MEMORY * past + (1.0 - _MEMORY) * float(found.fit[0])
+        scale = _SCALE_MEDIANS * scan_alignment.median_distance(self._field, points_m, found.poses[0])
+        self._scale_m = float(np.clip(_MEMORY * self._scale_m + (1.0 - _MEMORY) * scale, _MIN_SCALE_M, _MAX_SCALE_M))
+
+    def _align_around(
+        self, mean: np.ndarray, covariance: np.ndarray, shape: PreliminarySamples, points_m: np.ndarray
+    ) -> Alignment:
+        spread = _spread(covariance, shape)
+        count = int(np.clip(_MIN_STARTS * np.prod(spread / _START_GRID), _MIN_STARTS, _MAX_STARTS))
+        starts = preliminary_samples.around(mean, covariance, replace(shape, sample_count=count))
+        if count > _ALIGNED_STARTS:
+            fit = scan_alignment.fit(self._field, points_m, starts)
+            starts = starts[np.argsort(-fit)[:_ALIGNED_STARTS]]
+        return scan_alignment.distinct(scan_alignment.align(self._field, points_m, starts, last_scale_m=self._scale_m))
+
+
+def _within_reach(poses: np.ndarray, mean: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """(K,) bool: poses (K, 3) that a poor fit may still lead to."""
+    off = np.abs(poses - mean)
+    off[:, 2] = np.abs(angles.wrap(off[:, 2]))
+    return np.all(off < _REACH * _spread(covariance, _LEVELS[0]), axis=1)
+
+
+def _spread(covariance: np.ndarray, shape: PreliminarySamples) -> np.ndarray:
+    """(3,) deviations [m, m, rad] within the limits of the starts."""
+    return np.clip(
+        np.sqrt(np.diag(covariance)),
+        [shape.sample_min_radius_m] * 2 + [shape.sample_min_heading_rad],
+        [shape.sample_max_radius_m] * 2 + [shape.sample_max_heading_rad],
+    )

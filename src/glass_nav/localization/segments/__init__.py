@@ -1,0 +1,1 @@
+"""Scan and segment map -> corrected pose, with its quality measures."""

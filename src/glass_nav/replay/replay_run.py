@@ -1,0 +1,262 @@
+"""A recording through the filter, scan by scan: the loop of the replay. Drops nothing, knows no clock."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from dataclasses import dataclass
+from typing import Callable, Dict, Iterable, Iterator, List, Optional, Tuple
+
+import numpy as np
+
+from glass_nav.evaluation.metrics import case_scores, pose_errors
+from glass_nav.evaluation.metrics.case_scores import CaseScores, SurfaceScores
+from glass_nav.evaluation.metrics.replay_result import NO_BEAM, BeamExample, KeptScan, ReplayResult
+from glass_nav.geometry import se2
+from glass_nav.localization.integrity.pose_state import GLOBAL_SEARCH, UNKNOWN
+from glass_nav.localization.localizer import Estimate, GlassMcl
+from glass_nav.recording.recording import BeamTruth, Entry, Recording, RecordingError, Refusal, Step
+from glass_nav.sensing.scan import Scan, ScanError
+
+EXAMPLES = 3  # scans whose beams are kept for the picture, spread over the log
+WORST = 10  # scans kept that went worst, each from another part of the log
+PARTS = 60  # of the log, so that they do not all show one moment
+
+
+@dataclass(frozen=True)
+class Window:
+    """Which part of a log to replay."""
+
+    start_s: float = 0.0  # from the first scan on
+    duration_s: Optional[float] = None  # to the end
+    every: int = 1  # 2: each second scan
+    max_scans: Optional[int] = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.start_s < float("inf"):
+            raise ValueError(f"--start must be >= 0 s, got {self.start_s}")
+        if self.duration_s is not None and not self.duration_s > 0.0:
+            raise ValueError(f"--duration must be > 0 s, got {self.duration_s}")
+        if self.every < 1:
+            raise ValueError(f"--every must be >= 1, got {self.every}")
+        if self.max_scans is not None and self.max_scans < 1:
+            raise ValueError(f"--max-scans must be >= 1, got {self.max_scans}")
+
+    def expected(self, scan_count: int) -> int:
+        """About how many of so many scans: for a progress bar."""
+        count = -(-scan_count // self.every)
+        return count if self.max_scans is None else min(count, self.max_scans)
+
+    def of(self, entries: Iterable[Entry]) -> Iterator[Entry]:
+        """The entries of that part; refused scans within it are kept, to be counted."""
+        first_ns: Optional[int] = None
+        since_s = 0.0  # of the last scan that could be read: the stamp of a refused one may be its fault
+        seen = taken = 0
+        for entry in entries:
+            if isinstance(entry, Refusal):
+                if since_s >= self.start_s:
+                    yield entry
+                continue
+            first_ns = entry.scan.stamp_ns if first_ns is None else first_ns
+            since_s = (entry.scan.stamp_ns - first_ns) * 1e-9
+            if self.duration_s is not None and since_s > self.start_s + self.duration_s:
+                return
+            if since_s < self.start_s:
+                continue
+            seen += 1
+            if (seen - 1) % self.every:
+                continue
+            taken += 1
+            yield entry
+            if taken == self.max_scans:
+                return
+
+
+def run(
+    recording: Recording,
+    mcl: GlassMcl,
+    start: Callable[[int], None],
+    seed: int,
+    window: Optional[Window] = None,
+    step_done: Callable[[], None] = lambda: None,
+    listen: Callable[[Step, Estimate], None] = lambda step, estimate: None,
+) -> ReplayResult:
+    """Replay a recording.
+
+    Args:
+        recording: the log.
+        mcl: a fresh filter.
+        start: called once with the stamp [ns] of the first scan, before it is used: places the particles.
+        seed: what the filter's random numbers were seeded with; for the result.
+        window: the part of the log, all of it when not given.
+        step_done: called after each scan.
+        listen: called with each scan that the filter took, and what it said of it.
+
+    Raises:
+        RecordingError: not one scan of the log can be used.
+    """
+    began = time.perf_counter()
+    window = Window() if window is None else window
+    rows: List[_Row] = []
+    refusals: "Counter[str]" = Counter()
+    scores = _Scores(recording, window.expected(len(recording)))
+    worst = _WorstScans(recording, window.expected(len(recording)))
+    for entry in window.of(recording):
+        if isinstance(entry, Refusal):
+            refusals[entry.reason] += 1
+        else:
+            try:
+                if not rows:
+                    start(entry.scan.stamp_ns)
+                before = time.process_time()
+                estimate = mcl.update(entry.scan, entry.odom_from_base)
+                cpu_ms = 1e3 * (time.process_time() - before)
+                worst.take(len(rows), entry.scan, estimate)
+                rows.append(_Row(entry.odom_from_base, estimate, cpu_ms, scores.take(entry.scan, estimate)))
+                listen(entry, estimate)
+            except ScanError as err:
+                refusals[str(err).partition(": ")[2]] += 1
+        step_done()
+    if not rows:
+        raise RecordingError(f"{recording.name}: {_nothing_usable(refusals)}")
+    return _result(rows, refusals, recording, scores, worst.kept(), time.perf_counter() - began, seed)
+
+
+class _Scores:
+    """What the truth about the beams, where the log has it, says of the cases and of scan_surfaces."""
+
+    def __init__(self, recording: Recording, expected_scans: int) -> None:
+        self.cases: Optional[CaseScores] = None  # None: no truth
+        self.surfaces: Optional[SurfaceScores] = None
+        self.examples: List[BeamExample] = []
+        self._recording = recording
+        self._rest = iter(() if recording.beam_truth is None else recording.beam_truth)
+        self._next = next(self._rest, None)
+        self._scans = 0
+        self._example_at = [int((number + 0.5) / EXAMPLES * expected_scans) for number in range(EXAMPLES)]
+
+    def take(self, scan: Scan, estimate: Estimate) -> Optional[np.ndarray]:
+        """Score one scan; its true cases (B,), None where there are none. Both go by ascending stamps."""
+        self._scans += 1
+        while self._next is not None and self._next.stamp_ns < scan.stamp_ns:
+            self._next = next(self._rest, None)
+        if self._next is None or self._next.stamp_ns != scan.stamp_ns:
+            return None
+        truth = self._next
+        if len(truth.case) != len(scan):
+            raise RecordingError(
+                f"{self._recording.name}: the truth at {scan.stamp_ns * 1e-9:.3f} s is about "
+                f"{len(truth.case)} beams, the scan has {len(scan)}"
+            )
+        found = case_scores.of_cases(truth.case, estimate.cases.case, scan.answered)
+        self.cases = found if self.cases is None else self.cases + found
+        if truth.crossing_m is not None:
+            cut = estimate.surface_scan
+            surfaces = case_scores.of_surfaces(truth.crossing_m, scan.as_measured(cut.ranges_m), cut.cut, cut.trusted)
+            self.surfaces = surfaces if self.surfaces is None else self.surfaces + surfaces
+        if self._example_at and self._scans > self._example_at[0]:
+            del self._example_at[0]
+            self.examples.append(_example(scan, estimate, truth))
+        return truth.case
+
+
+class _WorstScans:
+    """The worst scan of each part of the log: farthest off, or least reliable where nobody knows. One part of it is in
+    memory at a time: all scans of a long log would not fit.
+    """
+
+    def __init__(self, recording: Recording, expected_scans: int) -> None:
+        self._reference = recording.ground_truth
+        self._expected = max(expected_scans, 1)
+        self._of_part: Dict[int, Tuple[Tuple[bool, float], KeptScan]] = {}
+
+    def take(self, row: int, scan: Scan, estimate: Estimate) -> None:
+        """Look at one scan."""
+        errors = pose_errors.of(np.array([estimate.stamp_ns]), estimate.map_from_base[None], self._reference)
+        # Nobody relies on a pose that is still being looked for: such scans come last.
+        bad = (
+            estimate.state not in (UNKNOWN, GLOBAL_SEARCH),
+            float(errors.position_m[0]) if errors.matched[0] else 1.0 - estimate.reliability,
+        )
+        part = row * PARTS // self._expected
+        if part not in self._of_part or bad > self._of_part[part][0]:
+            self._of_part[part] = bad, KeptScan(row, scan.base_from_laser, scan.points_in_base())
+
+    def kept(self) -> List[KeptScan]:
+        """The worst of all parts, the worst first."""
+        ordered = sorted(self._of_part.values(), key=lambda each: each[0], reverse=True)
+        return [kept for _, kept in ordered[:WORST]]
+
+
+def _example(scan: Scan, estimate: Estimate, truth: BeamTruth) -> BeamExample:
+    map_from_laser = se2.compose(estimate.map_from_base, scan.base_from_laser)
+    return BeamExample(
+        scan.stamp_ns,
+        map_from_laser[:2],
+        se2.transform_points(estimate.map_from_base, scan.points_in_base()),
+        truth.case,
+        estimate.cases.case,
+    )
+
+
+class _Row:
+    """What is kept of one scan: not the particles themselves, a long log would not fit."""
+
+    def __init__(
+        self, odom_from_base: np.ndarray, estimate: Estimate, cpu_ms: float, true_case: Optional[np.ndarray]
+    ) -> None:
+        self.odom_from_base, self.cpu_ms = odom_from_base, cpu_ms
+        self.stamp_ns, self.map_from_base = estimate.stamp_ns, estimate.map_from_base
+        self.deviation = np.sqrt(np.maximum(np.diag(estimate.covariance), 0.0))
+        self.state, self.reason = estimate.state, estimate.reason
+        self.used_share, self.updated = estimate.used_share, estimate.updated
+        self.reliability, self.places = estimate.reliability, estimate.places
+        self.particles, self.case, self.true_case = len(estimate.particles), estimate.cases.case, true_case
+
+
+def _nothing_usable(refusals: "Counter[str]") -> str:
+    if not refusals:
+        return "no scan in the part to be replayed"
+    most = "; ".join(f"{count} times: {reason}" for reason, count in refusals.most_common(3))
+    return f"none of its {sum(refusals.values())} scans can be used; {most}"
+
+
+def _result(
+    rows: List[_Row],
+    refusals: "Counter[str]",
+    recording: Recording,
+    scores: _Scores,
+    worst: List[KeptScan],
+    wall_s: float,
+    seed: int,
+) -> ReplayResult:
+    cases = np.full((len(rows), max(len(row.case) for row in rows)), NO_BEAM, np.uint8)
+    true_cases = None if scores.cases is None else cases.copy()
+    for index, row in enumerate(rows):
+        cases[index, : len(row.case)] = row.case
+        if true_cases is not None and row.true_case is not None:
+            true_cases[index, : len(row.true_case)] = row.true_case
+    return ReplayResult(
+        stamps_ns=np.array([row.stamp_ns for row in rows], np.int64),
+        map_from_base=np.array([row.map_from_base for row in rows], float),
+        odom_from_base=np.array([row.odom_from_base for row in rows], float),
+        deviation=np.array([row.deviation for row in rows], float),
+        states=[row.state for row in rows],
+        reasons=[row.reason for row in rows],
+        used_share=np.array([row.used_share for row in rows], float),
+        updated=np.array([row.updated for row in rows], bool),
+        particles=np.array([row.particles for row in rows], int),
+        reliability=np.array([row.reliability for row in rows], float),
+        places=np.array([row.places for row in rows], int),
+        cpu_ms=np.array([row.cpu_ms for row in rows], float),
+        cases=cases,
+        refusals=refusals,
+        reference=recording.ground_truth,
+        wall_s=wall_s,
+        seed=seed,
+        true_cases=true_cases,
+        case_scores=scores.cases,
+        surface_scores=scores.surfaces,
+        examples=scores.examples,
+        worst=worst,
+    )

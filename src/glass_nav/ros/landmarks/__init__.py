@@ -1,0 +1,1 @@
+"""landmarks_node."""

@@ -1,0 +1,1 @@
+"""localization_node, also startable as amcl."""

@@ -1,0 +1,412 @@
+"""localization_node: where is the robot in a map of walls and glass? Also startable as `amcl`.
+
+Wiring only; the answer comes from GlassMcl. Callbacks store, one loop works: nothing else touches the filter.
+
+Subscribes: scan (LaserScan; or each of ~scan_topics), initialpose (PoseWithCovarianceStamped), map (OccupancyGrid, if
+    ~use_map_topic), global_localization_area (PolygonStamped in the map's frame: the robot is searched for in it),
+    landmark_bearings (LandmarkBearings, if ~landmark_file is given), tf odom <- base <- laser.
+Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseArray, latched), tf map -> odom,
+    ~status (LocalizationStatus, latched), ~beam_cases (BeamCases), /diagnostics;
+    scan_surfaces (LaserScan): the scan for a costmap, with each beam cut at the first surface of the map that it
+    passed or was mirrored at. Stamp, frame and beams are the scan's; its `intensities` say 0 as measured, 1 cut,
+    and -1 for all beams while the pose is not trusted: the scan is passed on raw then. One for every scan that
+    is used; none for a scan that is refused or has no transforms, as nobody knows where it would have to be cut;
+    ~glass_map (OccupancyGrid, latched): how glassy each wall cell proved [percent], -1 where nothing is known;
+    for rviz, while somebody listens: ~beam_cloud (PointCloud2), ~beam_markers (MarkerArray, a namespace per case
+    and one for the status), ~wall_markers (MarkerArray, latched: the glass map without what is unknown), ~legend
+    (Image, latched).
+Services: global_localization, request_nomotion_update (Empty), set_map (SetMap), ~set_parameters (Reconfigure, with
+    its topics ~parameter_descriptions and ~parameter_updates). Calls static_map (GetMap).
+Parameters: LocalizationNodeParams and GlassMclParams; explained in config/localization.yaml.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any, Callable, Dict, List, Optional
+
+import numpy as np
+import rospkg
+import rospy
+import tf2_ros
+from geometry_msgs.msg import PolygonStamped, PoseWithCovarianceStamped
+from nav_msgs.msg import OccupancyGrid
+from nav_msgs.srv import SetMap, SetMapRequest, SetMapResponse
+from sensor_msgs.msg import LaserScan
+from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
+
+from glass_nav.localization.localizer import Estimate, GlassMcl
+from glass_nav.ros import conversions, shutdown
+from glass_nav.ros.landmarks.bearing_messages import LONGEST_TURN_S
+from glass_nav.ros.localization import initial_poses, params, reconfigure
+from glass_nav.ros.localization.bearing_input import BearingInput
+from glass_nav.ros.localization.diagnostics import Diagnostics, Situation
+from glass_nav.ros.localization.initial_poses import InitialPoses
+from glass_nav.ros.localization.map_source import MapSource
+from glass_nav.ros.localization.pose_memory import PoseMemory
+from glass_nav.ros.localization.publishers import Publishers
+from glass_nav.ros.localization.reconfigure import ReconfigureServer
+from glass_nav.ros.log_throttle import LogThrottle
+from glass_nav.ros.mailbox import Errand, Mailbox
+from glass_nav.ros.scan_input import STALE_SCANS, ScanInput
+from glass_nav.sensing.scan import Scan, ScanError
+from glass_nav.world import landmark_file
+from glass_nav.world.grid_map import GridMap
+
+TIME_JUMP_S = 0.5  # a clock that goes back by less is noise between machines
+NO_SCAN_WARNING_S = 15.0  # as AMCL
+SILENCE_S = 3.0  # without a used scan for that long, ~status says why
+SETTLING_S = 5.0  # a player of a launch file needs some seconds: no warning before
+ERRAND_TIMEOUT_S = 30.0
+
+
+class LocalizationNode:
+    """Wiring only: a message in, one call of the core, messages out."""
+
+    def __init__(self, p: params.LocalizationParams) -> None:
+        self._p = p
+        self._rng = p.node.rng
+        self._mcl: Optional[GlassMcl] = None
+        self._map: Optional[GridMap] = None
+        self._map_origin = ""  # where it came from, in words
+        self._waits = p.node.wait_for_initialpose  # with a map, without a filter
+        self._estimate: Optional[Estimate] = None
+        self._scan: Optional[Scan] = None  # that the estimate was made of
+        self._pose_is_news = True
+        self._log = LogThrottle()
+        self._inbox = Mailbox(scans=100, commands=100)
+        self._now_s = self._last_estimate_s = rospy.get_time()
+        self._started_s = time.monotonic()
+        self._simulated = bool(rospy.get_param("/use_sim_time", False))
+        self._next_report_s = 0.0  # by the monotonic clock
+
+        self._tf = tf2_ros.Buffer(rospy.Duration(LONGEST_TURN_S) if p.node.landmark_file else None)
+        self._scans = ScanInput(p.node, p.deskew, self._tf, self._log)
+        self._bearings = BearingInput(p.node, self._tf, self._log)
+        self._maps = MapSource(p.node, self._log, self._use_map)
+        self._starts = InitialPoses(p, self._tf)
+        self._memory = PoseMemory(p.pose_file, self._log)
+        self._outputs = Publishers(p.node)
+        self._diagnostics = Diagnostics(p.node, self._scans.counts)
+
+        rospy.Service("global_localization", Empty, self._serve_global_localization)
+        rospy.Service("request_nomotion_update", Empty, self._serve_nomotion_update)
+        rospy.Service("set_map", SetMap, self._serve_set_map)
+        self._reconfigure = ReconfigureServer(
+            params.changeable(p),
+            reconfigure.explanations(_parameter_file()),
+            lambda values: self._run_errand(lambda: self._take_parameters(values)),
+        )
+        # Subscribers last: they may fire at once.
+        self._listener = tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
+        self._scans.subscribe(lambda msg: self._inbox.put("scans", msg))
+        self._bearings.subscribe(self._command(self._bearings.receive))
+        rospy.Subscriber("initialpose", PoseWithCovarianceStamped, self._command(self._take_guess), queue_size=2)
+        rospy.Subscriber("global_localization_area", PolygonStamped, self._command(self._take_area), queue_size=2)
+        if p.node.use_map_topic:
+            rospy.Subscriber("map", OccupancyGrid, self._command(self._maps.take_topic), queue_size=1, buff_size=2**24)
+
+    def run(self, ending: threading.Event) -> None:
+        """The only thread that touches the filter; returns when ROS shuts down or ending is set."""
+        while not (rospy.is_shutdown() or ending.is_set()):
+            mail = self._inbox.take(timeout_s=0.01 if self._scans.is_waiting else 0.1)
+            if self._clock_jumped_back():
+                mail["scans"] = []  # from before the jump
+            for command in mail["commands"]:
+                command()
+            self._maps.request()
+            mail["scans"] += self._inbox.take_now("scans")  # a new map takes a while
+            if self._waits and mail["scans"]:
+                mail["scans"], self._scans.last_arrival_s = [], self._now_s
+            unusable = "there is no map yet" if self._mcl is None else None
+            for msg in mail["scans"]:
+                if self._scans.receive(msg, self._now_s, unusable):
+                    self._restart(f"the last {STALE_SCANS} scans are older than the one before them")
+            if self._mcl is not None:
+                for msg in self._scans.take_ready(self._now_s):
+                    self._step(msg)
+            if self._mcl is not None and self._map is not None:
+                stamp_ns = 0 if self._estimate is None else self._estimate.stamp_ns
+                self._outputs.send_glass_map(self._mcl, self._map, stamp_ns, self._now_s)
+            self._report()
+
+    def save_pose(self) -> None:
+        """For the next start."""
+        self._memory.save()
+
+    # -- callbacks of other threads: they store, services also wait for the outcome
+
+    def _command(self, handle: Callable[[Any], None]) -> Callable[[Any], None]:
+        return lambda msg: self._inbox.put("commands", lambda: handle(msg))
+
+    def _run_errand(self, work: Callable[[], None]) -> None:
+        errand = Errand(work)
+        self._inbox.put("commands", errand.run)
+        errand.wait(ERRAND_TIMEOUT_S)
+
+    def _serve_global_localization(self, _request: EmptyRequest) -> EmptyResponse:
+        try:
+            self._run_errand(self._search)
+        except (ValueError, TimeoutError) as err:
+            rospy.logwarn(f"global_localization refused: {err}")
+            raise rospy.ServiceException(str(err)) from err
+        return EmptyResponse()
+
+    def _serve_nomotion_update(self, _request: EmptyRequest) -> EmptyResponse:
+        try:
+            self._run_errand(lambda: self._core().request_update())
+        except (ValueError, TimeoutError) as err:
+            raise rospy.ServiceException(str(err)) from err
+        return EmptyResponse()
+
+    def _serve_set_map(self, request: SetMapRequest) -> SetMapResponse:
+        try:
+            self._run_errand(lambda: self._set_map_and_pose(request))
+        except (ValueError, TimeoutError) as err:
+            rospy.logwarn(f"set_map refused: {err}")
+            return SetMapResponse(success=False)
+        return SetMapResponse(success=True)
+
+    # -- maps, poses and parameters from outside
+
+    def _core(self) -> GlassMcl:
+        if self._mcl is None:
+            raise ValueError("there is no map yet")
+        return self._mcl
+
+    def _use_map(self, grid_map: GridMap, frame: str, origin: str) -> None:
+        """Build the filter around the first map; a later one leaves the particles where they are."""
+        if self._mcl is None:
+            self._map = grid_map
+            if not self._waits:
+                self._begin()
+        elif self._map is not None and grid_map.digest == self._map.digest:
+            rospy.loginfo(f"the map from {origin} is the one that is in use: nothing changes")
+            return
+        else:
+            self._mcl.set_map(grid_map)
+            self._map = grid_map
+        self._map_origin = origin
+        self._outputs.glass_is_news()
+        height, width = grid_map.occupancy.shape
+        rospy.loginfo(f"map of {width} x {height} cells of {grid_map.resolution_m:g} m from {origin}")
+        if conversions.frame_id(frame) != self._p.node.global_frame_id:
+            rospy.logwarn(
+                f"the map says it is in frame {frame!r}, ~global_frame_id is "
+                f"{self._p.node.global_frame_id!r}: used as the latter"
+            )
+
+    def _set_map_and_pose(self, request: SetMapRequest) -> None:
+        guess = conversions.guess_from_msg(request.initial_pose, self._p.node.global_frame_id)
+        grid_map = conversions.map_from_msg(request.map)
+        initial_poses.refuse_outside(guess, grid_map)
+        self._maps.take(grid_map, request.map.header.frame_id, "service set_map")
+        self._starts.give(guess, self._now_s)
+        self._wait_no_more()
+        if self._p.node.force_update_after_set_map:
+            self._core().request_update()
+
+    def _begin(self) -> str:
+        """A new filter, at the start that there is; where, in words."""
+        assert self._map is not None
+        self._mcl = GlassMcl(self._p.mcl, self._map, self._rng)
+        self._outputs.start_over()
+        self._pose_is_news = True
+        return self._starts.begin(self._mcl)
+
+    def _take_guess(self, msg: PoseWithCovarianceStamped) -> None:
+        try:
+            guess = conversions.guess_from_msg(msg, self._p.node.global_frame_id)
+            if self._map is not None:
+                initial_poses.refuse_outside(guess, self._map)
+        except ValueError as err:
+            rospy.logwarn(f"initialpose refused: {err}")
+            return
+        self._starts.give(guess, self._now_s)
+        self._wait_no_more()
+
+    def _wait_no_more(self) -> None:
+        """There is a pose, or somebody wants one to be found."""
+        if self._waits:
+            self._waits = False
+            if self._map is not None:
+                self._begin()
+
+    def _take_area(self, msg: PolygonStamped) -> None:
+        try:
+            self._search(conversions.area_from_msg(msg, self._p.node.global_frame_id))
+        except ValueError as err:
+            rospy.logwarn(f"global_localization_area refused: {err}")
+
+    def _search(self, area: Optional[np.ndarray] = None) -> None:
+        """Start over anywhere in the map, or in an area (N, 2) of it; ValueError if there is no room."""
+        self._wait_no_more()
+        self._core().scatter(area)
+        self._starts.forget()
+        self._outputs.start_over()
+        self._pose_is_news = True
+        where = "the map" if area is None else f"an area of {len(area)} corners"
+        rospy.loginfo(f"global localization: the robot may be anywhere in {where}")
+
+    def _take_parameters(self, values: Dict[str, Any]) -> None:
+        """Other parameters; what the filter knows stays. ParamError if one cannot be used, and then none is."""
+        p = params.changed(self._p, values, rospy.get_name())
+        if self._mcl is not None:
+            self._mcl.reconfigure(p.mcl)
+        self._p = p
+        self._scans.reconfigure(p.node, p.deskew)
+        self._outputs.reconfigure(p.node)
+        self._diagnostics.reconfigure(p.node)
+
+    # -- scans
+
+    def _step(self, msg: LaserScan) -> None:
+        """One scan through the filter."""
+        assert self._mcl is not None and self._map is not None
+        try:
+            placed = self._scans.place(msg)
+        except ScanError as err:
+            self._pass_over(msg, str(err))
+            return
+        began_cpu_s, began_s = time.process_time(), time.monotonic()
+        if self._starts.apply(self._mcl, self._map, placed.scan.stamp_ns, placed.odom_from_base, self._now_s):
+            self._pose_is_news = True
+            if self._p.node.force_update_after_initialpose:
+                self._mcl.request_update()
+        self._bearings.give(self._mcl, placed.scan.stamp_ns)
+        try:
+            estimate = self._mcl.update(placed.scan, placed.odom_from_base)
+        except ValueError as err:  # ScanError, and what the filter cannot work out: a robot drives on by odometry
+            self._pass_over(msg, str(err))
+            return
+        self._diagnostics.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
+        if not conversions.is_finite(estimate):
+            self._scans.counts.refused += 1
+            self._log.error("the filter's pose is not finite: nothing is published")
+            return
+        self._scans.counts.used += 1
+        self._estimate, self._scan, self._last_estimate_s = estimate, placed.scan, self._now_s
+        self._outputs.send(msg, placed, estimate, self._now_s, self._pose_is_news)
+        self._pose_is_news = False
+        self._memory.take(estimate, self._map.digest, self._p.node.save_pose_rate, self._now_s)
+
+    def _pass_over(self, msg: LaserScan, why: str) -> None:
+        """A scan that cannot be used: the pose moves on with the odometry all the same."""
+        self._scans.refuse(why)
+        if self._estimate is not None:
+            self._outputs.send_transform(conversions.ns_from_stamp(msg.header.stamp), self._estimate.map_from_odom)
+
+    # -- time, and what is missing
+
+    def _clock_jumped_back(self) -> bool:
+        before_s, self._now_s = self._now_s, rospy.get_time()
+        if before_s == 0.0:  # the first /clock
+            self._scans.last_arrival_s = self._last_estimate_s = self._now_s
+        if self._now_s >= before_s - TIME_JUMP_S:
+            return False
+        self._restart(f"time jumped back by {before_s - self._now_s:.3f} s")
+        return True
+
+    def _restart(self, why: str) -> None:
+        """Stamps start over: forget them. In simulated time the robot starts over too, else it stays."""
+        self._scans.restart(self._now_s)
+        self._bearings.restart()
+        self._tf.clear()
+        self._starts.forget()
+        self._last_estimate_s = self._now_s
+        if not self._simulated and self._estimate is not None:
+            self._starts.begin_at(self._estimate.map_from_base, self._estimate.covariance)
+        self._estimate = None
+        self._rng = self._p.node.rng  # a bag that starts over gives the same poses again
+        if self._simulated and self._p.node.wait_for_initialpose:
+            self._waits, self._mcl = True, None
+            rospy.logwarn(f"{why}: it waits for initialpose again")
+        elif self._map is not None:
+            rospy.logwarn(f"{why}: the filter starts over {self._begin()}")
+
+    def _report(self) -> None:
+        """Once a second: diagnostics, and in words what is missing if no scan is being used."""
+        if time.monotonic() < self._next_report_s:
+            return
+        self._next_report_s = time.monotonic() + 1.0
+        trouble = self._missing()
+        if trouble is not None:
+            self._outputs.send_trouble(self._estimate, trouble)
+        self._diagnostics.publish(
+            Situation(
+                self._estimate,
+                self._scan,
+                trouble,
+                self._map,
+                self._map_origin if self._map else self._maps.trouble or "no map yet",
+                self._scans.period_s,
+                self._scans.lidars,
+            )
+        )
+
+    def _missing(self) -> Optional[str]:
+        """Why no scan is being used; None while all is well."""
+        if self._now_s == 0.0:
+            trouble = "time stands still: /use_sim_time is set and nothing publishes /clock"
+            if time.monotonic() - self._started_s > SETTLING_S:
+                self._log.warn(trouble, NO_SCAN_WARNING_S)
+            return trouble
+        without_scan_s = self._now_s - self._scans.last_arrival_s
+        if without_scan_s > NO_SCAN_WARNING_S:
+            self._log.warn(self._scans.silence(self._now_s), NO_SCAN_WARNING_S)
+        if self._mcl is None:
+            return self._maps.trouble or ("it waits for initialpose" if self._map is not None else "no map yet")
+        if without_scan_s > SILENCE_S:
+            return self._scans.silence(self._now_s)
+        if self._now_s - self._last_estimate_s > SILENCE_S or self._estimate is None:
+            return self._scans.trouble
+        return None
+
+
+def _parameter_file() -> Optional[Path]:
+    """config/localization.yaml, which explains the parameters."""
+    try:
+        return Path(rospkg.RosPack().get_path("glass_nav")) / "config" / "localization.yaml"
+    except rospkg.ResourceNotFound:
+        return None
+
+
+def main(name: str = "glass_localization") -> None:
+    """Start the node; exit code 2 if a parameter or the landmark file cannot be used."""
+    rospy.init_node(name, disable_signals=True)
+    if "--run-from-bag" in rospy.myargv():
+        rospy.logfatal(
+            f"{rospy.get_name()}: --run-from-bag is the command glass_nav replay here: "
+            "rosrun glass_nav glass_nav replay BAG --map MAP --out FOLDER"
+        )
+        sys.exit(2)
+    ending = shutdown.event_on_signals()
+    core_log = logging.getLogger("glass_nav")
+    core_log.handlers = logging.getLogger("rosout").handlers
+    core_log.setLevel(logging.INFO)
+    core_log.propagate = False
+    given: Dict[str, Any] = rospy.get_param("~", {})
+    unknown: List[str] = []
+    if name == "amcl":
+        given, unknown = params.without_unknown(given, rospy.get_name())
+    try:
+        p, unused = params.localization_params(given, rospy.get_name())
+    except params.ParamError as err:
+        shutdown.refuse_to_start(err)
+    try:
+        node = LocalizationNode(p)
+    except landmark_file.LandmarkError as err:
+        shutdown.refuse_to_start(err)
+    for line in unknown:
+        rospy.logwarn(line)
+    if unused:
+        rospy.loginfo(f"parameters of amcl that this filter does not use: ~{', ~'.join(unused)}")
+    try:
+        node.run(ending)
+    finally:
+        node.save_pose()
+        rospy.signal_shutdown("ended")

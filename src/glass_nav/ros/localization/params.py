@@ -1,0 +1,155 @@
+"""The private parameters of the localization node: the parameter server -> validated dataclasses.
+
+Names and defaults are AMCL's where AMCL has the parameter. Parameters of AMCL that mean nothing to
+this filter are taken off first, so that launch files written for amcl load; whatever else is unknown
+is refused with the nearest known name; as amcl, which takes no notice of such names, it is left out and said.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass, field
+from typing import Any, Dict, List, Mapping, Tuple
+
+import numpy as np
+
+from glass_nav import amcl_parameters, params
+from glass_nav.localization.initial_pose import StartPose
+from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.saved_pose import PoseFile
+from glass_nav.params import ParamError
+from glass_nav.sensing.deskew import Deskew
+
+__all__ = ["LocalizationNodeParams", "LocalizationParams", "ParamError", "localization_params"]
+
+
+@dataclass(frozen=True)
+class LocalizationNodeParams:
+    """What the node itself needs: frames, map, start, rates. Units by REP 103."""
+
+    odom_frame_id: str = "odom"
+    base_frame_id: str = "base_link"
+    global_frame_id: str = "map"
+    scan_topics: Tuple[str, ...] = ()  # of several lidars; none: scan
+    tf_broadcast: bool = True
+    publish_tf_before_localized: bool = True  # False: map -> odom goes out once the state has been LOCALIZED
+    transform_tolerance: float = 0.1  # [s] how far ahead of the scan map -> odom is stamped
+    transform_wait_s: float = 1.0  # [s] how long a scan waits for odom <- base <- laser
+    use_map_topic: bool = False
+    first_map_only: bool = False
+    force_update_after_initialpose: bool = False
+    force_update_after_set_map: bool = False
+    start_without_guess: bool = False  # begin with a search of the whole map, not at initial_pose_*
+    wait_for_initialpose: bool = False  # no pose and no map -> odom before one is given; nothing is searched
+    gui_publish_rate: float = -1.0  # [Hz] of particlecloud, ~beam_cloud, ~beam_markers; <= 0: no limit
+    glass_map_period_s: float = 2.0  # [s] ~glass_map goes out no more often
+    save_pose_rate: float = 0.5  # [Hz]; <= 0: only when the node ends
+    std_warn_level_x: float = 0.2  # [m]
+    std_warn_level_y: float = 0.2  # [m]
+    std_warn_level_yaw: float = 0.1  # [rad]
+    landmark_file: str = ""  # landmarks.yaml; "": bearings are not used
+    random_seed: int = 0  # < 0: another one at every start
+
+    def __post_init__(self) -> None:
+        if len(set(self.scan_topics)) < len(self.scan_topics) or not all(self.scan_topics):
+            raise ValueError(f"~scan_topics must name each topic once, got {list(self.scan_topics)}")
+        for name in ("odom_frame_id", "base_frame_id", "global_frame_id"):
+            frame = getattr(self, name)
+            object.__setattr__(self, name, frame.lstrip("/"))  # tf2 has no "/" in front; tf1 files do
+            if not frame.strip("/ "):
+                raise ValueError(f"~{name} must name a frame, got {frame!r}")
+        frames = self.odom_frame_id, self.base_frame_id, self.global_frame_id
+        if len(set(frames)) < 3:
+            raise ValueError(
+                "~odom_frame_id, ~base_frame_id and ~global_frame_id must differ, "
+                f"got {frames[0]!r}, {frames[1]!r}, {frames[2]!r}"
+            )
+        for name, kind in [(f.name, f.type) for f in dataclasses.fields(self)]:
+            if kind in (float, "float") and not math.isfinite(getattr(self, name)):
+                raise ValueError(f"~{name} must be finite, got {getattr(self, name)}")
+        for name in (
+            "transform_tolerance",
+            "transform_wait_s",
+            "glass_map_period_s",
+            "std_warn_level_x",
+            "std_warn_level_y",
+            "std_warn_level_yaw",
+        ):
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"~{name} must be >= 0, got {getattr(self, name)}")
+
+    @property
+    def rng(self) -> np.random.Generator:
+        """A generator that repeats itself from start to start, unless ~random_seed is negative."""
+        return np.random.default_rng(None if self.random_seed < 0 else self.random_seed)
+
+
+@dataclass(frozen=True)
+class LocalizationParams:
+    """Everything the node reads: its own parameters and the filter's, one flat set of names."""
+
+    node: LocalizationNodeParams = field(default_factory=LocalizationNodeParams)
+    start: StartPose = field(default_factory=StartPose)
+    pose_file: PoseFile = field(default_factory=PoseFile)
+    deskew: Deskew = field(default_factory=Deskew)
+    mcl: GlassMclParams = field(default_factory=GlassMclParams)
+
+
+# Of the node's own parameters, those that may change while it runs; of the filter's, all.
+CHANGEABLE = (
+    "tf_broadcast",
+    "publish_tf_before_localized",
+    "transform_tolerance",
+    "transform_wait_s",
+    "force_update_after_initialpose",
+    "force_update_after_set_map",
+    "gui_publish_rate",
+    "glass_map_period_s",
+    "save_pose_rate",
+    "std_warn_level_x",
+    "std_warn_level_y",
+    "std_warn_level_yaw",
+)
+
+
+def changeable(p: LocalizationParams) -> Dict[str, Any]:
+    """Name -> value of the parameters that may change while the node runs."""
+    own = params.as_mapping(p.node)
+    return {**params.as_mapping(p.mcl), **params.as_mapping(p.deskew), **{name: own[name] for name in CHANGEABLE}}
+
+
+def changed(p: LocalizationParams, values: Mapping[str, Any], owner: str) -> LocalizationParams:
+    """The parameters with other values of those that may change.
+
+    Raises:
+        ParamError: a wrong type, or a value out of its range.
+    """
+    return params.load(LocalizationParams, {**params.as_mapping(p), **values}, owner)
+
+
+def localization_params(mapping: Mapping[str, Any], owner: str) -> Tuple[LocalizationParams, List[str]]:
+    """The parameters of the node, and the names in the mapping that are AMCL's and not used here.
+
+    Args:
+        mapping: names -> values as the parameter server has them under the node's name.
+        owner: the node's name, the first word of an error.
+
+    Raises:
+        ParamError: a name nobody knows, a wrong type, a value out of its range.
+    """
+    ours, unused = amcl_parameters.without_unused(mapping, LocalizationParams)
+    return params.load(LocalizationParams, amcl_parameters.adapted(ours, LocalizationParams), owner), unused
+
+
+def without_unknown(mapping: Mapping[str, Any], owner: str) -> Tuple[Dict[str, Any], List[str]]:
+    """The mapping without the names that neither this node nor AMCL has, and a line on each of them.
+
+    AMCL reads what it knows and no more, so launch files of robots carry names of other nodes and of long ago.
+    """
+    known = {*params.names(LocalizationParams), *amcl_parameters.NAMES}
+    unknown = [name for name in mapping if name not in known]
+    return (
+        {name: value for name, value in mapping.items() if name in known},
+        [f"{params.unknown(name, known, owner)}; not used, as by amcl" for name in unknown],
+    )

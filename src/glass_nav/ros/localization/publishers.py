@@ -1,0 +1,148 @@
+"""All that the localization node says of a scan, and when: tf, pose, particles, status, cases, surfaces, for rviz."""
+
+from __future__ import annotations
+
+from typing import Optional
+
+import numpy as np
+import rospy
+import tf2_ros
+from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
+from nav_msgs.msg import OccupancyGrid
+from sensor_msgs.msg import Image, LaserScan, PointCloud2
+from visualization_msgs.msg import MarkerArray
+
+from glass_nav.localization.integrity.pose_state import LOCALIZED
+from glass_nav.localization.localizer import Estimate, GlassMcl
+from glass_nav.msg import BeamCases, LocalizationStatus
+from glass_nav.ros import conversions
+from glass_nav.ros.localization import beam_displays, legend, wall_display
+from glass_nav.ros.localization.params import LocalizationNodeParams
+from glass_nav.ros.rate_limiter import RateLimiter, period_s
+from glass_nav.ros.scan_input import PlacedScan
+from glass_nav.world.grid_map import GridMap
+
+NOT_KNOWN = float("nan")
+
+
+class Publishers:
+    """The node's publishers."""
+
+    def __init__(self, p: LocalizationNodeParams) -> None:
+        self._p = p
+        self._frame = p.global_frame_id
+        self._was_localized = False
+        self._last_transform_ns = 0
+        self._particles_pace, self._beams_pace, self._glass_pace = RateLimiter(), RateLimiter(), RateLimiter()
+        self._glass_is_news = False  # since it was last sent
+        self._broadcaster = tf2_ros.TransformBroadcaster()
+        self._poses = rospy.Publisher("amcl_pose", PoseWithCovarianceStamped, queue_size=2, latch=True)
+        self._particles = rospy.Publisher("particlecloud", PoseArray, queue_size=2, latch=True)
+        self._status = rospy.Publisher("~status", LocalizationStatus, queue_size=5, latch=True)
+        self._beam_cases = rospy.Publisher("~beam_cases", BeamCases, queue_size=5)
+        self._surfaces = rospy.Publisher("scan_surfaces", LaserScan, queue_size=5)
+        self._glass_map = rospy.Publisher("~glass_map", OccupancyGrid, queue_size=1, latch=True)
+        self._beam_cloud = rospy.Publisher("~beam_cloud", PointCloud2, queue_size=2)
+        self._beam_markers = rospy.Publisher("~beam_markers", MarkerArray, queue_size=2)
+        self._wall_markers = rospy.Publisher("~wall_markers", MarkerArray, queue_size=1, latch=True)
+        self._legend = rospy.Publisher("~legend", Image, queue_size=1, latch=True)
+        self._legend.publish(legend.image_msg(self._frame))
+
+    def reconfigure(self, p: LocalizationNodeParams) -> None:
+        """Other parameters from now on."""
+        self._p = p
+
+    def start_over(self) -> None:
+        """The pose that was known is no more: stamps may go back, and tf waits for LOCALIZED where it shall."""
+        self._was_localized = False
+        self._last_transform_ns = 0
+        self.glass_is_news()
+
+    def glass_is_news(self) -> None:
+        """There is another glass map than the one that was sent."""
+        self._glass_is_news = True
+
+    def send(self, msg: LaserScan, placed: PlacedScan, estimate: Estimate, now_s: float, pose_is_news: bool) -> None:
+        """All about one scan that was used.
+
+        Args:
+            msg, placed: the scan.
+            estimate: what the filter says of it.
+            now_s: ROS time.
+            pose_is_news: publish the pose even if this scan did not move the particles.
+        """
+        self._was_localized = self._was_localized or estimate.state == LOCALIZED
+        self.send_transform(estimate.stamp_ns, estimate.map_from_odom)
+        self._surfaces.publish(conversions.surface_scan_msg(msg, placed.scan, estimate.surface_scan))
+        self._status.publish(
+            conversions.status_msg(
+                estimate.stamp_ns,
+                self._frame,
+                estimate.state,
+                estimate.reason,
+                estimate.used_share,
+                estimate.reliability,
+            )
+        )
+        if estimate.updated or pose_is_news:
+            self._poses.publish(conversions.pose_msg(estimate, self._frame))
+            if self._particles_pace.is_due(now_s, period_s(self._p.gui_publish_rate)) or pose_is_news:
+                self._particles.publish(conversions.pose_array(estimate.stamp_ns, self._frame, estimate.particles))
+        self._glass_is_news = self._glass_is_news or estimate.updated
+        if self._beam_cases.get_num_connections():
+            self._beam_cases.publish(conversions.beam_cases_msg(msg.header, placed.scan, estimate.cases))
+        self._show_beams(placed, estimate, now_s)
+
+    def send_transform(self, stamp_ns: int, map_from_odom: np.ndarray) -> None:
+        """tf map -> odom, if it is wanted. Never two of one stamp: tf warns of each."""
+        if not self._p.tf_broadcast or not (self._was_localized or self._p.publish_tf_before_localized):
+            return
+        stamp_ns = max(stamp_ns, self._last_transform_ns + 1)  # another lidar's scan may be older
+        self._last_transform_ns = stamp_ns
+        valid_until_ns = stamp_ns + round(self._p.transform_tolerance * 1e9)
+        self._broadcaster.sendTransform(
+            conversions.transform_stamped(valid_until_ns, self._frame, self._p.odom_frame_id, map_from_odom)
+        )
+
+    def send_trouble(self, estimate: Optional[Estimate], trouble: str) -> None:
+        """~status, and the words in rviz, while no scan is being used.
+
+        Args:
+            estimate: the last one, None before the first.
+            trouble: why no scan is being used.
+        """
+        stamp_ns, where, state = 0, None, "UNKNOWN"
+        if estimate is not None:
+            stamp_ns, where, state = estimate.stamp_ns, estimate.map_from_base, "UNCERTAIN"
+        self._status.publish(conversions.status_msg(stamp_ns, self._frame, state, trouble, NOT_KNOWN, NOT_KNOWN))
+        if self._beam_markers.get_num_connections():
+            self._beam_markers.publish(
+                MarkerArray([beam_displays.status_marker(where, self._frame, state, trouble, NOT_KNOWN)])
+            )
+
+    def send_glass_map(self, mcl: GlassMcl, grid_map: GridMap, stamp_ns: int, now_s: float) -> None:
+        """The glass map, if it is news to somebody and it is time."""
+        listeners = self._glass_map.get_num_connections() + self._wall_markers.get_num_connections()
+        if not (self._glass_is_news and listeners and self._glass_pace.is_due(now_s, self._p.glass_map_period_s)):
+            return
+        self._glass_is_news = False
+        glass = mcl.glass_map.occupancy()
+        self._glass_map.publish(conversions.glass_map_msg(stamp_ns, self._frame, grid_map, glass))
+        self._wall_markers.publish(wall_display.wall_markers(self._frame, grid_map, glass))
+
+    def _show_beams(self, placed: PlacedScan, estimate: Estimate, now_s: float) -> None:
+        """The beams for rviz, if it listens and it is time."""
+        listeners = self._beam_cloud.get_num_connections(), self._beam_markers.get_num_connections()
+        if not any(listeners) or not self._beams_pace.is_due(now_s, period_s(self._p.gui_publish_rate)):
+            return
+        base, height_m = self._p.base_frame_id, placed.mounting.height_m
+        if listeners[0]:
+            self._beam_cloud.publish(beam_displays.beam_cloud(placed.scan, estimate.cases, height_m, base))
+        if listeners[1]:
+            markers = beam_displays.beam_markers(placed.scan, estimate.cases, estimate.surface_scan, height_m, base)
+            markers.markers.append(
+                beam_displays.status_marker(
+                    estimate.map_from_base, self._frame, estimate.state, estimate.reason, estimate.used_share
+                )
+            )
+            self._beam_markers.publish(markers)

@@ -1,0 +1,22 @@
+"""Things that are done now and then, by ROS time."""
+
+from __future__ import annotations
+
+
+class RateLimiter:
+    """Lets pass one thing in a while; time that jumps back lets it pass."""
+
+    def __init__(self) -> None:
+        self._last_s = 0.0
+
+    def is_due(self, now_s: float, every_s: float) -> bool:
+        """Whether every_s has passed since it last was; it is noted as done then."""
+        if 0.0 <= now_s - self._last_s < every_s:
+            return False
+        self._last_s = now_s
+        return True
+
+
+def period_s(rate_hz: float) -> float:
+    """Of a rate as AMCL's parameters give it: <= 0 is no limit."""
+    return 1.0 / rate_hz if rate_hz > 0.0 else 0.0

@@ -1,0 +1,50 @@
+"""How a node begins and runs, is told to end, and says that it cannot begin."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from typing import Any, Callable, Dict, NoReturn, Tuple, Type
+
+import rospy
+
+
+def event_on_signals() -> threading.Event:
+    """Set by SIGINT and SIGTERM; for nodes that call rospy.init_node(..., disable_signals=True).
+
+    rospy's own handler shuts down from within whatever the main thread is doing; within a call of the parameter server
+    it waits for itself. Ours only asks the loop to end.
+    """
+    ending = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ending.set())
+    return ending
+
+
+def refuse_to_start(err: Exception, exit_code: int = 2) -> NoReturn:
+    """One line in the log, with the node's name in front, and the end of the process."""
+    name, text = rospy.get_name(), " ".join(str(err).split())
+    rospy.logfatal(text if text.startswith(name) else f"{name}: {text}")
+    rospy.signal_shutdown("cannot start")
+    sys.exit(exit_code)
+
+
+def run_node(name: str, make: Callable[[Dict[str, Any]], Any], bad_input: Tuple[Type[Exception], ...] = ()) -> None:
+    """Start a node and run it until it is told to end.
+
+    Args:
+        name: of the node, unless it is renamed.
+        make: the node from its private parameters, as they are given; ValueError ends it with exit code 2.
+        bad_input: exceptions of make() that end it with exit code 3.
+    """
+    rospy.init_node(name, disable_signals=True)
+    ending = event_on_signals()
+    try:
+        node = make(rospy.get_param("~", {}))
+    except (ValueError, *bad_input) as err:
+        refuse_to_start(err, 3 if isinstance(err, bad_input) else 2)
+    try:
+        node.run(ending)
+    finally:
+        rospy.signal_shutdown("ended")

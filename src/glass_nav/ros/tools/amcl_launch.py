@@ -1,0 +1,176 @@
+"""A launch file that starts amcl -> the parameters of localization_node, each line explained. Needs no roscore.
+
+roslaunch's own loader reads the file, so includes, args, groups, rosparam files and substitutions mean what they mean
+on the robot. Started by `glass_nav params` as a process of its own:
+    python3 -m glass_nav.ros.tools.amcl_launch FILE.launch [--node NAME] [ARG:=VALUE ...]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Dict, List, Optional, Sequence, Tuple
+
+import roslaunch.core
+import roslaunch.loader
+import roslaunch.xmlloader
+import rospkg
+import yaml
+from roslaunch.config import ROSLaunchConfig
+
+from glass_nav import amcl_parameters, params
+from glass_nav.ros.localization.params import LocalizationParams, localization_params, without_unknown
+
+DONE, BAD_INPUT = 0, 3
+KINDS = ("amcl", "localization_node")  # programs whose parameters these are
+
+WHY_UNUSED = {
+    "bag_scan_period": "of amcl's own replay; glass_nav replay takes every scan by its stamp",
+    "restore_defaults": "a button of dynamic_reconfigure, no setting",
+    "laser_model_type": "there is one sensor model here; vote_mode says how beams are told apart",
+    "laser_likelihood_max_dist": "fixed: distances to walls are cut at 2 m",
+    "laser_lambda_short": "a beam that ends short of the map is uncertain and weighs nothing",
+    "laser_z_short": "a beam that ends short of the map is uncertain and weighs nothing",
+    "laser_z_max": "a beam without an answer weighs nothing",
+    **dict.fromkeys(
+        ("do_beamskip", "beam_skip_distance", "beam_skip_threshold", "beam_skip_error_threshold"),
+        "each beam is told apart by what it met, instead of being left out",
+    ),
+    **dict.fromkeys(
+        ("recovery_alpha_slow", "recovery_alpha_fast"),
+        "no random particles are strewn: a robot that is lost is looked for in the whole map",
+    ),
+}
+WORTH_KNOWING = {
+    "laser_max_beams": "720 if left out: glass is told apart by many beams, which together count for "
+    "laser_independent_beams",
+}
+
+
+class LaunchError(ValueError):
+    """A launch file without parameters of amcl in it; one line."""
+
+
+@dataclass(frozen=True)
+class AmclNode:
+    """One node of a launch file, as roslaunch would start it."""
+
+    name: str
+    program: str  # package/type
+    values: Dict[str, Any]  # its private parameters
+    remaps: "List[Tuple[str, str]]"
+
+
+def nodes(path: Path, arguments: Sequence[str] = ()) -> List[AmclNode]:
+    """The amcl nodes that a launch file starts.
+
+    Args:
+        path: of the file.
+        arguments: `name:=value` of its args.
+
+    Raises:
+        LaunchError: roslaunch cannot load it; one line.
+    """
+    if not path.is_file():
+        raise LaunchError(f"{path}: does not exist")
+    config = ROSLaunchConfig()
+    try:
+        roslaunch.xmlloader.XmlLoader(resolve_anon=True).load(str(path), config, argv=list(arguments), verbose=False)
+    except (
+        roslaunch.core.RLException,
+        roslaunch.loader.LoadException,
+        roslaunch.xmlloader.XmlParseException,
+        rospkg.ResourceNotFound,
+    ) as err:
+        raise LaunchError(f"{path}: {' '.join(str(err).split())}") from err
+    found = []
+    for node in config.nodes:
+        if node.type in KINDS:
+            name = f"{node.namespace}{node.name}"
+            values = {
+                key[len(name) + 1 :]: each.value for key, each in config.params.items() if key.startswith(name + "/")
+            }
+            found.append(AmclNode(name, f"{node.package}/{node.type}", values, list(node.remap_args)))
+    return found
+
+
+def chosen(path: Path, found: Sequence[AmclNode], wanted: Optional[str]) -> AmclNode:
+    """The node asked for, or the only one.
+
+    Raises:
+        LaunchError: there is none, or several and none was asked for.
+    """
+    names = ", ".join(node.name for node in found)
+    if not found:
+        raise LaunchError(f"{path}: starts no amcl, by type one of {', '.join(KINDS)}")
+    if wanted is not None:
+        for node in found:
+            if node.name.strip("/") == wanted.strip("/"):
+                return node
+        raise LaunchError(f"{path}: starts no amcl of the name {wanted}; it starts {names}")
+    if len(found) > 1:
+        raise LaunchError(f"{path}: starts {len(found)} amcl ({names}), choose one with --node")
+    return found[0]
+
+
+def explained(node: AmclNode, source: str) -> str:
+    """Our parameters as yaml, which rosparam and `glass_nav replay --params` load, with comments.
+
+    Raises:
+        ParamError: a value that the node would refuse.
+    """
+    known, unknown = without_unknown(node.values, source)
+    localization_params(known, source)  # the node would refuse it, too
+    taken, unused = amcl_parameters.without_unused(known, LocalizationParams)
+    adapted = amcl_parameters.adapted(taken, LocalizationParams)
+    defaults = params.as_mapping(LocalizationParams())
+    lines = [f"# {source}: node {node.name} ({node.program})"]
+    for name in sorted(adapted):
+        if name not in taken and adapted[name] == defaults[name]:
+            continue
+        if name not in taken:
+            lines.append(_line(name, adapted[name], "not in the file; the default would contradict what is"))
+        elif defaults[name] == taken[name]:
+            lines.append(_line(name, taken[name], "the default here, too"))
+        else:
+            lines.append(_line(name, taken[name], WORTH_KNOWING.get(name, "")))
+    if unused:
+        lines += ["# without a meaning here:"]
+        lines += [f"# {_line(name, known[name], WHY_UNUSED[name])}" for name in unused]
+    if unknown:
+        lines += ["# names that neither amcl nor this node knows; amcl takes no notice of them either:"]
+        lines += [f"# {line.partition(': ')[2].partition(';')[0]}" for line in unknown]
+    if node.remaps:
+        lines += ["# remaps stay in the launch file: " + ", ".join(f"{old} -> {new}" for old, new in node.remaps)]
+    return "\n".join(lines)
+
+
+def _line(name: str, value: Any, comment: str) -> str:
+    text = yaml.safe_dump({name: value}, default_flow_style=True, width=10_000).strip()[1:-1]
+    return f"{text}  # {comment}" if comment else text
+
+
+def main(argv: Optional[Sequence[str]] = None) -> int:
+    """Print the parameters.
+
+    Returns:
+        0 done, 3 bad input (a line on stderr says what).
+    """
+    parser = argparse.ArgumentParser(prog="glass_nav params")
+    parser.add_argument("file", type=Path)
+    parser.add_argument("arguments", nargs="*")
+    parser.add_argument("--node")
+    given = parser.parse_args(argv)
+    try:
+        node = chosen(given.file, nodes(given.file, given.arguments), given.node)
+        sys.stdout.write(explained(node, str(given.file)) + "\n")
+    except ValueError as err:  # LaunchError, ParamError
+        sys.stderr.write(f"glass_nav params: {err}\n")
+        return BAD_INPUT
+    return DONE
+
+
+if __name__ == "__main__":
+    sys.exit(main())

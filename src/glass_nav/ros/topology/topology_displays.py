@@ -1,0 +1,154 @@
+"""The atlas, the candidates and their forest for rviz: native markers, one namespace for each thing to tick off.
+
+Namespaces: `atlas` (edges) and `nodes`; candidates as arrows in `searching`, `tentative`, `confirmed` or `ambiguous`,
+by the state of the search; `ruled_out`, crosses where candidates of the last row were left without a successor;
+`forest`, the ways by which the candidates came; `text`. Colours are of the Okabe-Ito set.
+"""
+
+from __future__ import annotations
+
+from typing import List, Optional
+
+import numpy as np
+from geometry_msgs.msg import Pose, Quaternion, Vector3
+from std_msgs.msg import ColorRGBA, Header
+from visualization_msgs.msg import Marker, MarkerArray
+
+from glass_nav.geometry import se2
+from glass_nav.ros import conversions
+from glass_nav.ros.packed_markers import PackedMarkerArray, colour, points_marker
+from glass_nav.topology.atlas.atlas import Atlas
+from glass_nav.topology.search.atlas_localizer import (
+    AMBIGUOUS,
+    CONFIRMED,
+    SEARCHING,
+    TENTATIVE,
+    AtlasLocalizer,
+    Estimate,
+)
+from glass_nav.topology.search.search_forest import NO_PARENT
+
+STATE_COLOURS = {
+    SEARCHING: (230, 159, 0),
+    TENTATIVE: (86, 180, 233),
+    CONFIRMED: (0, 158, 115),
+    AMBIGUOUS: (204, 121, 167),
+}
+NAMESPACES = ("atlas", "nodes", *(state.lower() for state in STATE_COLOURS), "ruled_out", "forest", "text")
+ATLAS_RGB, NODE_RGB, RULED_OUT_RGB, FOREST_RGB = (130, 130, 130), (60, 60, 60), (213, 94, 0), (0, 114, 178)
+MAX_PATHS = 50  # of candidates; more would only hide the map
+
+_ARROW_M = np.array([[0.0, 0.0], [0.8, 0.0], [0.8, 0.0], [0.5, 0.2], [0.8, 0.0], [0.5, -0.2]])  # pairs of ends
+_CROSS_M = np.array([[-0.25, -0.25], [0.25, 0.25], [-0.25, 0.25], [0.25, -0.25]])
+_HEIGHT_M = 0.02
+
+
+def atlas_markers(atlas: Atlas, map_frame: str) -> List[Marker]:
+    """Edges and nodes."""
+    header = conversions.header(0, map_frame)  # stamp 0: for every time
+    lines = [_line(atlas, 2 * edge) for edge in range(len(atlas.edges))]  # once for an atlas
+    return [
+        points_marker(header, "atlas", 0, Marker.LINE_LIST, _pairs(lines), _HEIGHT_M, 0.06, _rgb(ATLAS_RGB)),
+        points_marker(header, "nodes", 0, Marker.POINTS, atlas.nodes.position_m, _HEIGHT_M, 0.25, _rgb(NODE_RGB)),
+    ]
+
+
+def search_markers(
+    localizer: AtlasLocalizer,
+    estimate: Optional[Estimate],
+    poses: np.ndarray,
+    map_frame: str,
+    text: str,
+    atlas_shown: List[Marker],
+) -> MarkerArray:
+    """An atlas and what a search in it stands at; namespaces of other states are cleared.
+
+    Args:
+        localizer: of the search.
+        estimate: its last, None before it has begun.
+        poses: (K, 3) of the candidates that shall be shown.
+        map_frame: frame of the map.
+        text: state and reason.
+        atlas_shown: of atlas_markers().
+    """
+    atlas, header = localizer.atlas, conversions.header(0, map_frame)
+    arrows = {state: np.zeros((0, 2)) for state in STATE_COLOURS}
+    ruled_out, forest = np.zeros((0, 2)), np.zeros((0, 2))
+    if estimate is not None:
+        if estimate.state in arrows:
+            arrows[estimate.state] = _placed(_ARROW_M, poses)
+        gone = _ruled_out(localizer)[: len(poses) + MAX_PATHS]
+        ruled_out = _placed(_CROSS_M, np.column_stack([atlas.nodes.position_m[gone], np.zeros(len(gone))]))
+        forest = _pairs(
+            [
+                _line(atlas, departure)
+                for dart in estimate.dart[:MAX_PATHS].tolist()
+                for departure in (localizer.path(dart)[1:] ^ 1).tolist()
+            ]
+        )
+    markers = [
+        points_marker(
+            header, state.lower(), 0, Marker.LINE_LIST, points, 3 * _HEIGHT_M, 0.1, _rgb(STATE_COLOURS[state])
+        )
+        for state, points in arrows.items()
+    ]
+    markers.append(
+        points_marker(header, "ruled_out", 0, Marker.LINE_LIST, ruled_out, 2 * _HEIGHT_M, 0.06, _rgb(RULED_OUT_RGB))
+    )
+    markers.append(points_marker(header, "forest", 0, Marker.LINE_LIST, forest, 2 * _HEIGHT_M, 0.12, _rgb(FOREST_RGB)))
+    return PackedMarkerArray([*atlas_shown, *markers, _text(header, atlas, text)])
+
+
+def _ruled_out(localizer: AtlasLocalizer) -> np.ndarray:
+    """(K,) nodes of candidates of the row before without one in this row."""
+    forest = localizer.forest
+    if forest.depth < 1:
+        return np.zeros(0, np.int64)
+    before, row = forest.row(forest.depth - 1).dart, forest.row(forest.depth)
+    went_on = row.parent[(row.parent != NO_PARENT) & (row.parent_depth == forest.depth - 1)]
+    gone = np.ones(len(before), bool)
+    gone[went_on] = False
+    return np.unique(localizer.atlas.darts.node[before[gone]])
+
+
+def _line(atlas: Atlas, dart: int) -> np.ndarray:
+    """(n, 2) points of a dart's edge; straight if the atlas has no line of it."""
+    points = atlas.edges.polyline_m[dart >> 1]
+    if not len(points):
+        points = atlas.nodes.position_m[atlas.darts.node[2 * (dart >> 1) : 2 * (dart >> 1) + 2]]
+    return points
+
+
+def _pairs(lines: List[np.ndarray]) -> np.ndarray:
+    """Lines (n, 2) as pairs of ends (K, 2)."""
+    if not lines:
+        return np.zeros((0, 2))
+    return np.concatenate([np.repeat(line, 2, axis=0)[1:-1] for line in lines])
+
+
+def _placed(shape: np.ndarray, poses: np.ndarray) -> np.ndarray:
+    """A shape (n, 2) at each pose (K, 3): (K n, 2)."""
+    return se2.transform_points(poses[:, None], shape).reshape(-1, 2)
+
+
+def _rgb(rgb: "tuple[int, int, int]") -> ColorRGBA:
+    return colour(np.array(rgb))
+
+
+def _text(header: Header, atlas: Atlas, text: str) -> Marker:
+    """Above the atlas, readable from where all of it is seen."""
+    low, high = atlas.nodes.position_m.min(axis=0), atlas.nodes.position_m.max(axis=0)
+    size = max(0.3, 0.018 * float((high - low).max()))
+    pose = Pose(orientation=Quaternion(w=1.0))
+    pose.position.x, pose.position.y = 0.5 * float(low[0] + high[0]), float(high[1]) + 2.0 * size
+    return Marker(
+        header=header,
+        ns="text",
+        id=0,
+        type=Marker.TEXT_VIEW_FACING,
+        action=Marker.ADD,
+        pose=pose,
+        scale=Vector3(0.0, 0.0, size),
+        color=_rgb((0, 0, 0)),
+        text=text,
+    )

@@ -1,0 +1,1 @@
+"""MEETPOINT -> FOREST -> VOTE -> TURN: which places of the atlas are still possible?"""

@@ -1,0 +1,111 @@
+"""Candidates -> proof that no turn can tell them apart, or the turns that do.
+
+Two darts are indistinguishable if robots at them, told the same turns for ever, see the same: a search over pairs of
+darts. It begins at the pairs in question and follows every turn; when all pairs that it meets are alike, the pairs it
+began with are proved indistinguishable; the first pair that is not alike gives the shortest turns that tell one of them
+apart. What is alike is what a robot that measures without error would not rule out (Matcher.alike_along).
+
+If a and b, and b and c are proved indistinguishable, a and c are taken to be so too; where a and c are then not alike
+after all, a turn splits the candidates, and nobody asks for a proof. So a symmetric floor of n darts costs some n pairs
+and not n^2. C candidates, P pairs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import List, Optional, Tuple
+
+import numpy as np
+
+from glass_nav.topology.search.matching import Matcher
+
+MAX_PAIRS = 200_000  # of one search; a torus of 40,000 darts takes 40,000 pairs
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What the search over pairs found."""
+
+    indistinguishable: bool  # all candidates are
+    ranks: Optional[List[int]]  # turns that tell two of them apart; None: proved, or the search was broken off
+    pairs: int  # searched
+
+
+def prove(matcher: Matcher, dart: np.ndarray, max_pairs: int = MAX_PAIRS) -> Proof:
+    """Whether candidates can be told apart.
+
+    Args:
+        matcher: of the atlas.
+        dart: (C,) candidates at meetpoints that are alike.
+        max_pairs: the search is broken off behind so many.
+    """
+    group = np.arange(len(dart))
+    searched, known = 0, np.zeros((0, 2), np.int64)
+    while True:
+        apart = np.flatnonzero(group != group[0])
+        if not len(apart):
+            return Proof(True, None, searched)
+        met, ranks = _search(matcher, dart[0], dart[apart[0]], max_pairs - searched)
+        searched += len(met)
+        if ranks is not None or searched >= max_pairs:
+            return Proof(False, ranks, searched)
+        known = np.concatenate([known, met])
+        group = _groups(known, dart)
+
+
+def _groups(pairs: np.ndarray, dart: np.ndarray) -> np.ndarray:
+    """(C,) label of each dart, equal for those that pairs (P, 2) connect."""
+    from scipy.sparse import coo_matrix, csgraph  # slow to import
+
+    names, compact = np.unique(np.concatenate([pairs.ravel(), dart]), return_inverse=True)
+    links = compact[: pairs.size].reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(links), np.int8), (links[:, 0], links[:, 1])), shape=(len(names),) * 2)
+    return csgraph.connected_components(graph, directed=False)[1][compact[pairs.size :]]
+
+
+def _search(matcher: Matcher, first: int, second: int, max_pairs: int) -> Tuple[np.ndarray, Optional[List[int]]]:
+    """The pairs (P, 2) that turns lead to from one pair, level by level, and the turns to the first that is unlike."""
+    count = len(matcher.atlas.darts)
+    start = np.array([_key(np.array([first]), np.array([second]), count)[0]])
+    levels: List[Tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # keys, index in the level before, rank
+    frontier, visited = start, start
+    while len(frontier) and len(visited) <= max_pairs:
+        a, b = np.divmod(frontier, count)
+        keys, parents, turned = [], [], []
+        degree = matcher.atlas.degree[matcher.atlas.darts.node[a]]  # that of b as well: the pair is alike
+        for rank in range(int(degree.max())):
+            able = np.flatnonzero(degree > rank)
+            one, other = (
+                matcher.atlas.clockwise(a[able], np.array(rank)),
+                matcher.atlas.clockwise(b[able], np.array(rank)),
+            )
+            bad = np.flatnonzero(~(matcher.alike_along(one, other) & matcher.alike_along(other, one)))
+            if len(bad):
+                return _pairs(visited, count), _turns(levels, int(able[bad[0]]), rank)
+            keys.append(_key(one ^ 1, other ^ 1, count))
+            parents.append(able)
+            turned.append(np.full(len(able), rank))
+        key, index = np.unique(np.concatenate(keys), return_index=True)
+        new = np.isin(key, visited, assume_unique=True, invert=True)
+        frontier, index = key[new], index[new]
+        levels.append((frontier, np.concatenate(parents)[index], np.concatenate(turned)[index]))
+        visited = np.concatenate([visited, frontier])
+    return _pairs(visited, count), None
+
+
+def _key(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
+    """(P,) one number for a pair; pairs have no order, the smaller dart comes first."""
+    return np.minimum(a, b) * count + np.maximum(a, b)
+
+
+def _pairs(key: np.ndarray, count: int) -> np.ndarray:
+    return np.stack(np.divmod(key, count), axis=-1)
+
+
+def _turns(levels: List[Tuple[np.ndarray, np.ndarray, np.ndarray]], index: int, last_rank: int) -> List[int]:
+    """Ranks from the first pair to the one at this index of the last level, and the rank taken there."""
+    ranks = [last_rank]
+    for _, parents, turned in reversed(levels):
+        ranks.append(int(turned[index]))
+        index = int(parents[index])
+    return ranks[::-1]

@@ -1,0 +1,69 @@
+"""What cannot be told apart in an atlas, and how many edges a robot needs until it knows where it is.
+
+A robot without errors wakes up at every dart in turn and is sent through the search. Where that ends in several places,
+they are indistinguishable (ambiguity.py has the proof), and so are the places where robots began that end there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Callable, FrozenSet, List, Optional, Set
+
+import numpy as np
+
+from glass_nav.topology.atlas.atlas import Atlas
+from glass_nav.topology.search import wake_up_trials
+from glass_nav.topology.search.atlas_localizer import AMBIGUOUS, CONFIRMED, AtlasLocalizer, SearchParams
+from glass_nav.topology.search.wake_up_trials import Surroundings, TrialParams
+
+
+@dataclass(frozen=True)
+class Distinguishability:
+    """Of the darts that robots woke up at."""
+
+    starts: np.ndarray  # (S,) darts
+    edges: np.ndarray  # (S,) driven until the search ended; those that confirm included
+    confirmed: np.ndarray  # (S,) bool: in one place
+    alike: List[FrozenSet[int]]  # sets of darts, two or more each: a robot that begins at one may be at any
+    unresolved: np.ndarray  # darts (U,) from which the search did not end
+
+
+def of(
+    atlas: Atlas, params: SearchParams, starts: Optional[np.ndarray] = None, step: Callable[[], None] = lambda: None
+) -> Distinguishability:
+    """Search from every start.
+
+    Args:
+        atlas: in question.
+        params: of the search.
+        starts: (S,) darts; all of them when not given.
+        step: called once for each.
+    """
+    starts = np.arange(len(atlas.darts)) if starts is None else starts
+    localizer, world = AtlasLocalizer(atlas, params), Surroundings.of(atlas)
+    exact = TrialParams(noise_limit=0.0, angles=params.use_edge_angles and not params.document)
+    rng = np.random.default_rng(0)  # nothing is left to chance
+    edges, confirmed, unresolved = [], [], []
+    alike: Set[FrozenSet[int]] = set()
+    for dart in starts.tolist():
+        trial = wake_up_trials.run(localizer, world, exact, rng, dart=dart)
+        edges.append(trial.edges)
+        confirmed.append(trial.outcome == CONFIRMED)
+        if trial.outcome == AMBIGUOUS:
+            alike.add(frozenset(int(localizer.path(int(end))[0]) for end in trial.estimate.dart))
+        elif trial.outcome != CONFIRMED:
+            unresolved.append(dart)
+        step()
+    return Distinguishability(
+        starts, np.array(edges), np.array(confirmed), _merged(alike), np.array(unresolved, np.int64)
+    )
+
+
+def _merged(alike: Set[FrozenSet[int]]) -> List[FrozenSet[int]]:
+    """Sets that share a dart as one, by their smallest dart."""
+    merged: List[Set[int]] = []
+    for each in sorted(alike, key=min):
+        touching = [other for other in merged if other & each]
+        merged = [other for other in merged if not other & each]
+        merged.append(set(each).union(*touching))
+    return sorted((frozenset(each) for each in merged), key=min)

@@ -1,0 +1,391 @@
+"""Does this node, this edge of the atlas fit what was seen?
+
+Each test is on one number: the difference between atlas and observation, against z times its standard deviation. z
+comes from a budget of risk over a whole run: a chance that is small for one test is not for a hundred. C candidates; a
+candidate at a meetpoint is the dart that fits its reference edge.
+
+Seed document global_localization_procedure.txt, "Updating the Search Forest"; it leaves open when two values match.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Callable, Dict, Optional, Tuple
+
+import numpy as np
+
+from glass_nav.geometry import angles, se2
+from glass_nav.sensing.scan import Scan
+from glass_nav.topology.atlas.atlas import Atlas, twin
+from glass_nav.topology.atlas.edge_views import poses_along
+from glass_nav.topology.observations import Meetpoint, Traversal
+from glass_nav.topology.search import edge_segments
+from glass_nav.topology.search.edge_segments import Reach, SegmentTest
+
+_MAX_JUDGED = 2000  # candidates by a scan: a tenth of a millisecond each
+_MAX_COMPARED = 100  # candidates by their walls: some milliseconds each
+_LOOKED_FROM_M = 0.5  # between points of a way
+_REMEMBERED = 64  # traversals whose comparisons are kept
+_TESTS_PER_EDGE = 7  # length, chord, its direction, turn; then r and two angles between edges of the node
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """How well a robot measures, where it does not say so itself, and how much risk there may be."""
+
+    risk: float = 0.001  # chance to eliminate the truth in a run by errors of normal distribution
+    risk_edges: int = 30  # of a run of so many edges
+    r_sigma_m: float = 0.05  # of an equidistance
+    length_sigma_m: float = 0.1  # of a way: where its ends are ...
+    length_sigma_share: float = 0.02  # ... and per metre
+    bearing_sigma_rad: float = 0.1  # of the direction of an edge
+    turn_sigma_rad: float = 0.1  # of dead reckoning's heading over an edge
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.risk < 1.0:
+            raise ValueError(f"~risk must be in (0, 1), got {self.risk}")
+        if self.risk_edges < 1:
+            raise ValueError(f"~risk_edges must be >= 1, got {self.risk_edges}")
+        for name in ("r_sigma_m", "length_sigma_m", "bearing_sigma_rad", "turn_sigma_rad"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
+                raise ValueError(f"~{name} must be finite and > 0, got {getattr(self, name)}")
+        if not (math.isfinite(self.length_sigma_share) and self.length_sigma_share >= 0.0):
+            raise ValueError(f"~length_sigma_share must be finite and >= 0, got {self.length_sigma_share}")
+
+    @property
+    def z(self) -> float:
+        """Standard deviations that a difference may have: two-sided, the risk shared by all tests of the run."""
+        from scipy.special import ndtri  # slow to import
+
+        return float(-ndtri(self.risk / (2.0 * _TESTS_PER_EDGE * self.risk_edges)))
+
+    def sigma_length_m(self, length_m: np.ndarray) -> np.ndarray:
+        """(...) of ways travelled."""
+        return self.length_sigma_m + self.length_sigma_share * length_m
+
+
+Explained = Callable[[Scan, np.ndarray], np.ndarray]  # scan, map_from_base (C, 3) -> (C,) share that the map explains
+
+
+class Matcher:
+    """An atlas with what the tests need of it, by dart."""
+
+    def __init__(
+        self,
+        atlas: Atlas,
+        tolerances: Tolerances,
+        use_angles: bool,
+        segments: Optional[SegmentTest] = None,
+        explained: Optional[Explained] = None,
+        least_explained: float = 0.0,
+    ) -> None:
+        """Args:
+        atlas: with the segments of its darts, if these are to be compared.
+        tolerances: of the tests on numbers.
+        use_angles: directions of edges are evidence.
+        segments: the test on the walls seen along an edge; None: they are no evidence.
+        explained: of scans at meetpoints; None: they are no evidence.
+        least_explained: share of a scan that the map must explain from where a candidate is.
+        """
+        self._explained = explained
+        self._least_explained = least_explained
+        self._judged: Dict[int, Tuple[Meetpoint, Dict[int, bool]]] = {}  # by identity of the meetpoint
+        self.atlas = atlas
+        self._segments = segments if segments is not None and segments.match_segments else None
+        self._compared: Dict[int, Tuple[Traversal, Dict[int, bool]]] = {}  # by identity of the traversal
+        self.tolerances = tolerances
+        self.use_angles = use_angles
+        self.z = tolerances.z
+        ring, count = atlas.rings, len(atlas.darts)
+        following = np.arange(1, count + 1)
+        following[ring.offsets[1:] - 1] = ring.offsets[:-1]
+        self._next = np.empty(count, np.int32)  # clockwise; int32 and float32: a million nodes are gathered at random
+        self._next[ring.values] = ring.values[following]
+        self._before = np.empty(count, np.int32)
+        self._before[self._next] = np.arange(count, dtype=np.int32)
+        self._degree = atlas.degree.astype(np.int32)
+        self.length_m = atlas.edges.length_m.astype(np.float32)
+        self._by_degree_r = np.lexsort((atlas.nodes.r_m, self._degree))  # (N,) nodes
+        self._max_sigma_r = float(atlas.nodes.sigma_r_m.max())
+        self._r_sorted = atlas.nodes.r_m[self._by_degree_r]
+        self._degree_sorted = self._degree[self._by_degree_r]
+
+    def departures(self, dart: np.ndarray, rank: int) -> np.ndarray:
+        """(C,) darts by which a robot leaves that turns to this rank at reference darts (C,).
+
+        All of them must have the degree of one meetpoint, above the rank.
+        """
+        if not len(dart):
+            return dart
+        degree = int(self._degree[self.atlas.darts.node[dart[0]]])
+        steps, table = (rank, self._next) if 2 * rank <= degree else (degree - rank, self._before)
+        for _ in range(steps):
+            dart = table[dart]
+        return dart.astype(np.int64)
+
+    def others(self, dart: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """All other darts (K,) of the nodes of darts (C,), and for each the index (K,) of the one it is beside."""
+        beside = np.arange(len(dart))
+        found, of = [], []
+        step = self._next[dart]
+        while len(beside):
+            more = step != dart[beside]
+            beside, step = beside[more], step[more]
+            found.append(step.astype(np.int64))
+            of.append(beside)
+            step = self._next[step]
+        return (np.concatenate(found), np.concatenate(of)) if found else (dart, beside)
+
+    # -- nodes
+
+    def all_at(self, meetpoint: Meetpoint) -> np.ndarray:
+        """(C,) all darts of the atlas that fit the reference edge of a meetpoint."""
+        window = self.z * math.hypot(self.sigma_r_m(meetpoint), self._max_sigma_r)
+        first, last = np.searchsorted(self._degree_sorted, [meetpoint.degree, meetpoint.degree + 1])
+        r = self._r_sorted[first:last]
+        low, high = first + np.searchsorted(r, [meetpoint.r_m - window, meetpoint.r_m + window + 1e-9])
+        node = self._by_degree_r[low:high]
+        node = node[self._r_fits(node, meetpoint)]
+        start = self.atlas.rings.offsets[node]
+        dart = self.atlas.rings.values[(start[:, None] + np.arange(meetpoint.degree)).ravel()]
+        dart = np.sort(dart[self._angles_fit(dart, meetpoint)])
+        return dart[self._scan_fits(dart, meetpoint)]
+
+    def at(self, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
+        """(C,) bool: darts (C,) fit the reference edge of the meetpoint."""
+        node = self.atlas.darts.node[dart]
+        fits = self._degree[node] == meetpoint.degree
+        fits[fits] = self._r_fits(node[fits], meetpoint)
+        fits[fits] = self._angles_fit(dart[fits], meetpoint)
+        fits[fits] = self._scan_fits(dart[fits], meetpoint)
+        return fits
+
+    @property
+    def judges_scans(self) -> bool:
+        """Whether scans at meetpoints are evidence."""
+        return self._explained is not None
+
+    def _scan_fits(self, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
+        """(C,) bool: enough of the scan is explained if darts (C,) are the reference edge; of too many nothing is
+        asked.
+        """
+        if self._explained is None or meetpoint.scan is None or not 0 < len(dart) <= _MAX_JUDGED:
+            return np.ones(len(dart), bool)
+        if id(meetpoint) not in self._judged and len(self._judged) >= _REMEMBERED:
+            self._judged.clear()
+        _, known = self._judged.setdefault(id(meetpoint), (meetpoint, {}))
+        new = [each for each in dart.tolist() if each not in known]
+        if new:
+            shares = self._explained(meetpoint.scan, poses_at(self.atlas, np.array(new, np.int64), meetpoint))
+            shares = np.where(np.isnan(shares), 1.0, shares)  # a scan that says nothing rules out none
+            known.update(zip(new, (shares >= self._least_explained).tolist()))
+        return np.array([known[each] for each in dart.tolist()], bool)
+
+    def sigma_r_m(self, meetpoint: Optional[Meetpoint] = None) -> float:
+        """Of an equidistance measured, the atlas' part not included."""
+        return (meetpoint.sigma_r_m if meetpoint else 0.0) or self.tolerances.r_sigma_m
+
+    def _r_fits(self, node: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
+        nodes = self.atlas.nodes
+        sigma = np.hypot(self.sigma_r_m(meetpoint), nodes.sigma_r_m[node])
+        return np.abs(nodes.r_m[node] - meetpoint.r_m) <= self.z * sigma
+
+    def _angles_fit(self, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
+        fits = np.ones(len(dart), bool)
+        if not self.use_angles or not len(meetpoint.bearings_rad):
+            return fits
+        allowed = self.z * math.sqrt(2.0) * self.tolerances.bearing_sigma_rad
+        bearing = self.atlas.darts.bearing_rad
+        other = dart
+        for gap in meetpoint.gaps_rad[1:]:
+            other = self._next[other]
+            fits &= np.abs(angles.wrap(bearing[dart] - bearing[other] - gap)) <= allowed
+        return fits
+
+    # -- ways: one edge, or several that a missed meetpoint joins
+
+    def sigma_length_m(self, traversal: Traversal) -> float:
+        """Of a length measured, the atlas' part not included."""
+        return traversal.sigma_length_m or float(self.tolerances.sigma_length_m(np.array(traversal.length_m)))
+
+    def sigma_chord_m(self, traversal: Traversal) -> float:
+        """Of a chord measured, the atlas' part not included."""
+        return traversal.sigma_chord_m or float(self.tolerances.sigma_length_m(np.array(traversal.length_m)))
+
+    def longest_m(self, traversal: Traversal, edges: int = 1) -> float:
+        """No way of so many edges that fits is longer."""
+        sigma = math.hypot(self.sigma_length_m(traversal), math.sqrt(edges) * float(self.atlas.edges.sigma_m.max()))
+        return traversal.length_m + self.z * sigma
+
+    def may_contain(self, dart: np.ndarray, traversal: Traversal) -> np.ndarray:
+        """(C,) bool: the edges of darts (C,) are at least as long as what was travelled, within tolerance."""
+        edge = dart >> 1
+        sigma = np.hypot(self.sigma_length_m(traversal), self.atlas.edges.sigma_m[edge])
+        return self.atlas.edges.length_m[edge] >= traversal.length_m - self.z * sigma
+
+    def edges_along(self, departure: np.ndarray, traversal: Traversal) -> np.ndarray:
+        """(K,) which of the darts (C,) lead along an edge that fits."""
+        edges = self.atlas.edges
+        longest = self.longest_m(traversal)  # first the coarse window, on little memory
+        length = self.length_m[departure >> 1]
+        kept = np.flatnonzero((length <= longest + 1e-3) & (length >= 2.0 * traversal.length_m - longest - 1e-3))
+        departure = departure[kept]
+        edge = departure >> 1
+        fits = np.abs(edges.length_m[edge] - traversal.length_m) <= self.z * np.hypot(
+            self.sigma_length_m(traversal), edges.sigma_m[edge]
+        )
+        if not math.isnan(traversal.chord_m):
+            fits &= np.abs(edges.chord_m[edge] - traversal.chord_m) <= self.z * np.hypot(
+                self.sigma_chord_m(traversal), edges.sigma_m[edge]
+            )
+        fits[fits] = self._directions_fit(departure[fits], twin(departure[fits]), edges.sigma_m[edge[fits]], traversal)
+        fits[fits] = self._segments_fit(departure[fits], traversal)
+        return kept[fits]
+
+    def _segments_fit(self, departure: np.ndarray, traversal: Traversal) -> np.ndarray:
+        """(C,) bool: the walls seen do not contradict those of the atlas along darts; of too many nothing is asked."""
+        if self._segments is None or not len(traversal.segments_m) or len(departure) > _MAX_COMPARED:
+            return np.ones(len(departure), bool)
+        if id(traversal) not in self._compared and len(self._compared) >= _REMEMBERED:
+            self._compared.clear()
+        _, known = self._compared.setdefault(id(traversal), (traversal, {}))
+        for dart in departure.tolist():
+            if dart not in known:
+                known[dart] = edge_segments.fits(*self.contradiction(dart, traversal), self._segments)
+        return np.array([known[dart] for dart in departure.tolist()], bool)
+
+    def contradiction(self, dart: int, traversal: Traversal) -> Tuple[float, float]:
+        """Share of the walls seen that stand in free space if the edge was that of a dart, and metres of them."""
+        seen = self.atlas.darts.segments_m[dart]
+        dart_from_map = se2.inverse(self.atlas.map_from_dart(np.array(dart)))
+        line = self.atlas.edges.polyline_m[dart >> 1]
+        if len(line) < 2:
+            line = self.atlas.nodes.position_m[self.atlas.darts.node[[dart & ~1, dart | 1]]]
+        way = poses_along(line, _LOOKED_FROM_M)[:, :2]
+        limits = self.tolerances
+        reach = Reach(
+            self.z * math.hypot(limits.length_sigma_m, limits.r_sigma_m),
+            self.z * limits.bearing_sigma_rad,
+            self.z,
+            limits.length_sigma_share,
+        )
+        return edge_segments.contradiction(
+            traversal.segments_m,
+            se2.transform_points(dart_from_map, seen.reshape(-1, 2)).reshape(-1, 4),
+            se2.transform_points(dart_from_map, way),
+            reach,
+        )
+
+    def ways_along(
+        self,
+        departure: np.ndarray,
+        arrival: np.ndarray,
+        length_m: np.ndarray,
+        sigma_m: np.ndarray,
+        traversal: Traversal,
+    ) -> np.ndarray:
+        """(C,) bool: ways of several edges fit.
+
+        Args:
+            departure: (C,) first darts.
+            arrival: (C,) darts that lead back, at their ends.
+            length_m: (C,) of all edges together.
+            sigma_m: (C,) of the atlas, for all edges together.
+            traversal: what was travelled.
+        """
+        fits = np.abs(length_m - traversal.length_m) <= self.z * np.hypot(self.sigma_length_m(traversal), sigma_m)
+        if not math.isnan(traversal.chord_m):
+            chord = np.linalg.norm(self._displacement_m(departure[fits], arrival[fits]), axis=-1)
+            fits[fits] = np.abs(chord - traversal.chord_m) <= self.z * np.hypot(
+                self.sigma_chord_m(traversal), sigma_m[fits]
+            )
+        fits[fits] = self._directions_fit(departure[fits], arrival[fits], sigma_m[fits], traversal)
+        return fits
+
+    def _displacement_m(self, departure: np.ndarray, arrival: np.ndarray) -> np.ndarray:
+        position, node = self.atlas.nodes.position_m, self.atlas.darts.node
+        return position[node[arrival]] - position[node[departure]]
+
+    def _directions_fit(
+        self, departure: np.ndarray, arrival: np.ndarray, sigma_m: np.ndarray, traversal: Traversal
+    ) -> np.ndarray:
+        fits = np.ones(len(departure), bool)
+        if not self.use_angles:
+            return fits
+        limits = self.tolerances
+        bearing = self.atlas.darts.bearing_rad
+        if not math.isnan(traversal.turn_rad):
+            turned = bearing[arrival] + np.pi - bearing[departure]
+            allowed = self.z * math.hypot(math.sqrt(2.0) * limits.bearing_sigma_rad, limits.turn_sigma_rad)
+            fits &= np.abs(angles.wrap(turned - traversal.turn_rad)) <= allowed
+        if not math.isnan(traversal.chord_bearing_rad):
+            step = self._displacement_m(departure, arrival)
+            chord = np.linalg.norm(step, axis=-1)
+            ahead = np.arctan2(step[:, 1], step[:, 0]) - bearing[departure]
+            off_m = self.z * np.hypot(self.sigma_chord_m(traversal), sigma_m)
+            across = np.arcsin(np.minimum(off_m / np.maximum(chord, 1e-9), 1.0))  # near the start: any direction
+            allowed_each = self.z * math.hypot(limits.bearing_sigma_rad, limits.turn_sigma_rad) + across
+            fits &= (off_m >= chord) | (np.abs(angles.wrap(ahead - traversal.chord_bearing_rad)) <= allowed_each)
+        return fits
+
+    # -- what a turn would show: which candidates would it leave?
+
+    def alike_at(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """(...) bool: a robot at the first darts (...), which measures without error, would not rule out the second."""
+        nodes, node = self.atlas.nodes, self.atlas.darts.node
+        a, b = node[first], node[second]
+        alike = (self._degree[a] == self._degree[b]) & (
+            np.abs(nodes.r_m[a] - nodes.r_m[b]) <= self.z * np.hypot(self.tolerances.r_sigma_m, nodes.sigma_r_m[b])
+        )
+        if self.use_angles:
+            alike &= self._rings_alike(first, second)
+        return alike
+
+    def _rings_alike(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        bearing = self.atlas.darts.bearing_rad
+        allowed = self.z * math.sqrt(2.0) * self.tolerances.bearing_sigma_rad
+        alike = np.ones(np.broadcast(first, second).shape, bool)
+        most = int(self._degree[self.atlas.darts.node[first]].max()) if first.size else 0
+        a, b = first, second
+        for _ in range(most - 1):
+            a, b = self._next[a], self._next[b]
+            off = (bearing[first] - bearing[a]) - (bearing[second] - bearing[b])
+            alike &= np.abs(angles.wrap(off)) <= allowed
+        return alike
+
+    def alike_along(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """(...) bool: a robot that leaves by the first darts (...), and measures without error, would at the next
+        meetpoint not rule out that it left by the second.
+        """
+        edges, limits = self.atlas.edges, self.tolerances
+        a, b = first >> 1, second >> 1
+        sigma = np.hypot(limits.sigma_length_m(edges.length_m[a]), edges.sigma_m[b])
+        alike = (np.abs(edges.length_m[a] - edges.length_m[b]) <= self.z * sigma) & (
+            np.abs(edges.chord_m[a] - edges.chord_m[b]) <= self.z * sigma
+        )
+        if self.use_angles:
+            alike &= self._courses_alike(first, second, self.z * sigma)
+        return alike & self.alike_at(twin(first), twin(second))
+
+    def _courses_alike(self, first: np.ndarray, second: np.ndarray, off_m: np.ndarray) -> np.ndarray:
+        limits, bearing = self.tolerances, self.atlas.darts.bearing_rad
+        turned = (bearing[twin(first)] - bearing[first]) - (bearing[twin(second)] - bearing[second])
+        allowed = self.z * math.hypot(math.sqrt(2.0) * limits.bearing_sigma_rad, limits.turn_sigma_rad)
+        a, b = self._displacement_m(first, twin(first)), self._displacement_m(second, twin(second))
+        chord = np.hypot(b[..., 0], b[..., 1])
+        across = np.arcsin(np.minimum(off_m / np.maximum(chord, 1e-9), 1.0))
+        ahead = (np.arctan2(a[..., 1], a[..., 0]) - bearing[first]) - (
+            np.arctan2(b[..., 1], b[..., 0]) - bearing[second]
+        )
+        allowed_ahead = self.z * math.hypot(limits.bearing_sigma_rad, limits.turn_sigma_rad) + across
+        return (np.abs(angles.wrap(turned)) <= allowed) & (
+            (off_m >= chord) | (np.abs(angles.wrap(ahead)) <= allowed_ahead)
+        )
+
+
+def poses_at(atlas: Atlas, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
+    """(C, 3) poses in the frame map of a robot whose reference edges are darts (C,)."""
+    behind = float(meetpoint.bearings_rad[0]) if len(meetpoint.bearings_rad) else np.pi
+    base_from_dart = np.array([*meetpoint.centre_m, behind])
+    return se2.compose(atlas.map_from_dart(dart), se2.inverse(base_from_dart))

@@ -1,0 +1,293 @@
+"""Observations -> candidates: which darts are still possible?
+
+The document's forest has a row of search nodes for each depth; a search node is a node of the atlas with the search
+edge that leads there. Here a candidate is that edge's dart at the node, the arrival dart: it says both. A turn maps
+darts one to one, so a row never has more candidates than the atlas has darts, and no dart twice. Rows keep what is
+active; how a candidate came about, and what was ruled out beside it, can be worked out from the row before (explain.py
+draws it). In the row of depth 0 there is no arrival dart: any dart of a node that matches may be the reference edge.
+
+Beyond the document: a detector errs. It may miss a meetpoint, which joins two edges to one, or see one where there is
+none, which splits an edge. Rows are kept for each number of such errors, and those with errors are worked out only
+once nothing is left without. Rules for the row of depth d with e errors:
+
+* an edge from the row of d - 1 with e;
+* two edges joined from the row of d - 1 with e - 1, three from that with e - 2;
+* an edge from the row of d - 2 with e - 1, along the way of both traversals, if the meetpoint of d - 1 was none; from
+  the row of d - 3 with e - 2 if there were two such;
+* where it came from, if it turned round at such a meetpoint (a dead end that was none);
+* anywhere, if no meetpoint before this one was one: e = d, behind an edge at least as long as what was travelled; with
+  an error more a meetpoint may have been missed on it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Dict, List, Tuple
+
+import numpy as np
+
+from glass_nav.topology.atlas.atlas import twin
+from glass_nav.topology.observations import UNKNOWN, Meetpoint, Traversal, refuse_rank
+from glass_nav.topology.search.matching import Matcher
+
+NO_PARENT = -1
+
+
+@dataclass(frozen=True)
+class Row:
+    """Active candidates of one depth with one number of errors, by ascending dart. Parents may be rows further back."""
+
+    dart: np.ndarray  # (C,) arrival darts; at depth 0 reference darts
+    parent: np.ndarray  # (C,) index in the parent's row, NO_PARENT where a search begins
+    parent_depth: np.ndarray  # (C,)
+    parent_errors: np.ndarray  # (C,)
+
+    def __len__(self) -> int:
+        return len(self.dart)
+
+
+@dataclass
+class _Found:
+    """Parts of a row in the making."""
+
+    darts: List[np.ndarray] = field(default_factory=list)
+    parents: List[np.ndarray] = field(default_factory=list)
+    origins: List[Tuple[int, int]] = field(default_factory=list)  # depth and errors of the parents of each part
+
+    def add(self, dart: np.ndarray, parent: np.ndarray, depth: int, errors: int) -> None:
+        self.darts.append(dart)
+        self.parents.append(parent)
+        self.origins.append((depth, errors))
+
+    def row(self, ruled_out: List[Row]) -> Row:
+        """Each dart once, by its first parent; those that other rows have already are left out."""
+        sizes = [len(part) for part in self.darts]
+        depth = np.repeat([origin[0] for origin in self.origins], sizes)
+        errors = np.repeat([origin[1] for origin in self.origins], sizes)
+        dart, first = np.unique(np.concatenate(self.darts), return_index=True)
+        for other in ruled_out:
+            new = np.isin(dart, other.dart, assume_unique=True, invert=True)
+            dart, first = dart[new], first[new]
+        return Row(dart, np.concatenate(self.parents)[first], depth[first], errors[first])
+
+
+@dataclass(frozen=True)
+class _Course:
+    """Traversals one after the other along one edge, or along edges that a missed meetpoint joins."""
+
+    traversal: Traversal  # as one; in length what is between the ends
+    farthest: Traversal  # as far as it went
+    onward: bool  # it ended on the way away from where it began
+    turned_round: bool  # in between
+
+
+class SearchForest:
+    """The rows of one search. begin() it with the first meetpoint, step() with each edge."""
+
+    def __init__(self, matcher: Matcher, max_errors: int) -> None:
+        self._matcher = matcher
+        self._max_errors = max_errors
+        self._meetpoints: List[Meetpoint] = []
+        self._traversals: List[Traversal] = []  # the one at d leads from depth d to d + 1
+        self._rows: Dict[Tuple[int, int], Row] = {}  # by depth and errors
+        self._errors = 0
+
+    @property
+    def depth(self) -> int:
+        """The document's current search depth; -1 before the search begins."""
+        return len(self._meetpoints) - 1
+
+    @property
+    def errors(self) -> int:
+        """Up to so many errors of the detector are considered by now."""
+        return self._errors
+
+    @property
+    def meetpoints(self) -> Tuple[Meetpoint, ...]:
+        """Of each depth."""
+        return tuple(self._meetpoints)
+
+    @property
+    def traversals(self) -> Tuple[Traversal, ...]:
+        """From each depth to the next."""
+        return tuple(self._traversals)
+
+    def begin(self, meetpoint: Meetpoint) -> None:
+        """Start over at a meetpoint."""
+        self._meetpoints, self._traversals, self._rows, self._errors = [meetpoint], [], {}, 0
+        self._work_out_last_row()
+
+    def step(self, traversal: Traversal, meetpoint: Meetpoint) -> None:
+        """Take in an edge and the meetpoint at its end.
+
+        Raises:
+            ObservationError: the meetpoint it left has no such edge; nothing is changed.
+        """
+        refuse_rank(traversal.rank, self._meetpoints[-1].degree)
+        self._traversals.append(traversal)
+        self._meetpoints.append(meetpoint)
+        self._work_out_last_row()
+
+    def candidates(self) -> Tuple[np.ndarray, np.ndarray]:
+        """(C,) active darts of the current depth, and (C,) how many errors each takes; fewest errors first."""
+        rows = [self.row(self.depth, errors) for errors in range(self._errors + 1)]
+        return (
+            np.concatenate([row.dart for row in rows]),
+            np.repeat(np.arange(self._errors + 1), [len(row) for row in rows]),
+        )
+
+    def row(self, depth: int, errors: int = 0) -> Row:
+        """Active candidates of a depth that take exactly so many errors."""
+        return self._rows[depth, errors]
+
+    def between_meetpoints(self) -> bool:
+        """Whether the robot may be on an edge, at what it took for a meetpoint."""
+        return self._between_meetpoints(self._errors)
+
+    def path(self, dart: int) -> List[Tuple[int, int, bool]]:
+        """How a candidate of the current depth came there, from its beginning.
+
+        Returns:
+            For each row it passed: depth, dart, and whether one edge without an error led there; the first is False.
+        """
+        errors = next(e for e in range(self._errors + 1) if dart in self.row(self.depth, e).dart)
+        depth, index = self.depth, int(np.searchsorted(self.row(self.depth, errors).dart, dart))
+        found: List[Tuple[int, int, bool]] = []
+        while True:
+            row = self.row(depth, errors)
+            parent = int(row.parent[index])
+            before = int(row.parent_depth[index]), int(row.parent_errors[index])
+            plain = parent != NO_PARENT and before == (depth - 1, errors)
+            found.append((depth, int(row.dart[index]), plain))
+            if parent == NO_PARENT:
+                return found[::-1]
+            (depth, errors), index = before, parent
+
+    def has_rival(self, dart: int) -> bool:
+        """Whether a candidate of the current depth came by an edge where one with a meetpoint missed fits as well: to
+        the next meetpoint, if that is near.
+        """
+        came = self.path(dart)
+        if not came[-1][2]:
+            return False
+        departure = self._departures(np.array([came[-2][1]]), self.depth - 1)
+        _, arrival, _ = self._joined_edges(departure, self._traversals[-1], 1)
+        return bool(self._matcher.at(arrival, self._meetpoints[-1]).any())
+
+    # -- rows
+
+    def _work_out_last_row(self) -> None:
+        for errors in range(self._errors + 1):
+            self._rows[self.depth, errors] = self._worked_out(self.depth, errors)
+        while self._errors < self._max_errors and not self._alive():
+            self._errors += 1
+            for depth in range(self.depth + 1):
+                self._rows[depth, self._errors] = self._worked_out(depth, self._errors)
+
+    def _alive(self) -> bool:
+        return any(len(self.row(self.depth, errors)) for errors in range(self._errors + 1)) or self._between_meetpoints(
+            self._errors
+        )
+
+    def _between_meetpoints(self, errors: int) -> bool:
+        for back in range(1, min(errors, self.depth) + 1):  # so many of the last meetpoints were none
+            farthest = self._course(self.depth - back, self.depth).farthest
+            for spent in range(errors - back + 1):
+                row = self.row(self.depth - back, spent)
+                departure = self._departures(row.dart, self.depth - back)
+                if self._matcher.may_contain(departure, farthest).any():
+                    return True
+        return errors > self.depth  # none of the meetpoints was one
+
+    def _worked_out(self, depth: int, errors: int) -> Row:
+        found = _Found()
+        if depth == 0 and errors == 0:
+            dart = self._matcher.all_at(self._meetpoints[0])
+            found.add(dart, np.full(len(dart), NO_PARENT), 0, 0)
+        for spurious in range(min(errors, depth - 1) + 1 if depth else 0):
+            for missed in range(errors - spurious + 1):
+                self._add_ways(found, depth, errors, spurious, missed)
+        for spurious in range(1, min(errors, depth - 1) + 1):
+            self._add_returns(found, depth, errors, spurious)
+        if 1 <= depth <= errors:
+            self._add_beginnings(found, depth, errors)
+        if not found.darts:
+            none = np.zeros(0, np.int64)
+            found.add(none, none, 0, 0)
+        return found.row([self._rows[depth, fewer] for fewer in range(errors)])
+
+    def _departures(self, dart: np.ndarray, depth: int) -> np.ndarray:
+        return self._matcher.departures(dart, self._traversals[depth].rank)
+
+    def _add_ways(self, found: _Found, depth: int, errors: int, spurious: int, missed: int) -> None:
+        """Ways that take up so many traversals more than one, over so many edges more than one."""
+        origin = depth - 1 - spurious, errors - spurious - missed
+        course = self._course(origin[0], depth)
+        if not course.onward or (missed and course.turned_round):
+            return
+        traversal = course.traversal
+        departure = self._departures(self._rows[origin].dart, origin[0])
+        if missed:
+            departure, arrival, parent = self._joined_edges(departure, traversal, missed)
+        else:
+            parent = self._matcher.edges_along(departure, traversal)
+            arrival = twin(departure[parent])
+        here = self._matcher.at(arrival, self._meetpoints[depth])
+        found.add(arrival[here], parent[here], *origin)
+
+    def _course(self, first: int, last: int) -> _Course:
+        """The traversals between two depths; rank 0 at a meetpoint in between is a turn round.
+
+        Of the chord only what the triangle leaves of it is known, which is next to nothing: it is not matched.
+        """
+        parts = self._traversals[first:last]
+        if len(parts) == 1:
+            return _Course(parts[0], parts[0], True, False)
+        sigma = math.sqrt(sum(self._matcher.sigma_length_m(part) ** 2 for part in parts))
+        way = np.array([-1.0 if part.rank == 0 and number else 1.0 for number, part in enumerate(parts)]).cumprod()
+        at = np.cumsum(way * [part.length_m for part in parts])
+        net, farthest = (
+            Traversal(parts[0].rank, max(float(value), 1e-6), UNKNOWN, sigma_length_m=sigma)
+            for value in (at[-1], at.max())
+        )
+        return _Course(net, farthest, bool(way[-1] > 0.0), bool(way.min() < 0.0))
+
+    def _joined_edges(
+        self, departure: np.ndarray, traversal: Traversal, missed: int
+    ) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Ways over so many missed meetpoints that fit: departures, arrivals, indices of the departures."""
+        edges, matcher = self._matcher.atlas.edges, self._matcher
+        longest = matcher.longest_m(traversal, missed + 1)
+        parent, last, length = np.arange(len(departure)), departure, matcher.length_m[departure >> 1]
+        variance = edges.sigma_m[departure >> 1] ** 2
+        for _ in range(missed):
+            short = length < longest
+            parent, last, length, variance = parent[short], last[short], length[short], variance[short]
+            onward, beside = matcher.others(twin(last))
+            parent, last = parent[beside], onward
+            length = length[beside] + matcher.length_m[onward >> 1]
+            variance = variance[beside] + edges.sigma_m[onward >> 1] ** 2
+        near = np.flatnonzero((length <= longest) & (length >= 2.0 * traversal.length_m - longest))
+        parent, last, length, variance = parent[near], last[near], length[near], variance[near]
+        fits = matcher.ways_along(departure[parent], twin(last), length, np.sqrt(variance), traversal)
+        return departure[parent[fits]], twin(last[fits]), parent[fits]
+
+    def _add_returns(self, found: _Found, depth: int, errors: int, spurious: int) -> None:
+        """The robot turned round on an edge, at what it took for a meetpoint, and is back where that edge began."""
+        origin = depth - 1 - spurious, errors - spurious
+        course = self._course(origin[0], depth)
+        if course.onward or course.traversal.length_m > self._matcher.z * course.traversal.sigma_length_m:
+            return
+        departure = self._departures(self._rows[origin].dart, origin[0])
+        fits = self._matcher.may_contain(departure, course.farthest)
+        fits[fits] = self._matcher.at(departure[fits], self._meetpoints[depth])
+        found.add(departure[fits], np.flatnonzero(fits), *origin)
+
+    def _add_beginnings(self, found: _Found, depth: int, errors: int) -> None:
+        """No meetpoint before this one was one: the search begins here, behind an edge at least so long."""
+        arrival = self._matcher.all_at(self._meetpoints[depth])
+        course = self._course(0, depth)
+        if not course.turned_round and errors == depth:
+            arrival = arrival[self._matcher.may_contain(arrival, course.traversal)]
+        found.add(arrival, np.full(len(arrival), NO_PARENT), 0, 0)

@@ -1,0 +1,95 @@
+"""Candidates -> the turn to take.
+
+Seed document global_localization_procedure.txt, "Traversing the match edge": a vote taken from the current candidate
+list, for right or left. What a candidate votes for it does not say. Here (vote_mode seed) each votes for the side on
+which fewer of the others expect the same as it does; the majority wins, a tie goes right as in the document's example.
+
+The default (vote_mode best) is the turn with the fewest expected survivors: each candidate may be the truth, and a turn
+leaves those that expect what the truth shows. C candidates, R ranks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import List, Tuple
+
+import numpy as np
+
+from glass_nav.topology.search.matching import Matcher
+
+_POLLED = 100  # candidates whose expectations are compared, each with each: 2 ms of a step
+_EQUAL = 1e-9  # survivors by which two turns differ only by rounding
+
+
+@dataclass(frozen=True)
+class Vote:
+    """What the candidates think of each turn."""
+
+    ranks: np.ndarray  # (R,)
+    survivors: np.ndarray  # (R,) expected number of candidates left
+    length_m: np.ndarray  # (R,) mean of the ways
+    rank: int  # of the turn that won
+    splits: bool  # some turn leaves fewer candidates than there are
+
+
+def best(matcher: Matcher, dart: np.ndarray) -> Vote:
+    """The turn with the fewest expected survivors, of those the shortest; back only where nothing else splits.
+
+    Args:
+        matcher: of the atlas.
+        dart: (C,) candidates at a meetpoint of one degree, two or more of them.
+    """
+    polled = _polled(dart)
+    degree = int(matcher.atlas.degree[matcher.atlas.darts.node[dart[0]]])
+    survivors, length = [], []
+    for rank in range(degree):
+        departure = matcher.departures(polled, rank)
+        survivors.append(len(dart) * float(_alike(matcher, departure).mean()))
+        length.append(float(matcher.length_m[departure >> 1].mean()))
+    order = sorted(range(degree), key=lambda rank: (round(survivors[rank] / _EQUAL), rank == 0, length[rank]))
+    return Vote(
+        np.arange(degree),
+        np.array(survivors),
+        np.array(length),
+        order[0],
+        bool(survivors[order[0]] < len(dart) - _EQUAL * len(dart)),
+    )
+
+
+def seed(matcher: Matcher, dart: np.ndarray) -> int:
+    """The document's majority for left (rank 1) or right (the last rank); 0 where the only way is back."""
+    degree = int(matcher.atlas.degree[matcher.atlas.darts.node[dart[0]]])
+    if degree <= 2:
+        return degree - 1
+    left, right = left_right_votes(matcher, dart)
+    return 1 if left > right else degree - 1
+
+
+def left_right_votes(matcher: Matcher, dart: np.ndarray) -> Tuple[int, int]:
+    """How many of the candidates (C,) vote for left, and how many for right."""
+    degree = int(matcher.atlas.degree[matcher.atlas.darts.node[dart[0]]])
+    polled = _polled(dart)
+    same: List[np.ndarray] = []
+    for rank in (1, degree - 1):
+        voter, other = matcher.departures(dart, rank), matcher.departures(polled, rank)
+        same.append(_chunked(matcher, voter, other))
+    left = int(np.count_nonzero(same[0] < same[1]))
+    return left, len(dart) - left
+
+
+def _chunked(matcher: Matcher, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """(C,) how many of the second darts (P,) are like each of the first (C,), in pieces that fit the cache."""
+    rows = max(1, 2_000_000 // max(len(second), 1))
+    return np.concatenate(
+        [matcher.alike_along(first[at : at + rows, None], second).sum(axis=1) for at in range(0, len(first), rows)]
+    )
+
+
+def _alike(matcher: Matcher, departure: np.ndarray) -> np.ndarray:
+    return matcher.alike_along(departure[:, None], departure)
+
+
+def _polled(dart: np.ndarray) -> np.ndarray:
+    if len(dart) <= _POLLED:
+        return dart
+    return dart[np.linspace(0, len(dart) - 1, _POLLED).astype(np.int64)]

@@ -1,0 +1,146 @@
+"""Jobs in this process, on its cores and on a Dask cluster of one worker on this machine."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import engine_jobs
+import pytest
+
+from glass_nav.compare import engine
+from glass_nav.compare.engine import EngineError, Failed
+
+JOBS = [3, 1, -4, 5, 0, 2]
+ANSWERS = [9, 1, Failed(-4, "-4 is negative"), 25, 0, 4]
+
+
+def wait_until(condition, timeout_s):
+    end = time.monotonic() + timeout_s
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+@pytest.fixture(scope="module")
+def scheduler(tmp_path_factory):
+    """Address of a scheduler with one worker, both processes of their own on free ports."""
+    pytest.importorskip("distributed", reason="scripts/setup --dev installs distributed")
+    folder = tmp_path_factory.mktemp("dask")
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(
+            [str(Path(engine_jobs.__file__).parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+        ),
+    }
+    started = []
+
+    def start(name, *options):
+        with (folder / f"{name}.log").open("w") as log:
+            started.append(
+                subprocess.Popen(
+                    [
+                        sys.executable,
+                        "-m",
+                        f"distributed.cli.dask_{name}",
+                        *options,
+                        "--dashboard-address",
+                        "127.0.0.1:0",
+                    ],
+                    cwd=folder,
+                    env=environment,
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                )
+            )
+
+    try:
+        told = folder / "scheduler.json"
+        start("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(told))
+        assert wait_until(lambda: told.exists() and told.read_text().endswith("}"), 60), "no scheduler within 60 s"
+        address = json.loads(told.read_text())["address"]
+        start("worker", address, "--nthreads", "1", "--no-nanny")
+        yield address
+    finally:
+        for process in reversed(started):
+            process.terminate()
+            process.wait(timeout=30)
+
+
+@pytest.mark.parametrize("cores", [1, 2])
+def test_answers_come_in_the_order_of_the_jobs_and_a_failure_stops_no_other(cores):
+    if cores > 1:
+        pytest.importorskip("joblib", reason="scripts/setup installs joblib")
+    steps = []
+    assert engine.run(JOBS, engine_jobs.squared, steps.append, cores) == ANSWERS
+    assert sum(steps) == 3 + 1 + 5 + 0 + 2
+
+
+def test_a_dask_cluster_gives_the_same_answers(scheduler):
+    steps = []
+    assert engine.run(JOBS, engine_jobs.squared, steps.append, scheduler=scheduler) == ANSWERS
+    assert sum(steps) == 3 + 1 + 5 + 0 + 2
+    (worker,) = set(engine.run([1, 2], engine_jobs.process, steps.append, scheduler=scheduler))
+    assert worker != os.getpid()
+
+
+def test_more_than_one_core_means_other_processes():
+    pytest.importorskip("joblib", reason="scripts/setup installs joblib")
+    assert os.getpid() not in engine.run([1, 2], engine_jobs.process, lambda count: None, cores=2)
+    assert set(engine.run([1, 2], engine_jobs.process, lambda count: None)) == {os.getpid()}
+
+
+def test_a_process_that_is_killed_is_told_in_one_line():
+    pytest.importorskip("joblib", reason="scripts/setup installs joblib")
+    answers = engine.run([1, 2], engine_jobs.ended, lambda count: None, cores=2)
+    assert [answer.job for answer in answers] == [1, 2]
+    assert {answer.reason for answer in answers} == {
+        "a process ended on its own, out of memory? (fewer --jobs need less)"
+    }
+
+
+def test_what_a_worker_of_the_cluster_cannot_do_stops_no_other(scheduler):
+    done, failed = engine.run([2, "two"], engine_jobs.squared, lambda count: None, scheduler=scheduler)
+    assert done == 4
+    assert failed.job == "two" and failed.reason.startswith("TypeError: ")
+
+
+def test_a_joblib_too_old_is_told(monkeypatch):
+    joblib = pytest.importorskip("joblib", reason="scripts/setup installs joblib")
+    monkeypatch.setattr(joblib, "Parallel", lambda: None)  # as before 1.3: without return_as
+    with pytest.raises(EngineError, match="^joblib .* is too old, 1.3 or later is needed$"):
+        engine.run([1, 2], engine_jobs.squared, lambda count: None, cores=2)
+
+
+def test_a_scheduler_without_workers_is_told(monkeypatch):
+    distributed = pytest.importorskip("distributed", reason="scripts/setup --dev installs distributed")
+    monkeypatch.setattr(engine, "WORKER_S", 0.5)
+    with distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0", scheduler_port=0) as cluster:
+        address = cluster.scheduler_address
+        with pytest.raises(EngineError) as caught:
+            engine.run([1], engine_jobs.squared, lambda count: None, scheduler=address)
+    assert str(caught.value) == f"no worker has joined the Dask scheduler at {address} within 0.5 s"
+
+
+@pytest.mark.parametrize("package, options", [("joblib", {"cores": 2}), ("distributed", {"scheduler": "tcp://a:1"})])
+def test_a_package_that_is_missing_is_named(monkeypatch, package, options):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(EngineError, match=rf"needs the Python package {package} \(pip install {package}\)"):
+        engine.run([1, 2], engine_jobs.squared, lambda count: None, **options)
+
+
+def test_a_scheduler_that_does_not_answer_is_told(monkeypatch):
+    pytest.importorskip("distributed", reason="scripts/setup --dev installs distributed")
+    monkeypatch.setattr(engine, "CONNECT_S", 0.5)
+    with pytest.raises(EngineError, match="^no Dask scheduler answers at tcp://127.0.0.1:9: ") as caught:
+        engine.run([1], engine_jobs.squared, lambda count: None, scheduler="tcp://127.0.0.1:9")
+    assert "\n" not in str(caught.value)
+    with pytest.raises(EngineError, match="^no Dask scheduler answers at nowhere://: "):
+        engine.run([1], engine_jobs.squared, lambda count: None, scheduler="nowhere://")

@@ -1,0 +1,34 @@
+"""How often a pane answers: between lidars that see little of glass and lidars that see much."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from glass_nav.localization.beam_classification import glass_return_model
+
+INCIDENCE_RAD = np.radians(np.linspace(0.0, 89.0, 90))
+
+
+@pytest.mark.parametrize("share", [glass_return_model.least, glass_return_model.most])
+def test_a_pane_answers_the_less_the_farther_from_head_on(share):
+    answers = share(INCIDENCE_RAD)
+    assert np.all((answers > 0.0) & (answers < 1.0))
+    assert np.all(np.diff(answers) <= 1e-12)
+    assert answers[0] > 0.5  # head on most lidars see it
+    assert answers[60:].max() < 0.15  # from the side none does
+
+
+def test_a_lidar_that_sees_little_of_glass_never_sees_more_than_one_that_sees_much():
+    assert np.all(glass_return_model.least(INCIDENCE_RAD) <= glass_return_model.most(INCIDENCE_RAD))
+    between = np.radians(15.0)
+    assert glass_return_model.most(between) > 2.0 * glass_return_model.least(between)
+
+
+def test_what_has_no_normal_is_neither_pane_nor_wall():
+    """A railing, a shelf: some beams end there and some pass, for every lidar."""
+    for share in (glass_return_model.least, glass_return_model.most):
+        answers = share(np.array([[np.nan, 0.0], [1.0, np.nan]]))
+        assert answers.shape == (2, 2)
+        assert answers[0, 0] == answers[1, 1] and 0.1 < answers[0, 0] < 0.9
+        assert answers[0, 1] == share(np.zeros(1))[0]

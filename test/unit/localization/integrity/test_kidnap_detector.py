@@ -1,0 +1,142 @@
+"""A pose that is believed: when is it doubted, and when is another one believed instead?"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from buildings import L_ROOM, SECOND_NS, Building, loop_drive, odometry, off
+
+from glass_nav.geometry import se2
+from glass_nav.hypotheses.global_search import SearchParams
+from glass_nav.hypotheses.scan_matcher import ScanMatcher
+from glass_nav.localization.integrity.kidnap_detector import KidnapDetector
+from glass_nav.sensing.distance_field import DistanceField
+
+SQUARE = Building([(0, 0), (6, 0), (6, 6), (0, 6)])
+
+
+class Watched:
+    """A robot, the pose that is believed, and what the watch says of it after each step."""
+
+    def __init__(self, building=L_ROOM, usual_fit=None, seed=0, **values):
+        self.building, self.rng = building, np.random.default_rng(seed)
+        grid_map = building.grid_map()
+        field = DistanceField(grid_map)
+        self.matchers = 0
+
+        def matcher():
+            self.matchers += 1
+            return ScanMatcher(grid_map, field)
+
+        self.watch = KidnapDetector(field, matcher, SearchParams(**values), usual_fit)
+        self.stamp_ns = 0
+
+    def drive(self, true, believed=None, odom=None, blind=None):
+        odom = odometry(true, self.rng) if odom is None else odom
+        believed = true if believed is None else believed
+        verdicts = []
+        for pose, told, moved in zip(true, believed, odom):
+            self.stamp_ns += SECOND_NS
+            scan = self.building.scan(pose, self.stamp_ns, self.rng)
+            scan = scan if blind is None else replace(scan, ranges_m=blind(len(scan)))
+            verdicts.append(self.watch.observe(scan, moved, np.asarray(told)))
+        return verdicts
+
+
+def carried(steps=30, offset=(1.2, 0.6, 0.8)):
+    """Where a robot is and where it believes to be: it was carried away and drives on."""
+    true = loop_drive(steps)
+    wrong = [se2.compose(true[0] + np.array(offset), se2.compose(se2.inverse(true[0]), pose)) for pose in true]
+    return true, wrong
+
+
+def test_a_right_pose_is_never_doubted_and_costs_no_search():
+    watched = Watched()
+    verdicts = watched.drive(loop_drive(60))
+    assert not any(verdict.doubted or verdict.poor or verdict.contested for verdict in verdicts)
+    assert watched.matchers == 0 and np.isnan(verdicts[-1].fit_there)
+    assert verdicts[-1].usual == pytest.approx(verdicts[-1].fit, abs=0.05)  # it has learnt how scans fit
+
+
+def test_a_wrong_pose_is_doubted_within_a_metre_and_the_right_one_is_found():
+    watched = Watched()
+    watched.drive(loop_drive(30))
+    true, wrong = carried()
+    verdicts = watched.drive(true, wrong)
+    assert any(verdict.contested for verdict in verdicts[:6])
+    found = next(index for index, verdict in enumerate(verdicts) if verdict.found is not None)
+    assert off(verdicts[found].found, true[found])[0] < 0.1
+    assert verdicts[found].fit_there > 0.8 > verdicts[found].fit
+    assert watched.matchers == 1
+
+
+def test_told_not_to_it_does_not_look_elsewhere():
+    watched = Watched(recover_when_lost=False)
+    watched.drive(loop_drive(30))
+    verdicts = watched.drive(*carried())
+    assert watched.matchers == 0 and verdicts[-1].found is None and not verdicts[-1].contested
+    assert verdicts[-1].doubted and verdicts[-1].poor
+
+
+@pytest.mark.long_run
+def test_people_all_round_make_a_pose_doubtful_but_move_nobody():
+    watched = Watched()
+    watched.drive(loop_drive(30))
+    crowd = watched.drive(loop_drive(30), blind=lambda beams: watched.rng.uniform(0.3, 0.8, beams))
+    assert crowd[-1].doubted and crowd[-1].poor
+    assert not any(verdict.found is not None for verdict in crowd)
+    after = watched.drive(loop_drive(60))
+    assert not after[-1].doubted and not any(verdict.found is not None for verdict in after)
+
+
+def test_of_places_that_look_alike_the_believed_one_stays():
+    """In a square room a pose turned by half about the middle fits as well: nobody can tell, so nobody moves."""
+    true = loop_drive(40, (3.0, 3.0))
+    twin = [se2.compose(np.array([3.0, 3.0, np.pi]), np.array([*(pose[:2] - 3.0), pose[2]])) for pose in true]
+    verdicts = Watched(SQUARE).drive(true, twin)
+    assert not any(verdict.contested for verdict in verdicts)
+
+
+def test_without_answers_the_verdict_stays():
+    watched = Watched()
+    blind = watched.drive(loop_drive(2), blind=lambda beams: np.full(beams, np.nan))
+    assert np.isnan(blind[-1].fit) and not blind[-1].doubted and not blind[-1].poor
+    before = watched.drive(loop_drive(3))[-1]
+    assert watched.drive(loop_drive(1), blind=lambda beams: np.full(beams, np.inf))[-1] == before
+
+
+def test_how_scans_fit_somewhere_is_learnt_with_a_delay():
+    """What was not doubted for 3 m is how scans fit here; a doubt forgets what came just before."""
+    watched = Watched(usual_fit=0.8)
+    first = watched.drive(loop_drive(5))[-1]
+    assert first.usual == 0.8  # not yet
+    later = watched.drive(loop_drive(80))[-1]
+    assert later.usual > 0.9
+
+
+def test_where_scans_always_fit_badly_that_becomes_usual():
+    """A map that is wrong everywhere: the believed pose stays the best, and the search for another ends."""
+    watched = Watched()
+    true = loop_drive(80)
+    odom, verdicts = odometry(true, watched.rng), []
+    for pose, moved in zip(true, odom):
+        exact = L_ROOM.scan(pose, 0, watched.rng).ranges_m
+        verdicts += watched.drive(
+            [pose], odom=[moved], blind=lambda beams, exact=exact: exact + watched.rng.normal(0.0, 0.2, beams)
+        )
+    assert verdicts[0].usual == 0.9 and 1 <= watched.matchers <= 2
+    assert verdicts[-1].usual < 0.85 and verdicts[-1].candidates is None
+    assert not any(verdict.found is not None or verdict.contested for verdict in verdicts)
+
+
+def test_other_limits_hold_from_the_next_scan_on():
+    watched = Watched(search_margin=1000.0)
+    watched.drive(loop_drive(30))
+    true, wrong = carried(60)
+    assert not any(verdict.found is not None for verdict in watched.drive(true[:40], wrong[:40]))
+    watched.watch.decide_by(SearchParams(search_margin=2.0))
+    odom = odometry(true, np.random.default_rng(0))
+    last = watched.drive(true[40:], wrong[40:], odom[40:])
+    assert any(verdict.found is not None for verdict in last) or last[-1].contested

@@ -1,0 +1,86 @@
+import numpy as np
+import pytest
+
+from glass_nav.geometry import angles, se2
+from glass_nav.localization.particle_filter import motion
+from glass_nav.localization.particle_filter.motion import OdometryNoise
+
+EXACT = dict(odom_alpha1=0.0, odom_alpha2=0.0, odom_alpha3=0.0, odom_alpha4=0.0, odom_alpha5=0.0)
+
+
+@pytest.mark.parametrize("model", motion.MODELS)
+@pytest.mark.parametrize(
+    "step", [(0.5, 0.0, 0.0), (0.3, 0.1, 0.2), (-0.4, 0.0, 0.0), (0.0, 0.0, 2.0), (-0.3, -0.2, -3.0)]
+)
+def test_without_noise_every_particle_makes_the_step_of_odometry(model, step):
+    start = np.array([[1.0, 2.0, 0.5], [-3.0, 0.0, -2.0]])
+    noise = OdometryNoise(odom_model_type=model, **EXACT)
+    moved = motion.sample(start, np.array(step), noise, np.random.default_rng(0))
+    expected = se2.compose(start, np.array(step))
+    np.testing.assert_allclose(moved[:, :2], expected[:, :2], atol=1e-9)
+    np.testing.assert_allclose(angles.wrap(moved[:, 2] - expected[:, 2]), 0.0, atol=1e-9)
+
+
+def spread(model, step, **alphas):
+    noise = OdometryNoise(odom_model_type=model, **dict(EXACT, **alphas))
+    moved = motion.sample(np.zeros((40000, 3)), np.array(step), noise, np.random.default_rng(3))
+    return moved.std(axis=0)
+
+
+def test_the_corrected_model_takes_the_variance_for_a_variance():
+    way = 0.5
+    np.testing.assert_allclose(spread("diff-corrected", (way, 0, 0), odom_alpha3=0.04)[0], 0.2 * way, rtol=0.03)
+    np.testing.assert_allclose(spread("omni-corrected", (way, 0, 0), odom_alpha5=0.04)[1], 0.2 * way, rtol=0.03)
+
+
+def test_the_plain_model_takes_it_for_a_deviation_as_amcl_does():
+    way = 0.5
+    np.testing.assert_allclose(spread("diff", (way, 0, 0), odom_alpha3=0.04)[0], 0.04 * way**2, rtol=0.03)
+
+
+def test_the_spread_across_grows_with_the_turn_in_front_of_the_way():
+    # first rotation noise sqrt(alpha2) way, seen after the way: way * that
+    way = 0.5
+    np.testing.assert_allclose(
+        spread("diff-corrected", (way, 0, 0), odom_alpha2=0.0025)[1], way * 0.05 * way, rtol=0.05
+    )
+
+
+def test_driving_backwards_is_as_sure_as_driving_forwards():
+    forwards = spread("diff-corrected", (0.5, 0, 0), odom_alpha1=0.2)
+    backwards = spread("diff-corrected", (-0.5, 0, 0), odom_alpha1=0.2)
+    np.testing.assert_allclose(forwards, backwards, atol=1e-9)
+
+
+def test_turning_on_the_spot_keeps_the_place():
+    assert np.all(spread("diff-corrected", (0.0, 0.0, 1.0), odom_alpha1=0.1)[:2] < 1e-9)
+
+
+def test_an_omnidirectional_robot_errs_sideways():
+    deviation = spread("omni-corrected", (0.0, 0.5, 0.0), odom_alpha5=0.04)
+    assert deviation[0] == pytest.approx(0.1, rel=0.05) and deviation[1] < 1e-9
+
+
+def test_the_same_seed_gives_the_same_particles():
+    one, other = (
+        motion.sample(np.zeros((9, 3)), np.array([0.2, 0, 0.1]), OdometryNoise(), np.random.default_rng(7))
+        for _ in range(2)
+    )
+    np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize(
+    "values, text",
+    [
+        (
+            dict(odom_model_type="tank"),
+            "~odom_model_type must be one of diff, omni, diff-corrected, omni-corrected, got 'tank'",
+        ),
+        (dict(odom_alpha3=-0.1), "~odom_alpha3 must be finite and >= 0, got -0.1"),
+        (dict(odom_alpha1=float("nan")), "~odom_alpha1 must be finite and >= 0, got nan"),
+    ],
+)
+def test_a_wrong_noise_is_refused_in_one_line(values, text):
+    with pytest.raises(ValueError) as err:
+        OdometryNoise(**values)
+    assert str(err.value) == text

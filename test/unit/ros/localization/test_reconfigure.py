@@ -1,0 +1,65 @@
+"""What the running node tells dynamic_reconfigure's clients of its parameters."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+from dynamic_reconfigure.encoding import decode_config, decode_description
+
+from glass_nav.ros.localization import reconfigure
+from glass_nav.ros.localization.params import LocalizationParams, changeable
+
+REPO = Path(__file__).parents[4]
+VALUES = changeable(LocalizationParams())
+EXPLAINED = reconfigure.explanations(REPO / "config" / "localization.yaml")
+
+
+@pytest.fixture(scope="module")
+def described():
+    """Name -> what a client makes of the message."""
+    tree = decode_description(reconfigure.description_msg(VALUES, EXPLAINED))
+    return {each["name"]: each for each in tree["parameters"]}
+
+
+def test_a_client_sees_every_parameter_with_its_type_and_value(described):
+    assert set(described) == set(VALUES)
+    for name, value in VALUES.items():
+        assert described[name]["default"] == value
+        assert described[name]["type"] == {bool: "bool", int: "int", float: "double", str: "str"}[type(value)]
+
+
+def test_every_parameter_is_explained(described):
+    assert not [name for name, each in described.items() if not each["description"]]
+    assert described["transform_tolerance"]["description"] == (
+        "[s] map -> odom is stamped so far ahead of the scan; raise it if move_base complains about transforms of the "
+        "future"
+    )
+
+
+def test_no_value_is_out_of_bounds_for_a_client(described):
+    assert described["kld_err"]["min"] == float("-inf") and described["kld_err"]["max"] == float("inf")
+
+
+@pytest.mark.parametrize(
+    "name, value", [("vote_mode", "paper"), ("weight_mode", "ranges"), ("odom_model_type", "omni-corrected")]
+)
+def test_a_parameter_of_few_values_is_a_choice(described, name, value):
+    choices = ast.literal_eval(described[name]["edit_method"])["enum"]
+    assert value in [choice["value"] for choice in choices]
+    assert all(set(choice) >= {"name", "value", "type", "description"} for choice in choices)
+
+
+def test_without_the_file_nothing_is_explained():
+    assert reconfigure.explanations(None) == {} == reconfigure.explanations(Path("/nowhere"))
+
+
+def test_the_values_of_a_message_keep_their_types():
+    from dynamic_reconfigure.encoding import encode_config
+
+    given = {"a": True, "b": 2, "c": 0.5, "d": "x"}
+    msg = encode_config(given)
+    assert decode_config(msg) == given
+    found = reconfigure._values_from_msg(msg)
+    assert found == given and [type(found[name]) for name in "abcd"] == [bool, int, float, str]
