@@ -40,7 +40,7 @@ from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from glass_nav.localization.localizer import Estimate, GlassMcl
-from glass_nav.ros import conversions, shutdown
+from glass_nav.ros import conversions, mailbox, shutdown
 from glass_nav.ros.landmarks.bearing_messages import LONGEST_TURN_S
 from glass_nav.ros.localization import initial_poses, params, reconfigure
 from glass_nav.ros.localization.bearing_input import BearingInput
@@ -51,7 +51,7 @@ from glass_nav.ros.localization.pose_memory import PoseMemory
 from glass_nav.ros.localization.publishers import Publishers
 from glass_nav.ros.localization.reconfigure import ReconfigureServer
 from glass_nav.ros.log_throttle import LogThrottle
-from glass_nav.ros.mailbox import Errand, Mailbox
+from glass_nav.ros.mailbox import Mailbox
 from glass_nav.ros.scan_input import STALE_SCANS, ScanInput
 from glass_nav.sensing.scan import Scan, ScanError
 from glass_nav.world import landmark_file
@@ -61,7 +61,7 @@ TIME_JUMP_S = 0.5  # a clock that goes back by less is noise between machines
 NO_SCAN_WARNING_S = 15.0  # as AMCL
 SILENCE_S = 3.0  # without a used scan for that long, ~status says why
 SETTLING_S = 5.0  # a player of a launch file needs some seconds: no warning before
-ERRAND_TIMEOUT_S = 30.0
+SERVICE_TIMEOUT_S = 30.0
 
 
 class LocalizationNode:
@@ -99,7 +99,7 @@ class LocalizationNode:
         self._reconfigure = ReconfigureServer(
             params.changeable(p),
             reconfigure.explanations(_parameter_file()),
-            lambda values: self._run_errand(lambda: self._take_parameters(values)),
+            lambda values: self._in_run_loop(lambda: self._take_parameters(values)),
         )
         # Subscribers last: they may fire at once.
         self._listener = tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
@@ -143,14 +143,12 @@ class LocalizationNode:
     def _command(self, handle: Callable[[Any], None]) -> Callable[[Any], None]:
         return lambda msg: self._inbox.put("commands", lambda: handle(msg))
 
-    def _run_errand(self, work: Callable[[], None]) -> None:
-        errand = Errand(work)
-        self._inbox.put("commands", errand.run)
-        errand.wait(ERRAND_TIMEOUT_S)
+    def _in_run_loop(self, work: Callable[[], None]) -> None:
+        mailbox.outcome(self._inbox.submit("commands", work), SERVICE_TIMEOUT_S)
 
     def _serve_global_localization(self, _request: EmptyRequest) -> EmptyResponse:
         try:
-            self._run_errand(self._search)
+            self._in_run_loop(self._search)
         except (ValueError, TimeoutError) as err:
             rospy.logwarn(f"global_localization refused: {err}")
             raise rospy.ServiceException(str(err)) from err
@@ -158,14 +156,14 @@ class LocalizationNode:
 
     def _serve_nomotion_update(self, _request: EmptyRequest) -> EmptyResponse:
         try:
-            self._run_errand(lambda: self._core().request_update())
+            self._in_run_loop(lambda: self._core().request_update())
         except (ValueError, TimeoutError) as err:
             raise rospy.ServiceException(str(err)) from err
         return EmptyResponse()
 
     def _serve_set_map(self, request: SetMapRequest) -> SetMapResponse:
         try:
-            self._run_errand(lambda: self._set_map_and_pose(request))
+            self._in_run_loop(lambda: self._set_map_and_pose(request))
         except (ValueError, TimeoutError) as err:
             rospy.logwarn(f"set_map refused: {err}")
             return SetMapResponse(success=False)
