@@ -1,6 +1,6 @@
 """localization_node: where is the robot in a map of walls and glass? Also startable as `amcl`.
 
-Wiring only; the answer comes from GlassMcl. Callbacks store, one loop works: nothing else touches the filter.
+Wiring only; the answer comes from the Localizer. Callbacks store, one loop works: nothing else touches the filter.
 
 Subscribes: scan (LaserScan; or each of ~scan_topics), initialpose (PoseWithCovarianceStamped), map (OccupancyGrid, if
     ~use_map_topic), global_localization_area (PolygonStamped in the map's frame: the robot is searched for in it),
@@ -17,7 +17,7 @@ Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseAr
     (Image, latched).
 Services: global_localization, request_nomotion_update (Empty), set_map (SetMap), ~set_parameters (Reconfigure, with
     its topics ~parameter_descriptions and ~parameter_updates). Calls static_map (GetMap).
-Parameters: LocalizationNodeParams and GlassMclParams; explained in config/localization.yaml.
+Parameters: LocalizationNodeParams and LocalizerParams; explained in config/localization.yaml.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from nav_msgs.srv import SetMap, SetMapRequest, SetMapResponse
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
-from glass_nav.localization.localizer import Estimate, GlassMcl
+from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.ros import conversions, shutdown
 from glass_nav.ros.landmarks.bearing_messages import LONGEST_TURN_S
 from glass_nav.ros.localization import initial_poses, params, reconfigure
@@ -70,7 +70,7 @@ class LocalizationNode:
     def __init__(self, p: params.LocalizationParams) -> None:
         self._p = p
         self._rng = p.node.rng
-        self._mcl: Optional[GlassMcl] = None
+        self._localizer: Optional[Localizer] = None
         self._map: Optional[GridMap] = None
         self._map_origin = ""  # where it came from, in words
         self._waits = p.node.wait_for_initialpose  # with a map, without a filter
@@ -122,16 +122,16 @@ class LocalizationNode:
             mail["scans"] += self._inbox.take_now("scans")  # a new map takes a while
             if self._waits and mail["scans"]:
                 mail["scans"], self._scans.last_arrival_s = [], self._now_s
-            unusable = "there is no map yet" if self._mcl is None else None
+            unusable = "there is no map yet" if self._localizer is None else None
             for msg in mail["scans"]:
                 if self._scans.receive(msg, self._now_s, unusable):
                     self._restart(f"the last {STALE_SCANS} scans are older than the one before them")
-            if self._mcl is not None:
+            if self._localizer is not None:
                 for msg in self._scans.take_ready(self._now_s):
                     self._step(msg)
-            if self._mcl is not None and self._map is not None:
+            if self._localizer is not None and self._map is not None:
                 stamp_ns = 0 if self._estimate is None else self._estimate.stamp_ns
-                self._outputs.send_glass_map(self._mcl, self._map, stamp_ns, self._now_s)
+                self._outputs.send_glass_map(self._localizer, self._map, stamp_ns, self._now_s)
             self._report()
 
     def save_pose(self) -> None:
@@ -173,14 +173,14 @@ class LocalizationNode:
 
     # -- maps, poses and parameters from outside
 
-    def _core(self) -> GlassMcl:
-        if self._mcl is None:
+    def _core(self) -> Localizer:
+        if self._localizer is None:
             raise ValueError("there is no map yet")
-        return self._mcl
+        return self._localizer
 
     def _use_map(self, grid_map: GridMap, frame: str, origin: str) -> None:
         """Build the filter around the first map; a later one leaves the particles where they are."""
-        if self._mcl is None:
+        if self._localizer is None:
             self._map = grid_map
             if not self._waits:
                 self._begin()
@@ -188,7 +188,7 @@ class LocalizationNode:
             rospy.loginfo(f"the map from {origin} is the one that is in use: nothing changes")
             return
         else:
-            self._mcl.set_map(grid_map)
+            self._localizer.set_map(grid_map)
             self._map = grid_map
         self._map_origin = origin
         self._outputs.glass_is_news()
@@ -213,10 +213,10 @@ class LocalizationNode:
     def _begin(self) -> str:
         """A new filter, at the start that there is; where, in words."""
         assert self._map is not None
-        self._mcl = GlassMcl(self._p.mcl, self._map, self._rng)
+        self._localizer = Localizer(self._p.localizer, self._map, self._rng)
         self._outputs.start_over()
         self._pose_is_news = True
-        return self._starts.begin(self._mcl)
+        return self._starts.begin(self._localizer)
 
     def _take_guess(self, msg: PoseWithCovarianceStamped) -> None:
         try:
@@ -255,8 +255,8 @@ class LocalizationNode:
     def _take_parameters(self, values: Dict[str, Any]) -> None:
         """Other parameters; what the filter knows stays. ParamError if one cannot be used, and then none is."""
         p = params.changed(self._p, values, rospy.get_name())
-        if self._mcl is not None:
-            self._mcl.reconfigure(p.mcl)
+        if self._localizer is not None:
+            self._localizer.reconfigure(p.localizer)
         self._p = p
         self._scans.reconfigure(p.node, p.deskew)
         self._outputs.reconfigure(p.node)
@@ -266,20 +266,20 @@ class LocalizationNode:
 
     def _step(self, msg: LaserScan) -> None:
         """One scan through the filter."""
-        assert self._mcl is not None and self._map is not None
+        assert self._localizer is not None and self._map is not None
         try:
             placed = self._scans.place(msg)
         except ScanError as err:
             self._pass_over(msg, str(err))
             return
         began_cpu_s, began_s = time.process_time(), time.monotonic()
-        if self._starts.apply(self._mcl, self._map, placed.scan.stamp_ns, placed.odom_from_base, self._now_s):
+        if self._starts.apply(self._localizer, self._map, placed.scan.stamp_ns, placed.odom_from_base, self._now_s):
             self._pose_is_news = True
             if self._p.node.force_update_after_initialpose:
-                self._mcl.request_update()
-        self._bearings.give(self._mcl, placed.scan.stamp_ns)
+                self._localizer.request_update()
+        self._bearings.give(self._localizer, placed.scan.stamp_ns)
         try:
-            estimate = self._mcl.update(placed.scan, placed.odom_from_base)
+            estimate = self._localizer.update(placed.scan, placed.odom_from_base)
         except ValueError as err:  # ScanError, and what the filter cannot work out: a robot drives on by odometry
             self._pass_over(msg, str(err))
             return
@@ -323,7 +323,7 @@ class LocalizationNode:
         self._estimate = None
         self._rng = self._p.node.rng  # a bag that starts over gives the same poses again
         if self._simulated and self._p.node.wait_for_initialpose:
-            self._waits, self._mcl = True, None
+            self._waits, self._localizer = True, None
             rospy.logwarn(f"{why}: it waits for initialpose again")
         elif self._map is not None:
             rospy.logwarn(f"{why}: the filter starts over {self._begin()}")
@@ -358,7 +358,7 @@ class LocalizationNode:
         without_scan_s = self._now_s - self._scans.last_arrival_s
         if without_scan_s > NO_SCAN_WARNING_S:
             self._log.warn(self._scans.silence(self._now_s), NO_SCAN_WARNING_S)
-        if self._mcl is None:
+        if self._localizer is None:
             return self._maps.trouble or ("it waits for initialpose" if self._map is not None else "no map yet")
         if without_scan_s > SILENCE_S:
             return self._scans.silence(self._now_s)
