@@ -51,13 +51,13 @@ from glass_nav.ros.localization.pose_memory import PoseMemory
 from glass_nav.ros.localization.publishers import Publishers
 from glass_nav.ros.localization.reconfigure import ReconfigureServer
 from glass_nav.ros.log_throttle import LogThrottle
+from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Errand, Mailbox
 from glass_nav.ros.scan_input import STALE_SCANS, ScanInput
 from glass_nav.sensing.scan import Scan, ScanError
 from glass_nav.world import landmark_file
 from glass_nav.world.grid_map import GridMap
 
-TIME_JUMP_S = 0.5  # a clock that goes back by less is noise between machines
 NO_SCAN_WARNING_S = 15.0  # as AMCL
 SILENCE_S = 3.0  # without a used scan for that long, ~status says why
 SETTLING_S = 5.0  # a player of a launch file needs some seconds: no warning before
@@ -79,7 +79,8 @@ class LocalizationNode:
         self._pose_is_news = True
         self._log = LogThrottle()
         self._inbox = Mailbox(scans=100, commands=100)
-        self._now_s = self._last_estimate_s = rospy.get_time()
+        self._clock = LoopClock()
+        self._last_estimate_s = self._clock.now_s
         self._started_s = time.monotonic()
         self._simulated = bool(rospy.get_param("/use_sim_time", False))
         self._next_report_s = 0.0  # by the monotonic clock
@@ -121,17 +122,17 @@ class LocalizationNode:
             self._maps.request()
             mail["scans"] += self._inbox.take_now("scans")  # a new map takes a while
             if self._waits and mail["scans"]:
-                mail["scans"], self._scans.last_arrival_s = [], self._now_s
+                mail["scans"], self._scans.last_arrival_s = [], self._clock.now_s
             unusable = "there is no map yet" if self._localizer is None else None
             for msg in mail["scans"]:
-                if self._scans.receive(msg, self._now_s, unusable):
+                if self._scans.receive(msg, self._clock.now_s, unusable):
                     self._restart(f"the last {STALE_SCANS} scans are older than the one before them")
             if self._localizer is not None:
-                for msg in self._scans.take_ready(self._now_s):
+                for msg in self._scans.take_ready(self._clock.now_s):
                     self._step(msg)
             if self._localizer is not None and self._map is not None:
                 stamp_ns = 0 if self._estimate is None else self._estimate.stamp_ns
-                self._outputs.send_glass_map(self._localizer, self._map, stamp_ns, self._now_s)
+                self._outputs.send_glass_map(self._localizer, self._map, stamp_ns, self._clock.now_s)
             self._report()
 
     def save_pose(self) -> None:
@@ -205,7 +206,7 @@ class LocalizationNode:
         grid_map = conversions.map_from_msg(request.map)
         initial_poses.refuse_outside(guess, grid_map)
         self._maps.take(grid_map, request.map.header.frame_id, "service set_map")
-        self._starts.give(guess, self._now_s)
+        self._starts.give(guess, self._clock.now_s)
         self._wait_no_more()
         if self._p.node.force_update_after_set_map:
             self._core().request_update()
@@ -226,7 +227,7 @@ class LocalizationNode:
         except ValueError as err:
             rospy.logwarn(f"initialpose refused: {err}")
             return
-        self._starts.give(guess, self._now_s)
+        self._starts.give(guess, self._clock.now_s)
         self._wait_no_more()
 
     def _wait_no_more(self) -> None:
@@ -273,7 +274,9 @@ class LocalizationNode:
             self._pass_over(msg, str(err))
             return
         began_cpu_s, began_s = time.process_time(), time.monotonic()
-        if self._starts.apply(self._localizer, self._map, placed.scan.stamp_ns, placed.odom_from_base, self._now_s):
+        if self._starts.apply(
+            self._localizer, self._map, placed.scan.stamp_ns, placed.odom_from_base, self._clock.now_s
+        ):
             self._pose_is_news = True
             if self._p.node.force_update_after_initialpose:
                 self._localizer.request_update()
@@ -289,10 +292,10 @@ class LocalizationNode:
             self._log.error("the filter's pose is not finite: nothing is published")
             return
         self._scans.counts.used += 1
-        self._estimate, self._scan, self._last_estimate_s = estimate, placed.scan, self._now_s
-        self._outputs.send(msg, placed, estimate, self._now_s, self._pose_is_news)
+        self._estimate, self._scan, self._last_estimate_s = estimate, placed.scan, self._clock.now_s
+        self._outputs.send(msg, placed, estimate, self._clock.now_s, self._pose_is_news)
         self._pose_is_news = False
-        self._memory.take(estimate, self._map.digest, self._p.node.save_pose_rate, self._now_s)
+        self._memory.take(estimate, self._map.digest, self._p.node.save_pose_rate, self._clock.now_s)
 
     def _pass_over(self, msg: LaserScan, why: str) -> None:
         """A scan that cannot be used: the pose moves on with the odometry all the same."""
@@ -303,21 +306,20 @@ class LocalizationNode:
     # -- time, and what is missing
 
     def _clock_jumped_back(self) -> bool:
-        before_s, self._now_s = self._now_s, rospy.get_time()
-        if before_s == 0.0:  # the first /clock
-            self._scans.last_arrival_s = self._last_estimate_s = self._now_s
-        if self._now_s >= before_s - TIME_JUMP_S:
-            return False
-        self._restart(f"time jumped back by {before_s - self._now_s:.3f} s")
-        return True
+        jump = self._clock.tick()
+        if self._clock.has_begun:
+            self._scans.last_arrival_s = self._last_estimate_s = self._clock.now_s
+        if jump is not None:
+            self._restart(jump)
+        return jump is not None
 
     def _restart(self, why: str) -> None:
         """Stamps start over: forget them. In simulated time the robot starts over too, else it stays."""
-        self._scans.restart(self._now_s)
+        self._scans.restart(self._clock.now_s)
         self._bearings.restart()
         self._tf.clear()
         self._starts.forget()
-        self._last_estimate_s = self._now_s
+        self._last_estimate_s = self._clock.now_s
         if not self._simulated and self._estimate is not None:
             self._starts.begin_at(self._estimate.map_from_base, self._estimate.covariance)
         self._estimate = None
@@ -350,19 +352,19 @@ class LocalizationNode:
 
     def _missing(self) -> Optional[str]:
         """Why no scan is being used; None while all is well."""
-        if self._now_s == 0.0:
+        if self._clock.now_s == 0.0:
             trouble = "time stands still: /use_sim_time is set and nothing publishes /clock"
             if time.monotonic() - self._started_s > SETTLING_S:
                 self._log.warn(trouble, NO_SCAN_WARNING_S)
             return trouble
-        without_scan_s = self._now_s - self._scans.last_arrival_s
+        without_scan_s = self._clock.now_s - self._scans.last_arrival_s
         if without_scan_s > NO_SCAN_WARNING_S:
-            self._log.warn(self._scans.silence(self._now_s), NO_SCAN_WARNING_S)
+            self._log.warn(self._scans.silence(self._clock.now_s), NO_SCAN_WARNING_S)
         if self._localizer is None:
             return self._maps.trouble or ("it waits for initialpose" if self._map is not None else "no map yet")
         if without_scan_s > SILENCE_S:
-            return self._scans.silence(self._now_s)
-        if self._now_s - self._last_estimate_s > SILENCE_S or self._estimate is None:
+            return self._scans.silence(self._clock.now_s)
+        if self._clock.now_s - self._last_estimate_s > SILENCE_S or self._estimate is None:
             return self._scans.trouble
         return None
 
