@@ -44,9 +44,9 @@ from glass_nav.msg import (
     TopologyStatus,
     TurnChoice,
 )
-from glass_nav.ros import action_status, conversions, shutdown
+from glass_nav.ros import action_status, conversions, mailbox, shutdown
 from glass_nav.ros.log_throttle import LogThrottle
-from glass_nav.ros.mailbox import Errand, Mailbox
+from glass_nav.ros.mailbox import Mailbox
 from glass_nav.ros.topology import topology_displays, topology_messages
 from glass_nav.ros.topology.scan_memory import ScanMemory
 from glass_nav.ros.topology.served_explanation import ServedExplanation
@@ -59,7 +59,7 @@ from glass_nav.topology.search.atlas_localizer import CONFIRMED, AtlasLocalizer,
 
 NO_ATLAS, IDLE, WAITING = "NO_ATLAS", "IDLE", "WAITING"  # beside those of the localizer
 TIME_JUMP_S = 0.5  # a clock that goes back by less is noise between machines
-ERRAND_TIMEOUT_S = 30.0
+SERVICE_TIMEOUT_S = 30.0
 
 
 class TopologyNode:
@@ -94,8 +94,8 @@ class TopologyNode:
             self._begin("the node has started")
         else:
             self._publish(0)
-        rospy.Service("~restart", Trigger, self._errand(self._restart))
-        rospy.Service("~reload_atlas", Trigger, self._errand(self._reload_atlas))
+        rospy.Service("~restart", Trigger, self._service(self._restart))
+        rospy.Service("~reload_atlas", Trigger, self._service(self._reload_atlas))
         action_status.start(self._server)
         # Subscribers last: they may fire at once.
         rospy.Subscriber(
@@ -131,18 +131,15 @@ class TopologyNode:
 
     # -- commands
 
-    def _errand(self, work: Callable[[], str]) -> Callable[[TriggerRequest], TriggerResponse]:
+    def _service(self, work: Callable[[], str]) -> Callable[[TriggerRequest], TriggerResponse]:
         """A service that has the run loop do something and gives back what it says."""
 
         def serve(_request: TriggerRequest) -> TriggerResponse:
-            said = []
-            errand = Errand(lambda: said.append(work()))
-            self._inbox.put("commands", errand.run)
             try:
-                errand.wait(ERRAND_TIMEOUT_S)
+                message = mailbox.outcome(self._inbox.submit("commands", work), SERVICE_TIMEOUT_S)
             except (ValueError, TimeoutError) as err:
                 return TriggerResponse(success=False, message=str(err))
-            return TriggerResponse(success=True, message=said[0])
+            return TriggerResponse(success=True, message=message)
 
         return serve
 
