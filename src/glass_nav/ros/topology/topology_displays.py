@@ -18,23 +18,11 @@ from glass_nav.geometry import se2
 from glass_nav.ros import conversions
 from glass_nav.ros.packed_markers import PackedMarkerArray, colour, points_marker
 from glass_nav.topology.atlas.atlas import Atlas
-from glass_nav.topology.search.atlas_localizer import (
-    AMBIGUOUS,
-    CONFIRMED,
-    SEARCHING,
-    TENTATIVE,
-    AtlasLocalizer,
-    Estimate,
-)
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer, SearchEstimate
 from glass_nav.topology.search.search_forest import NO_PARENT
+from glass_nav.vocabulary import SEARCH_RGB
 
-STATE_COLOURS = {
-    SEARCHING: (230, 159, 0),
-    TENTATIVE: (86, 180, 233),
-    CONFIRMED: (0, 158, 115),
-    AMBIGUOUS: (204, 121, 167),
-}
-NAMESPACES = ("atlas", "nodes", *(state.lower() for state in STATE_COLOURS), "ruled_out", "forest", "text")
+NAMESPACES = ("atlas", "nodes", *(state.lower() for state in SEARCH_RGB), "ruled_out", "forest", "text")
 ATLAS_RGB, NODE_RGB, RULED_OUT_RGB, FOREST_RGB = (130, 130, 130), (60, 60, 60), (213, 94, 0), (0, 114, 178)
 MAX_PATHS = 50  # of candidates; more would only hide the map
 
@@ -55,7 +43,7 @@ def atlas_markers(atlas: Atlas, map_frame: str) -> List[Marker]:
 
 def search_markers(
     localizer: AtlasLocalizer,
-    estimate: Optional[Estimate],
+    estimate: Optional[SearchEstimate],
     poses: np.ndarray,
     map_frame: str,
     text: str,
@@ -72,7 +60,7 @@ def search_markers(
         atlas_shown: of atlas_markers().
     """
     atlas, header = localizer.atlas, conversions.header(0, map_frame)
-    arrows = {state: np.zeros((0, 2)) for state in STATE_COLOURS}
+    arrows = {state: np.zeros((0, 2)) for state in SEARCH_RGB}
     ruled_out, forest = np.zeros((0, 2)), np.zeros((0, 2))
     if estimate is not None:
         if estimate.state in arrows:
@@ -88,7 +76,7 @@ def search_markers(
         )
     markers = [
         points_marker(
-            header, state.lower(), 0, Marker.LINE_LIST, points, 3 * _HEIGHT_M, 0.1, _rgb(STATE_COLOURS[state])
+            header, state.lower(), 0, Marker.LINE_LIST, points, 3 * _HEIGHT_M, 0.1, _rgb(SEARCH_RGB[state])
         )
         for state, points in arrows.items()
     ]

@@ -15,7 +15,7 @@ from glass_nav.msg import TurnChoice as TurnChoiceMsg
 from glass_nav.ros import conversions
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.observations import UNKNOWN, Meetpoint, ObservationError, Traversal
-from glass_nav.topology.search.atlas_localizer import Estimate, TurnChoice
+from glass_nav.topology.search.atlas_localizer import SearchEstimate, TurnChoice
 
 AS_TOLD = -1  # rank of a traversal: as the last turn_choice said
 
@@ -68,7 +68,9 @@ def turn_choice_msg(choice: TurnChoice, stamp_ns: int, frame: str) -> TurnChoice
     )
 
 
-def status_msg(state: str, reason: str, stamp_ns: int, frame: str, estimate: Optional[Estimate]) -> TopologyStatus:
+def status_msg(
+    state: str, reason: str, stamp_ns: int, frame: str, estimate: Optional[SearchEstimate]
+) -> TopologyStatus:
     """By the name of a state; with an estimate also depth, candidates and turn."""
     msg = TopologyStatus(
         header=conversions.header(stamp_ns, frame),
@@ -83,7 +85,7 @@ def status_msg(state: str, reason: str, stamp_ns: int, frame: str, estimate: Opt
 
 
 def candidates_msg(
-    atlas: Atlas, estimate: Estimate, poses: np.ndarray, stamp_ns: int, frame: str
+    atlas: Atlas, estimate: SearchEstimate, poses: np.ndarray, stamp_ns: int, frame: str
 ) -> TopologyCandidates:
     """The first candidates, as many as there are poses (K, 3) for; none where the atlas does not have the place that
     scans confirmed.
