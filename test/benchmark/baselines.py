@@ -4,7 +4,7 @@ Two sensor models, the likelihood field and the beam model, in two filters: plai
 AMCL has it (particles move by odometry only), and our own filter with nothing but the weights exchanged. And our
 filter with less and with more knowledge of glass: only the beams that are told diffuse, and the true cases.
 
-All have set_pose() and update() as GlassMcl has. Every model is told what is known to help it: log probabilities
+All have set_pose() and update() as Localizer has. Every model is told what is known to help it: log probabilities
 (AMCL multiplies or adds up cubes), surfaces half a cell inside the walls that are drawn, thinned beams, and the
 settings of SETTINGS, the best of those that tune_baselines.py tries (glass_office, glass_bridge and glass_atrium, lidar
 weak, seed 100, the first 150 scans). P particles, B beams.
@@ -20,8 +20,8 @@ import numpy as np
 from glass_nav.geometry import angles, se2
 from glass_nav.localization.particle_filter import motion, pose_estimate, resampling
 from glass_nav.localization.beam_classification.case_votes import DIFFUSE, UNCERTAIN, BeamCases
-from glass_nav.localization.localizer import GlassMcl
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer import Localizer
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.beam_classification.expected_ranges import ExpectedRanges
 from glass_nav.localization.particle_filter.resampling import ParticleCount
 from glass_nav.sensing.distance_field import DistanceField
@@ -154,7 +154,7 @@ class PlainMcl:
 
     def __init__(
         self,
-        params: GlassMclParams,
+        params: LocalizerParams,
         grid_map: GridMap,
         rng: np.random.Generator,
         model: SensorModel,
@@ -197,10 +197,12 @@ class PlainMcl:
         return way >= self._params.schedule.update_min_d or turn >= self._params.schedule.update_min_a
 
 
-class OtherWeights(GlassMcl):
+class OtherWeights(Localizer):
     """Our filter, start to end, but the particles weighed by another sensor model."""
 
-    def __init__(self, params: GlassMclParams, grid_map: GridMap, rng: np.random.Generator, model: SensorModel) -> None:
+    def __init__(
+        self, params: LocalizerParams, grid_map: GridMap, rng: np.random.Generator, model: SensorModel
+    ) -> None:
         super().__init__(params, grid_map, rng)
         self._model = model
 
@@ -208,7 +210,7 @@ class OtherWeights(GlassMcl):
         return self._model.log_weights(particles, scan)
 
 
-class DiffuseOnly(GlassMcl):
+class DiffuseOnly(Localizer):
     """Our filter, going only by the beams that it takes for ended at the first surface."""
 
     def _vote(self, scan: Scan, *pose: np.ndarray) -> Tuple[BeamCases, ExpectedRanges]:
@@ -217,7 +219,7 @@ class DiffuseOnly(GlassMcl):
         return replace(cases, case=diffuse), references
 
 
-class OracleCases(GlassMcl):
+class OracleCases(Localizer):
     """Our filter, going by the true cases; set `true_case` (B,) before each update()."""
 
     true_case = np.zeros(0, np.uint8)
@@ -238,12 +240,12 @@ SETTINGS = {
     ),
 }
 
-Localizer = Union[GlassMcl, PlainMcl]
+PoseFilter = Union[Localizer, PlainMcl]
 
 
 def localizer(
-    name: str, params: GlassMclParams, grid_map: GridMap, seed: int, settings: Optional[Settings] = None
-) -> Localizer:
+    name: str, params: LocalizerParams, grid_map: GridMap, seed: int, settings: Optional[Settings] = None
+) -> PoseFilter:
     """One of LOCALIZERS, fresh.
 
     Args:
@@ -261,14 +263,14 @@ def localizer(
     return (PlainMcl if name.startswith("amcl") else OtherWeights)(params, grid_map, rng, model)
 
 
-def _with_vote(mode: str) -> Callable[[GlassMclParams, GridMap, np.random.Generator], GlassMcl]:
-    return lambda params, grid_map, rng: GlassMcl(
+def _with_vote(mode: str) -> Callable[[LocalizerParams, GridMap, np.random.Generator], Localizer]:
+    return lambda params, grid_map, rng: Localizer(
         replace(params, vote=replace(params.vote, vote_mode=mode)), grid_map, rng
     )
 
 
-OURS: Dict[str, Callable[[GlassMclParams, GridMap, np.random.Generator], GlassMcl]] = {
-    "ours": GlassMcl,
+OURS: Dict[str, Callable[[LocalizerParams, GridMap, np.random.Generator], Localizer]] = {
+    "ours": Localizer,
     "ours_paper": _with_vote("paper"),
     "ours_case1": DiffuseOnly,
     "ours_oracle": OracleCases,

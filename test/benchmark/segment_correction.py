@@ -41,8 +41,8 @@ import tracks
 from glass_nav.geometry import angles, se2
 from glass_nav.localization.particle_filter import importance_weights
 from glass_nav.hypotheses import scan_alignment
-from glass_nav.localization.localizer import GlassMcl
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer import Localizer
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.segments.segment_correction import SegmentCorrectionParams, SegmentCorrector
 from glass_nav.localization.segments.segment_locator import SegmentLocator
 from glass_nav.localization.segments.segment_polish import Polish
@@ -317,7 +317,7 @@ def speed(arguments: argparse.Namespace) -> bool:
 
 def filter_errors(arguments: argparse.Namespace, name: str, polished: bool) -> np.ndarray:
     """(2,) mean errors of position [m] and yaw [deg] over the seeds, of a log or a building."""
-    settings = GlassMclParams(polish=Polish(polished))
+    settings = LocalizerParams(polish=Polish(polished))
     found = []
     for seed in range(arguments.filter_seed, arguments.filter_seed + 2):
         if name in replay_logs.PEERS:
@@ -325,10 +325,10 @@ def filter_errors(arguments: argparse.Namespace, name: str, polished: bool) -> n
             found.append([figures["position_mean_m"], figures["yaw_mean_deg"]])
             continue
         grid_map, frames = drives.drive(name, arguments.lidar, seed, max_scans=200)
-        mcl = GlassMcl(settings, grid_map, np.random.default_rng(seed))
-        mcl.set_pose(frames[0].map_from_base, np.diag([0.1, 0.1, 0.05]) ** 2)
+        localizer = Localizer(settings, grid_map, np.random.default_rng(seed))
+        localizer.set_pose(frames[0].map_from_base, np.diag([0.1, 0.1, 0.05]) ** 2)
         off = np.array(
-            [mcl.update(frame.scan, frame.odom_from_base).map_from_base - frame.map_from_base for frame in frames]
+            [localizer.update(frame.scan, frame.odom_from_base).map_from_base - frame.map_from_base for frame in frames]
         )
         found.append([np.hypot(off[:, 0], off[:, 1]).mean(), np.degrees(np.abs(angles.wrap(off[:, 2]))).mean()])
     return np.mean(found, axis=0)

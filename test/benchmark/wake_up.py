@@ -38,8 +38,8 @@ from glass_nav.driving.route import RoutePlanner
 from glass_nav.driving.route_follower import FollowerParams
 from glass_nav.driving.tasks import EdgeTask, GoTask, Moment, Task
 from glass_nav.geometry import angles, se2
-from glass_nav.localization.localizer import GlassMcl
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer import Localizer
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.hypotheses.scan_explanation import ScanExplanation
 from glass_nav.simulation import lidar, shipped_buildings, start_place
 from glass_nav.simulation.simulation import Frame, Simulation
@@ -216,7 +216,7 @@ class Trial:
 
     def tour(self) -> Dict[str, Any]:
         """To some nodes, while the filter tracks."""
-        mcl = GlassMcl(GlassMclParams(), self.grid_map, self.rng)
+        mcl = Localizer(LocalizerParams(), self.grid_map, self.rng)
         assert self.map_from_odom is not None
         mcl.set_pose(se2.compose(self.map_from_odom, self.simulation.reading.odom_from_base), START_COVARIANCE)
         planner = RoutePlanner(self.atlas, self.limits, self.grid_map)

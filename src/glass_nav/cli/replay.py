@@ -20,7 +20,7 @@ from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.evaluation.metrics.thresholds import Threshold
 from glass_nav.evaluation.plots import run_pictures
 from glass_nav.localization.initial_pose import StartPose
-from glass_nav.localization.localizer import Estimate, GlassMcl
+from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.recording.log_file import open_log
 from glass_nav.recording.recording import LogOptions, Recording, Step
 from glass_nav.replay import replay_bag, replay_params, replay_run, replay_topology
@@ -169,7 +169,7 @@ def main(arguments: argparse.Namespace) -> bool:
         RecordingError, MapError, AtlasError, ParamError, ValueError, OSError: bad input; one line.
     """
     ready = prepare(arguments)
-    recording, mcl, grid_map = ready.recording, ready.mcl, ready.grid_map
+    recording, localizer, grid_map = ready.recording, ready.localizer, ready.grid_map
     watch = (
         None
         if arguments.topology is None
@@ -184,7 +184,9 @@ def main(arguments: argparse.Namespace) -> bool:
             listeners: List[Listener] = [] if watch is None else [watch.listen]
             if arguments.bag is not None:
                 arguments.bag.parent.mkdir(parents=True, exist_ok=True)
-                listeners.append(stack.enter_context(replay_bag.listener(arguments.bag, recording, mcl, grid_map)))
+                listeners.append(
+                    stack.enter_context(replay_bag.listener(arguments.bag, recording, localizer, grid_map))
+                )
             result = ready.run(progress.step, _all_of(listeners))
     finally:
         progress.finish()
@@ -195,7 +197,7 @@ def main(arguments: argparse.Namespace) -> bool:
         "map": str(arguments.map),
         "start": ready.origin,
         "notes": ready.notes,
-        "params": params.as_mapping(ready.settings.mcl),
+        "params": params.as_mapping(ready.settings.localizer),
         "versions": versions(),
     }
     if watch is not None and topology is not None:
@@ -209,7 +211,7 @@ def main(arguments: argparse.Namespace) -> bool:
             recording.name,
         )
     replay_result.write(result, arguments.out, about)
-    glass = GridMap(mcl.glass_map.occupancy(), grid_map.resolution_m, grid_map.map_from_grid)
+    glass = GridMap(localizer.glass_map.occupancy(), grid_map.resolution_m, grid_map.map_from_grid)
     map_file.save(glass, arguments.out / "glass_map.yaml", image_suffix=".png")
     if not arguments.no_picture:
         run_pictures.draw_trajectory(arguments.out / "trajectory.png", image, result, recording.name)
@@ -233,7 +235,7 @@ class Prepared:
     settings: ReplayParams
     grid_map: GridMap
     recording: Recording
-    mcl: GlassMcl
+    localizer: Localizer
     start: Callable[[int], None]  # see replay_run.run()
     origin: str  # where the robot starts, in words
     notes: List[str]  # what was chosen or found odd
@@ -255,7 +257,7 @@ class Prepared:
         Raises:
             RecordingError: not one scan of the log can be used.
         """
-        return replay_run.run(self.recording, self.mcl, self.start, self.seed, self.window, step_done, listen)
+        return replay_run.run(self.recording, self.localizer, self.start, self.seed, self.window, step_done, listen)
 
 
 def prepare(arguments: argparse.Namespace) -> Prepared:
@@ -267,14 +269,14 @@ def prepare(arguments: argparse.Namespace) -> Prepared:
     settings, unused = (ReplayParams(), []) if arguments.params is None else replay_params.load(arguments.params)
     grid_map = map_file.load(arguments.map)
     recording = open_recording(arguments, settings)
-    mcl = GlassMcl(settings.mcl, grid_map, np.random.default_rng(arguments.seed))
-    start, origin = _start(mcl, recording, arguments, settings.start)
+    localizer = Localizer(settings.localizer, grid_map, np.random.default_rng(arguments.seed))
+    start, origin = _start(localizer, recording, arguments, settings.start)
     unused_note = [f"parameters that only a node uses: {', '.join(unused)}"] if unused else []
     return Prepared(
         settings,
         grid_map,
         recording,
-        mcl,
+        localizer,
         start,
         origin,
         [*recording.notes, *unused_note, f"start: {origin}"],
@@ -394,18 +396,20 @@ def _log_options(arguments: argparse.Namespace, settings: ReplayParams) -> LogOp
 
 
 def _start(
-    mcl: GlassMcl, recording: Recording, arguments: argparse.Namespace, defaults: StartPose
+    localizer: Localizer, recording: Recording, arguments: argparse.Namespace, defaults: StartPose
 ) -> Tuple[Callable[[int], None], str]:
     """What places the particles at the first scan, and a text that says where."""
     covariance = defaults.covariance if arguments.initial_cov is None else np.diag(arguments.initial_cov)
     truth = recording.ground_truth
     if arguments.everywhere:
-        return lambda stamp_ns: mcl.scatter(), "anywhere in the map"
+        return lambda stamp_ns: localizer.scatter(), "anywhere in the map"
     if arguments.initial_pose is not None:
-        return lambda stamp_ns: mcl.set_pose(np.array(arguments.initial_pose), covariance), "--initial-pose"
+        return lambda stamp_ns: localizer.set_pose(np.array(arguments.initial_pose), covariance), "--initial-pose"
     if truth is not None and len(truth):
-        return lambda stamp_ns: mcl.set_pose(truth.at(np.int64(stamp_ns)), covariance), "the ground truth's first pose"
-    return lambda stamp_ns: mcl.set_pose(defaults.pose, covariance), "initial_pose_* of the parameters"
+        return lambda stamp_ns: localizer.set_pose(
+            truth.at(np.int64(stamp_ns)), covariance
+        ), "the ground truth's first pose"
+    return lambda stamp_ns: localizer.set_pose(defaults.pose, covariance), "initial_pose_* of the parameters"
 
 
 def _all_of(listeners: List[Listener]) -> Listener:

@@ -2,7 +2,7 @@
 
 The filter of Thrun, Burgard, Fox, Probabilistic Robotics (2005), ch. 8, with the sensor model of the
 seed document glass_localization.txt: decide beam by beam what the beam met, then weigh the particles by
-the beams that are understood. GlassMcl.update() reads as the document does.
+the beams that are understood. Localizer.update() reads as the document does.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from glass_nav.localization.beam_classification.range_residuals import RangeResi
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
 from glass_nav.localization.integrity import pose_state
 from glass_nav.localization.integrity.kidnap_detector import KidnapDetector
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.particle_filter import importance_weights, motion, pose_estimate, proposal, resampling
 from glass_nav.localization.particle_filter.scan_registration import ScanRegistration
 from glass_nav.localization.segments.segment_polish import SegmentPolish
@@ -87,10 +87,10 @@ class _MadeOnce:
         return self._matcher
 
 
-class GlassMcl:
+class Localizer:
     """Monte Carlo localization that decides beam by beam what the beam met."""
 
-    def __init__(self, params: GlassMclParams, grid_map: GridMap, rng: np.random.Generator) -> None:
+    def __init__(self, params: LocalizerParams, grid_map: GridMap, rng: np.random.Generator) -> None:
         """Starts with nothing known: call set_pose() or scatter() before update().
 
         Args:
@@ -129,7 +129,7 @@ class GlassMcl:
         self._polish = SegmentPolish(grid_map) if self._params.polish.polish_with_segments else None
         self._up_to_date = set()
 
-    def reconfigure(self, params: GlassMclParams) -> None:
+    def reconfigure(self, params: LocalizerParams) -> None:
         """Other parameters from the next scan on; the particles, the glass map and what the filter learnt stay."""
         if params.schedule.raycast_threads != self._params.schedule.raycast_threads:
             self._caster = RayCaster(self._grid_map, threads=params.schedule.raycast_threads)

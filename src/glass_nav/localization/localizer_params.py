@@ -57,7 +57,7 @@ class LaserLimits:
 
 
 @dataclass(frozen=True)
-class GlassMclParams:
+class LocalizerParams:
     """All parameters of the filter, a struct per model."""
 
     schedule: Schedule = field(default_factory=Schedule)

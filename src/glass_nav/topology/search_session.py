@@ -263,11 +263,13 @@ class SearchSession:
         """
         return [self._load(), self._await_meetpoint("the atlas was reloaded")]
 
-    def time_jumped_back(self, by_s: float) -> List[Decision]:
-        """The clock was set back, as when a recording starts again."""
-        if self._localizer is None:
-            return []
-        return [self._await_meetpoint(f"time jumped back by {by_s:.3f} s")]
+    def time_jumped_back(self, jump: str) -> List[Decision]:
+        """The clock was set back, as when a recording starts again.
+
+        Args:
+            jump: in words, by how much.
+        """
+        return [] if self._localizer is None else [self._await_meetpoint(jump)]
 
     # -- how an event is decided
 

@@ -339,7 +339,7 @@ def test_a_search_that_is_forgotten_begins_anew_with_the_next_meetpoint() -> Non
     for begin, why in (
         (session.restart, "restarted by service"),
         (session.reload_atlas, "the atlas was reloaded"),
-        (lambda: session.time_jumped_back(3.25), "time jumped back by 3.250 s"),
+        (lambda: session.time_jumped_back("time jumped back by 3.250 s"), "time jumped back by 3.250 s"),
     ):
         session.meetpoint(meetpoint())
         session.meetpoint(meetpoint(T_0 + S))  # waits for its edge, in vain
@@ -377,7 +377,7 @@ def test_an_atlas_of_another_map_is_refused_until_its_map_comes() -> None:
     assert session.status.reason.startswith("the atlas was made from another map than that of topic /map: ")
     assert only(decisions, GoalEnd).reason == session.status.reason
 
-    assert session.time_jumped_back(9.0) == []
+    assert session.time_jumped_back("time jumped back by 9.000 s") == []
     assert texts(session.meetpoint(meetpoint())) == ["meetpoint not used: the search is NO_ATLAS"]
     with pytest.raises(ValueError, match="the atlas was made from another map"):
         session.restart()

@@ -16,7 +16,7 @@ import numpy as np
 
 from glass_nav import amcl_parameters, params
 from glass_nav.localization.initial_pose import StartPose
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.saved_pose import PoseFile
 from glass_nav.params import ParamError
 from glass_nav.sensing.deskew import Deskew
@@ -93,7 +93,7 @@ class LocalizationParams:
     start: StartPose = field(default_factory=StartPose)
     pose_file: PoseFile = field(default_factory=PoseFile)
     deskew: Deskew = field(default_factory=Deskew)
-    mcl: GlassMclParams = field(default_factory=GlassMclParams)
+    localizer: LocalizerParams = field(default_factory=LocalizerParams)
 
 
 # Of the node's own parameters, those that may change while it runs; of the filter's, all.
@@ -116,7 +116,7 @@ CHANGEABLE = (
 def changeable(p: LocalizationParams) -> Dict[str, Any]:
     """Name -> value of the parameters that may change while the node runs."""
     own = params.as_mapping(p.node)
-    return {**params.as_mapping(p.mcl), **params.as_mapping(p.deskew), **{name: own[name] for name in CHANGEABLE}}
+    return {**params.as_mapping(p.localizer), **params.as_mapping(p.deskew), **{name: own[name] for name in CHANGEABLE}}
 
 
 def changed(p: LocalizationParams, values: Mapping[str, Any], owner: str) -> LocalizationParams:

@@ -44,9 +44,10 @@ from glass_nav.msg import (
     TopologyStatus,
     TurnChoice,
 )
-from glass_nav.ros import action_status, conversions, shutdown
+from glass_nav.ros import action_status, conversions, mailbox, shutdown
 from glass_nav.ros.log_throttle import LogThrottle
-from glass_nav.ros.mailbox import Errand, Mailbox
+from glass_nav.ros.loop_clock import LoopClock
+from glass_nav.ros.mailbox import Mailbox
 from glass_nav.ros.topology import topology_displays, topology_messages
 from glass_nav.ros.topology.scan_memory import ScanMemory
 from glass_nav.ros.topology.topology_params import TopologyParams
@@ -56,8 +57,7 @@ from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.topology.observations import ObservationError
 from glass_nav.topology.search_session import Decision, GoalOutcome, SearchSession, SearchStatus
 
-TIME_JUMP_S = 0.5  # a clock that goes back by less is noise between machines
-ERRAND_TIMEOUT_S = 30.0
+SERVICE_TIMEOUT_S = 30.0
 LOG_PERIOD_S = 5.0  # of lines that may come with every report
 LOGGERS = {logging.INFO: rospy.loginfo, logging.WARNING: rospy.logwarn, logging.ERROR: rospy.logerr}
 
@@ -74,7 +74,7 @@ class TopologyNode:
         self._atlas_markers: List[Marker] = []  # of that atlas
         self._log = LogThrottle()
         self._inbox = Mailbox(reports=100, commands=100)  # reports: meetpoints and traversals, in order
-        self._now_s = rospy.get_time()
+        self._clock = LoopClock()
 
         self._turns = rospy.Publisher("turn_choice", TurnChoice, queue_size=5)
         self._poses = rospy.Publisher("initialpose", PoseWithCovarianceStamped, queue_size=2)
@@ -93,8 +93,8 @@ class TopologyNode:
             search_session.LogLine: self._log_line,
         }
         self._carry_out(self._session.start())
-        rospy.Service("~restart", Trigger, self._errand(self._restart))
-        rospy.Service("~reload_atlas", Trigger, self._errand(self._reload_atlas))
+        rospy.Service("~restart", Trigger, self._service(self._restart))
+        rospy.Service("~reload_atlas", Trigger, self._service(self._reload_atlas))
         action_status.start(self._server)
         # Subscribers last: they may fire at once.
         for topic, kind, take in (
@@ -115,9 +115,9 @@ class TopologyNode:
         """The only thread that touches the session; returns when ROS shuts down or ending is set."""
         while not (rospy.is_shutdown() or ending.is_set()):
             mail = self._inbox.take(timeout_s=0.1)
-            before_s, self._now_s = self._now_s, rospy.get_time()
-            if self._now_s < before_s - TIME_JUMP_S:
-                self._carry_out(self._session.time_jumped_back(before_s - self._now_s))
+            jump = self._clock.tick()
+            if jump is not None:
+                self._carry_out(self._session.time_jumped_back(jump))
             for work in [*mail["commands"], *mail["reports"]]:
                 work()
 
@@ -170,18 +170,15 @@ class TopologyNode:
         if self._server.is_preempt_requested() and not self._server.is_new_goal_available():
             self._carry_out(self._session.preempt())
 
-    def _errand(self, work: Callable[[], str]) -> Callable[[TriggerRequest], TriggerResponse]:
+    def _service(self, work: Callable[[], str]) -> Callable[[TriggerRequest], TriggerResponse]:
         """A service that has the run loop do something and gives back what it says."""
 
         def serve(_request: TriggerRequest) -> TriggerResponse:
-            said = []
-            errand = Errand(lambda: said.append(work()))
-            self._inbox.put("commands", errand.run)
             try:
-                errand.wait(ERRAND_TIMEOUT_S)
+                message = mailbox.outcome(self._inbox.submit("commands", work), SERVICE_TIMEOUT_S)
             except (ValueError, TimeoutError) as err:
                 return TriggerResponse(success=False, message=str(err))
-            return TriggerResponse(success=True, message=said[0])
+            return TriggerResponse(success=True, message=message)
 
         return serve
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from buildings import CORRIDOR, L_ROOM, SECOND_NS, loop_drive, odometry, off
 
-from glass_nav.localization.localizer import GlassMcl
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer import Localizer
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.particle_filter.pose_estimate import PoseEstimate
 from glass_nav.localization.segments.segment_polish import Polish, SegmentPolish
 
@@ -58,12 +58,13 @@ def test_along_a_corridor_the_pose_stays():
 def test_the_filter_polishes_when_it_is_told_to():
     """The same drive: as long as it is off the poses are those of the filter without it; then they are others."""
     plain, polished = (
-        GlassMcl(GlassMclParams(polish=Polish(on)), L_ROOM.grid_map(), np.random.default_rng(3)) for on in (False, True)
+        Localizer(LocalizerParams(polish=Polish(on)), L_ROOM.grid_map(), np.random.default_rng(3))
+        for on in (False, True)
     )
-    off_again = GlassMcl(GlassMclParams(polish=Polish(True)), L_ROOM.grid_map(), np.random.default_rng(3))
-    off_again.reconfigure(GlassMclParams())
-    on_again = GlassMcl(GlassMclParams(), L_ROOM.grid_map(), np.random.default_rng(3))
-    on_again.reconfigure(GlassMclParams(polish=Polish(True)))
+    off_again = Localizer(LocalizerParams(polish=Polish(True)), L_ROOM.grid_map(), np.random.default_rng(3))
+    off_again.reconfigure(LocalizerParams())
+    on_again = Localizer(LocalizerParams(), L_ROOM.grid_map(), np.random.default_rng(3))
+    on_again.reconfigure(LocalizerParams(polish=Polish(True)))
     drive = loop_drive(8)
     wheels = odometry(drive, np.random.default_rng(4))
     filters = (plain, polished, off_again, on_again)
@@ -81,8 +82,8 @@ def test_the_filter_polishes_when_it_is_told_to():
 
 
 def test_another_map_has_other_walls():
-    mcl = GlassMcl(GlassMclParams(polish=Polish(True)), CORRIDOR.grid_map(), np.random.default_rng(0))
-    mcl.set_map(L_ROOM.grid_map())
-    mcl.set_pose(TRUE + [0.03, 0.0, 0.0], np.diag([0.03, 0.03, 0.01]) ** 2)
-    found = mcl.update(L_ROOM.scan(TRUE, rng=np.random.default_rng(0)), np.zeros(3)).map_from_base
+    localizer = Localizer(LocalizerParams(polish=Polish(True)), CORRIDOR.grid_map(), np.random.default_rng(0))
+    localizer.set_map(L_ROOM.grid_map())
+    localizer.set_pose(TRUE + [0.03, 0.0, 0.0], np.diag([0.03, 0.03, 0.01]) ** 2)
+    found = localizer.update(L_ROOM.scan(TRUE, rng=np.random.default_rng(0)), np.zeros(3)).map_from_base
     assert off(found, TRUE)[0] < 0.01

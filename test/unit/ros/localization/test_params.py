@@ -131,7 +131,7 @@ def test_names_that_nobody_knows_are_taken_off_and_said():
 def test_all_parameters_of_the_filter_may_change_and_no_frame():
     p = LocalizationParams()
     values = changeable(p)
-    assert set(as_mapping(p.mcl)) <= set(values)
+    assert set(as_mapping(p.localizer)) <= set(values)
     assert {"transform_tolerance", "tf_broadcast"} <= set(values)
     assert not {"odom_frame_id", "scan_topics", "random_seed", "initial_pose_x"} & set(values)
 
@@ -139,8 +139,8 @@ def test_all_parameters_of_the_filter_may_change_and_no_frame():
 def test_changed_values_reach_their_struct_and_the_rest_stays():
     before, _ = localization_params({"odom_frame_id": "o", "max_particles": 100}, "/n")
     after = changed(before, {"laser_z_hit": 0.5, "transform_tolerance": 0.3}, "/n")
-    assert (after.mcl.mixture.laser_z_hit, after.node.transform_tolerance) == (0.5, 0.3)
-    assert (after.node.odom_frame_id, after.mcl.count) == ("o", before.mcl.count)
+    assert (after.localizer.mixture.laser_z_hit, after.node.transform_tolerance) == (0.5, 0.3)
+    assert (after.node.odom_frame_id, after.localizer.count) == ("o", before.localizer.count)
     with pytest.raises(ParamError, match="/n: ~laser_z_hit must be > 0, got 0.0"):
         changed(before, {"laser_z_hit": 0.0}, "/n")
 
