@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from dataclasses import dataclass
 from enum import Enum
@@ -12,6 +11,7 @@ import numpy as np
 
 from glass_nav.driving.edge_driver import Arrival
 from glass_nav.driving.tasks import Ending
+from glass_nav.log_line import LogLine
 from glass_nav.vocabulary import DriverPhase
 
 
@@ -78,15 +78,6 @@ class GoalEnd:
 @dataclass(frozen=True)
 class SearchRestart:
     """The search is to begin anew: it cannot follow the robot to where it stands."""
-
-
-@dataclass(frozen=True)
-class LogLine:
-    """To be logged."""
-
-    text: str
-    level: int = logging.INFO
-    often: bool = False  # may come at the rate of a topic: limit it
 
 
 Decision = Union[Command, TraversalReport, MeetpointReport, DriveStatus, Feedback, GoalEnd, SearchRestart, LogLine]

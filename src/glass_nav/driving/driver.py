@@ -22,7 +22,6 @@ from glass_nav.driving.decisions import (
     DriveStatus,
     Feedback,
     GoalEnd,
-    LogLine,
     MeetpointReport,
     SearchRestart,
     TraversalReport,
@@ -35,6 +34,8 @@ from glass_nav.driving.meetpoint_stay import MeetpointStay
 from glass_nav.driving.place_goals import PlaceGoal, PlaceTasks, TaskTo
 from glass_nav.driving.seek_policy import SeekPolicy
 from glass_nav.driving.tasks import EdgeTask, Ending, GoTask, Moment, Task
+from glass_nav.health import Health, Level
+from glass_nav.log_line import LogLine
 from glass_nav.sensing.scan import Scan
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.vocabulary import DriverPhase, LocalizationState, Outcome, SearchState
@@ -43,6 +44,11 @@ from glass_nav.world.grid_map import GridMap
 QUIET_S = 0.5  # zeros are sent for so long after a task, then nothing: others may steer
 MAX_STEP_S = 0.2  # a control step that came later counts as one of so long
 STATUS_PERIOD_S = 0.5
+_LEVELS = {
+    DriverPhase.FAILED: Level.ERROR,
+    DriverPhase.HALTED: Level.ERROR,
+    DriverPhase.RECOVERING: Level.WARN,
+}
 IN_SEARCH = (SearchState.SEARCHING, SearchState.TENTATIVE)
 
 
@@ -100,9 +106,11 @@ class Driver:
         return DriveStatus(phase, reason, task, self._job.travelled_m, self._job.task.remaining_m, self._inputs.scan_ns)
 
     @property
-    def localization(self) -> Optional[LocalizationState]:
-        """As it was heard last; None: not yet."""
-        return self._inputs.localization
+    def health(self) -> Health:
+        """For its operators."""
+        phase, reason, task = self._said
+        values = {"task": task, "localization": self._inputs.localization or ""}
+        return Health(_LEVELS.get(phase, Level.OK), f"{phase}: {reason}", values)
 
     @property
     def edge_driver(self) -> EdgeDriver:

@@ -18,16 +18,15 @@ Parameters: DriverParams, read once; explained in config/driver.yaml.
 
 from __future__ import annotations
 
-import logging
 import threading
 import time
+from dataclasses import replace
 from typing import Any, Callable, Dict, List, Optional
 
 import actionlib
 import numpy as np
 import rospy
 import tf2_ros
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan
@@ -39,6 +38,7 @@ from glass_nav.driving import decisions
 from glass_nav.driving.decisions import Action, Decision
 from glass_nav.driving.driver import Driver
 from glass_nav.driving.input_watch import Odometry
+from glass_nav.log_line import LogLine
 from glass_nav.msg import (
     DriverStatus,
     EdgeTraversal,
@@ -52,6 +52,7 @@ from glass_nav.msg import (
     TurnChoice,
 )
 from glass_nav.ros import action_status, conversions, shutdown
+from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.driver import driver_displays, driver_messages
 from glass_nav.ros.driver.driver_params import MOVE_BASE, DriverParams
 from glass_nav.ros.driver.move_base_task import MoveBase, MoveBaseTask
@@ -63,16 +64,11 @@ from glass_nav.ros.scan_input import STALE_SCANS, ScanInput
 from glass_nav.sensing.scan import ScanError
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import AtlasError
-from glass_nav.vocabulary import DriverPhase, LocalizationState, Outcome
+from glass_nav.vocabulary import LocalizationState, Outcome
 
 MARKERS_PERIOD_S = 0.5
 RESTART_WAIT_S = 2.0  # for the service, by the wall clock
 SILENCE_S = 5.0  # without any scan for so long, the log says why
-LEVELS = {
-    DriverPhase.FAILED: DiagnosticStatus.ERROR,
-    DriverPhase.HALTED: DiagnosticStatus.ERROR,
-    DriverPhase.RECOVERING: DiagnosticStatus.WARN,
-}
 
 
 class DriverNode:
@@ -103,7 +99,7 @@ class DriverNode:
             decisions.Feedback: self._send_feedback,
             decisions.GoalEnd: self._end_goal,
             decisions.SearchRestart: self._restart_search,
-            decisions.LogLine: self._write,
+            LogLine: self._log.write,
         }
         self._tf = tf2_ros.Buffer()
         self._scans = ScanInput(self._p.of_scans("scan"), p.deskew, self._tf, self._log)
@@ -113,7 +109,7 @@ class DriverNode:
         self._traversals = rospy.Publisher("edge_traversal", EdgeTraversal, queue_size=5)
         self._status = rospy.Publisher("~status", DriverStatus, queue_size=10, latch=True)
         self._markers = rospy.Publisher("~markers", MarkerArray, queue_size=2)
-        self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=2)
+        self._diagnostics = Diagnostics("driver")
         self._servers = {
             Action.TRAVERSE_EDGE: self._action(
                 Action.TRAVERSE_EDGE, TraverseEdgeAction, lambda goal: self._driver.traverse_edge(goal.edge)
@@ -290,12 +286,6 @@ class DriverNode:
     def _restart_search(self, _request: decisions.SearchRestart) -> None:
         threading.Thread(target=_call_restart_search, daemon=True).start()
 
-    def _write(self, line: decisions.LogLine) -> None:
-        if line.often:
-            self._log.warn(line.text)
-        else:
-            (rospy.logwarn if line.level >= logging.WARNING else rospy.loginfo)(line.text)
-
     # -- what people see
 
     def _show(self) -> None:
@@ -323,25 +313,9 @@ class DriverNode:
         self._next_report_s = time.monotonic() + 1.0
         if self._clock.now_s - self._scans.last_arrival_s > SILENCE_S:
             self._log.warn(self._scans.silence(self._clock.now_s), 15.0)
-        status = self._driver.status
-        values = {
-            "task": status.task,
-            "localization": self._driver.localization or "",
-            **{f"scans {name}": count for name, count in vars(self._scans.counts).items()},
-        }
-        msg = DiagnosticArray(
-            status=[
-                DiagnosticStatus(
-                    level=LEVELS.get(status.phase, DiagnosticStatus.OK),
-                    name=f"{rospy.get_name().strip('/')}: driver",
-                    message=f"{status.phase}: {status.reason}",
-                    hardware_id="none",
-                    values=[KeyValue(key, str(value)) for key, value in values.items()],
-                )
-            ]
-        )
-        msg.header.stamp = rospy.Time.now()  # of the report, not of the data
-        self._diagnostics.publish(msg)
+        health, counts = self._driver.health, vars(self._scans.counts)
+        values = {**health.values, **{f"scans {name}": count for name, count in counts.items()}}
+        self._diagnostics.publish({"driver": replace(health, values=values)})
 
 
 def _call_restart_search() -> None:
