@@ -35,7 +35,6 @@ from glass_nav.localization.integrity.kidnap_detector import KidnapDetector
 from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.particle_filter import importance_weights, motion, pose_estimate, proposal, resampling
 from glass_nav.localization.particle_filter.scan_registration import ScanRegistration
-from glass_nav.localization.segments.segment_polish import SegmentPolish
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.raycast import RayCaster
@@ -126,7 +125,6 @@ class Localizer:
             self._search = self._new_search() if grid_map.free.any() else None
         self._residuals = RangeResiduals(0.5, self._params.mixture.laser_sigma_hit)
         self._glass_map = GlassMap(grid_map, self._params.glass)
-        self._polish = SegmentPolish(grid_map) if self._params.polish.polish_with_segments else None
         self._up_to_date = set()
 
     def reconfigure(self, params: LocalizerParams) -> None:
@@ -138,10 +136,6 @@ class Localizer:
         self._watch.decide_by(params.search)
         if self._search is not None:
             self._search.decide_by(params.search)
-        if not params.polish.polish_with_segments:
-            self._polish = None
-        elif self._polish is None:
-            self._polish = SegmentPolish(self._grid_map)
         self._params = params
 
     @property
@@ -269,9 +263,6 @@ class Localizer:
         """The scan places the particles, and the best cluster of them is the pose."""
         cases = self._correct(scan, predicted, odom_from_base)
         self._best = pose_estimate.of(self._particles, self._weights)
-        if self._polish is not None and self._is_one_place(self._best):
-            ends_m = scan.points_in_base()[importance_weights.known_ends(cases.case)]
-            self._best = replace(self._best, map_from_base=self._polish.pose(self._best, ends_m))
         self._resample()
         return cases
 

@@ -16,7 +16,6 @@ from glass_nav.localization.particle_filter.importance_weights import BeamMixtur
 from glass_nav.localization.particle_filter.motion import OdometryNoise
 from glass_nav.localization.particle_filter.proposal import Proposal
 from glass_nav.localization.particle_filter.resampling import ParticleCount
-from glass_nav.localization.segments.segment_polish import Polish
 
 
 @dataclass(frozen=True)
@@ -72,4 +71,3 @@ class LocalizerParams:
     quality: QualityLimits = field(default_factory=QualityLimits)
     search: SearchParams = field(default_factory=SearchParams)
     bearings: BearingMixture = field(default_factory=BearingMixture)
-    polish: Polish = field(default_factory=Polish)
