@@ -24,7 +24,7 @@ struct Chances {
   double depth_share;   // of the thickness of a wall: where in it beams end
   double sigma_m;       // around that, across the wall
   double gate_m;        // farther across from a reference a beam does not belong to it
-  double least_cos;     // a surface seen flatter counts as one seen like that
+  double min_cos;     // a surface seen flatter counts as one seen like that
   double temper;        // of a sample's evidence
 };
 
