@@ -28,8 +28,8 @@ sys.path.append(str(Path(__file__).resolve().parent))
 import drives
 from glass_nav.geometry import angles
 from glass_nav.geometry.trajectory import Trajectory
-from glass_nav.localization.localizer import GlassMcl
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer import Localizer
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.sensing import deskew
 from glass_nav.simulation import building_file, building_map, lidar
 from glass_nav.simulation.path_follower import FollowerParams
@@ -52,13 +52,13 @@ def errors(grid_map: GridMap, frames: List[Frame], straighten: bool, seed: int) 
     """(S, 2) of position [m] and heading [rad]."""
     readings = {each.stamp_ns: each.odom_from_base for frame in frames for each in frame.odometry}
     odometry = Trajectory(np.array(sorted(readings)), np.array([readings[stamp_ns] for stamp_ns in sorted(readings)]))
-    mcl = GlassMcl(GlassMclParams(), grid_map, np.random.default_rng(seed))
-    mcl.set_pose(frames[0].map_from_base, START_COVARIANCE)
+    localizer = Localizer(LocalizerParams(), grid_map, np.random.default_rng(seed))
+    localizer.set_pose(frames[0].map_from_base, START_COVARIANCE)
     off = []
     for frame in frames:
         turns = straighten and frame.scan.time_increment_s > 0.0
         scan = deskew.straightened(frame.scan, odometry) if turns else frame.scan
-        error = mcl.update(scan, frame.odom_from_base).map_from_base - frame.map_from_base
+        error = localizer.update(scan, frame.odom_from_base).map_from_base - frame.map_from_base
         off.append((np.hypot(error[0], error[1]), angles.wrap(error[2])))
     return np.array(off)
 

@@ -40,7 +40,7 @@ from glass_nav.evaluation.metrics import case_scores, pose_errors, replay_result
 from glass_nav.evaluation.metrics.case_scores import CaseScores, SurfaceScores
 from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.localization.localizer import Estimate
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer_params import LocalizerParams
 
 START_DEVIATION = np.array([0.1, 0.1, np.radians(3.0)])  # of the pose the localizers are told, and what they are told
 CASE_NAMES = ("uncertain", "diffuse", "specular", "1st penetration", "2nd penetration")
@@ -56,7 +56,7 @@ class Job(NamedTuple):
     changed: float
     max_scans: Optional[int]
     localizers: Tuple[str, ...]
-    settings: GlassMclParams
+    settings: LocalizerParams
 
 
 class Run(NamedTuple):
@@ -338,9 +338,9 @@ def baselines_from(path: Path, jobs: Sequence[Job]) -> List[Run]:
     return runs
 
 
-def settings_from(assignments: Sequence[str]) -> GlassMclParams:
+def settings_from(assignments: Sequence[str]) -> LocalizerParams:
     pairs = (assignment.partition("=") for assignment in assignments)
-    return params.load(GlassMclParams, {name: yaml.safe_load(value) for name, _, value in pairs}, "glass_buildings")
+    return params.load(LocalizerParams, {name: yaml.safe_load(value) for name, _, value in pairs}, "glass_buildings")
 
 
 def main() -> int:

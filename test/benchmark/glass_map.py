@@ -26,8 +26,8 @@ import numpy as np
 from glass_nav import params
 from glass_nav.replay import replay_run
 from glass_nav.evaluation.metrics import glass_agreement
-from glass_nav.localization.localizer import GlassMcl
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer import Localizer
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.recording.log_file import open_log
 from glass_nav.recording.recording import LogOptions
 from glass_nav.world import map_file
@@ -37,15 +37,17 @@ DATA = Path(os.environ.get("GLASS_NAV_DATA", Path(__file__).resolve().parents[3]
 COVARIANCE = np.diag([0.25, 0.25, (np.pi / 12.0) ** 2])  # AMCL's default
 
 
-def learnt(name: str, seed: int, settings: GlassMclParams) -> "tuple[GridMap, np.ndarray, Any]":
+def learnt(name: str, seed: int, settings: LocalizerParams) -> "tuple[GridMap, np.ndarray, Any]":
     """The map of a log, its glass map (H, W) [percent] after one replay, and the result."""
     folder = DATA / "logs" / name
     recording, grid_map = open_log(folder / f"{name}.bag", LogOptions()), map_file.load(folder / "map.yaml")
     truth = recording.ground_truth
     assert truth is not None
-    mcl = GlassMcl(settings, grid_map, np.random.default_rng(seed))
-    result = replay_run.run(recording, mcl, lambda stamp: mcl.set_pose(truth.at(np.int64(stamp)), COVARIANCE), seed)
-    return grid_map, mcl.glass_map.occupancy(), result
+    localizer = Localizer(settings, grid_map, np.random.default_rng(seed))
+    result = replay_run.run(
+        recording, localizer, lambda stamp: localizer.set_pose(truth.at(np.int64(stamp)), COVARIANCE), seed
+    )
+    return grid_map, localizer.glass_map.occupancy(), result
 
 
 def see_through(name: str) -> Optional[np.ndarray]:
@@ -95,7 +97,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, help="JSON")
     arguments = parser.parse_args()
     given = {name: json.loads(value) for name, _, value in (each.partition("=") for each in arguments.set)}
-    settings = params.load(GlassMclParams, given, "glass_map")
+    settings = params.load(LocalizerParams, given, "glass_map")
     rows: List[Dict[str, Any]] = []
     print(
         "| log | seed | glass cells | share of walls | seen through | precision | recall | case 3 | case 4 | case 2 "

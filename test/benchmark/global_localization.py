@@ -28,8 +28,8 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # a process a core: th
 import numpy as np
 
 import tracks
-from glass_nav.localization.localizer import GlassMcl
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer import Localizer
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.integrity.pose_state import LOCALIZED
 
 MAX_M = 60.0  # of a search
@@ -45,13 +45,13 @@ def find(track: tracks.Track, seed: int) -> Dict[str, Any]:
     """From anywhere."""
     rng = np.random.default_rng(seed)
     start = tracks.start_of(track, rng)
-    mcl = GlassMcl(GlassMclParams(), track.grid_map, rng)
-    mcl.scatter()
+    localizer = Localizer(LocalizerParams(), track.grid_map, rng)
+    localizer.scatter()
     found_m: Optional[float] = None
     wrong = right_now = False
     last_m = 0.0
     for way_m, moment in tracks.moments_of(track, start, MAX_M):
-        estimate = mcl.update(moment.scan, moment.odom_from_base)
+        estimate = localizer.update(moment.scan, moment.odom_from_base)
         right_now = tracks.is_right(estimate.map_from_base, moment.map_from_base)
         last_m = way_m
         if estimate.state == LOCALIZED:
@@ -73,15 +73,15 @@ def kidnap(track: tracks.Track, seed: int) -> Dict[str, Any]:
     """Carried away."""
     rng = np.random.default_rng(seed)
     moments, down = tracks.carried_away(track, rng, KNOWN_M)
-    mcl = GlassMcl(GlassMclParams(), track.grid_map, rng)
-    mcl.set_pose(moments[0].map_from_base, COVARIANCE)
-    before = [mcl.update(moment.scan, moment.odom_from_base).state for moment in moments[:down]]
+    localizer = Localizer(LocalizerParams(), track.grid_map, rng)
+    localizer.set_pose(moments[0].map_from_base, COVARIANCE)
+    before = [localizer.update(moment.scan, moment.odom_from_base).state for moment in moments[:down]]
     left_m: Optional[float] = None
     back_m: Optional[float] = None
     for way_m, moment in zip(tracks.ways(moments[down:]), moments[down:]):
         if way_m > BACK_M:
             break
-        estimate = mcl.update(moment.scan, moment.odom_from_base)
+        estimate = localizer.update(moment.scan, moment.odom_from_base)
         right = tracks.is_right(estimate.map_from_base, moment.map_from_base)
         if left_m is None and (estimate.state != LOCALIZED or right):
             left_m = float(way_m)
@@ -103,12 +103,12 @@ def elsewhere(track: tracks.Track, seed: int) -> Dict[str, Any]:
     others = [name for name in tracks.names() if name != track.name and not _same_house(name, track.name)]
     other = others[int(rng.integers(len(others)))]
     grid_map = tracks.load(other, 0).grid_map
-    mcl = GlassMcl(GlassMclParams(), grid_map, rng)
-    mcl.scatter()
+    localizer = Localizer(LocalizerParams(), grid_map, rng)
+    localizer.scatter()
     wrong_m: Optional[float] = None
     way_m = 0.0
     for way_m, moment in tracks.moments_of(track, tracks.start_of(track, rng), 20.0):
-        if mcl.update(moment.scan, moment.odom_from_base).state == LOCALIZED:
+        if localizer.update(moment.scan, moment.odom_from_base).state == LOCALIZED:
             wrong_m = way_m
             break
     return {"map": other, "wrong": wrong_m is not None, "wrong_m": wrong_m, "driven_m": way_m}

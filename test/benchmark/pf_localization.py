@@ -12,7 +12,7 @@ the clock, so its runs differ from one time to the next.
 The settings are those of the localization_demo.ini that comes with it: 40000 particles in the free cells of the whole
 map, KLD sampling from 150 to 40000 (bins of 0.1 m and 10 degrees, delta and epsilon 0.01), likelihood field (sigma
 0.2 m, every 20th beam), 0.1 m and 2 degrees of noise a step; --set changes them. It takes every scan that it is
-given, and gets those that GlassMcl takes: one after each 0.1 m or 0.1 rad. Needs apt's mrpt-apps, cmake and
+given, and gets those that Localizer takes: one after each 0.1 m or 0.1 rad. Needs apt's mrpt-apps, cmake and
 libmrpt-maps-dev; a small program compiled into .build writes the map and the log.
 """
 
@@ -34,7 +34,7 @@ import numpy as np
 
 import tracks
 from glass_nav.geometry import se2
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import GridMap
 from global_localization import MAX_M, count, median
@@ -184,8 +184,8 @@ def scan_numbers(scan: Scan, odom_from_base: np.ndarray) -> np.ndarray:
 
 
 def steps_of(track: tracks.Track, start: int) -> List[Step]:
-    """The scans that GlassMcl would take, each lidar's own."""
-    schedule = GlassMclParams().schedule
+    """The scans that Localizer would take, each lidar's own."""
+    schedule = LocalizerParams().schedule
     steps: List[Step] = []
     taken: List[str] = []
     odom_from_last: Optional[np.ndarray] = None

@@ -27,8 +27,8 @@ import numpy as np
 
 import global_localization
 import tracks
-from glass_nav.localization.localizer import GlassMcl
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer import Localizer
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.integrity.pose_state import LOCALIZED
 
 AFTER_M = 10.0  # driven after each beginning
@@ -46,32 +46,34 @@ class Told(NamedTuple):
 
 def carried(track: tracks.Track, rng: np.random.Generator) -> List[Told]:
     moments, down = tracks.carried_away(track, rng, global_localization.KNOWN_M)
-    mcl = GlassMcl(GlassMclParams(), track.grid_map, rng)
-    mcl.set_pose(moments[0].map_from_base, global_localization.COVARIANCE)
+    localizer = Localizer(LocalizerParams(), track.grid_map, rng)
+    localizer.set_pose(moments[0].map_from_base, global_localization.COVARIANCE)
     after = int(np.searchsorted(tracks.ways(moments[down:]), AFTER_M))
-    return _follow(mcl, moments[: down + after])
+    return _follow(localizer, moments[: down + after])
 
 
 def started_wrong(track: tracks.Track, rng: np.random.Generator) -> List[Told]:
-    mcl = GlassMcl(GlassMclParams(), track.grid_map, rng)
+    localizer = Localizer(LocalizerParams(), track.grid_map, rng)
     rows, columns = np.nonzero(track.grid_map.free)
     cell = int(rng.integers(len(rows)))
-    mcl.set_pose(np.append(track.grid_map.centres(rows[cell], columns[cell]), rng.uniform(-np.pi, np.pi)), WRONG_START)
+    localizer.set_pose(
+        np.append(track.grid_map.centres(rows[cell], columns[cell]), rng.uniform(-np.pi, np.pi)), WRONG_START
+    )
     start = tracks.start_of(track, rng)
-    return _follow(mcl, [moment for _, moment in tracks.moments_of(track, start, AFTER_M)])
+    return _follow(localizer, [moment for _, moment in tracks.moments_of(track, start, AFTER_M)])
 
 
 def without_guess(track: tracks.Track, rng: np.random.Generator) -> List[Told]:
-    mcl = GlassMcl(GlassMclParams(), track.grid_map, rng)
-    mcl.scatter()
+    localizer = Localizer(LocalizerParams(), track.grid_map, rng)
+    localizer.scatter()
     start = tracks.start_of(track, rng)
-    return _follow(mcl, [moment for _, moment in tracks.moments_of(track, start, AFTER_M)])
+    return _follow(localizer, [moment for _, moment in tracks.moments_of(track, start, AFTER_M)])
 
 
-def _follow(mcl: GlassMcl, moments: List[tracks.Moment]) -> List[Told]:
+def _follow(localizer: Localizer, moments: List[tracks.Moment]) -> List[Told]:
     told = []
     for moment in moments:
-        estimate = mcl.update(moment.scan, moment.odom_from_base)
+        estimate = localizer.update(moment.scan, moment.odom_from_base)
         if estimate.updated:
             told.append(
                 Told(

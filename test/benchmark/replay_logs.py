@@ -31,8 +31,8 @@ import yaml
 from glass_nav import params
 from glass_nav.replay import replay_run
 from glass_nav.evaluation.metrics import pose_errors
-from glass_nav.localization.localizer import GlassMcl
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer import Localizer
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.recording.log_file import open_log
 from glass_nav.recording.recording import LogOptions, Recording
 from glass_nav.world import map_file
@@ -80,14 +80,16 @@ def load(name: str, even: bool) -> Tuple[Recording, GridMap]:
     return open_log(log, LogOptions()).in_memory(), map_file.load(grid)
 
 
-def run(job: Tuple[str, int, GlassMclParams, bool]) -> Dict[str, Any]:
+def run(job: Tuple[str, int, LocalizerParams, bool]) -> Dict[str, Any]:
     """One log, one seed."""
     name, seed, settings, even = job
     recording, grid_map = load(name, even)
     truth = recording.ground_truth
     assert truth is not None
-    mcl = GlassMcl(settings, grid_map, np.random.default_rng(seed))
-    result = replay_run.run(recording, mcl, lambda stamp: mcl.set_pose(truth.at(np.int64(stamp)), COVARIANCE), seed)
+    localizer = Localizer(settings, grid_map, np.random.default_rng(seed))
+    result = replay_run.run(
+        recording, localizer, lambda stamp: localizer.set_pose(truth.at(np.int64(stamp)), COVARIANCE), seed
+    )
     figures = {"log": name, **result.metrics()}
     if even:
         errors = result.errors
@@ -119,21 +121,21 @@ HEADER = (
 )
 
 
-def settings_from(path: Optional[Path], assignments: List[str]) -> GlassMclParams:
+def settings_from(path: Optional[Path], assignments: List[str]) -> LocalizerParams:
     mapping: Dict[str, Any] = {}
     if path is not None:
         mapping.update(yaml.safe_load(path.read_text()) or {})
     for assignment in assignments:
         name, _, value = assignment.partition("=")
         mapping[name] = yaml.safe_load(value)
-    known = set(params.names(GlassMclParams))
+    known = set(params.names(LocalizerParams))
     if path is not None:  # a node's file has names of the node as well
         mapping = {
             name: value
             for name, value in mapping.items()
             if name in known or name in {each.partition("=")[0] for each in assignments}
         }
-    return params.load(GlassMclParams, mapping, "replay_logs")
+    return params.load(LocalizerParams, mapping, "replay_logs")
 
 
 def main() -> int:

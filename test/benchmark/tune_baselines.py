@@ -24,7 +24,7 @@ import glass_buildings  # first: it limits the threads of numpy
 import drives
 import numpy as np
 from baselines import Settings
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer_params import LocalizerParams
 
 SIGMAS_M = (0.05, 0.1, 0.2)
 HITS = {"field": ((0.95, 0.05, 0.0), (0.5, 0.5, 0.0)), "beam": ((0.7, 0.2, 0.1), (0.5, 0.5, 0.0))}  # hit, random, short
@@ -69,7 +69,7 @@ def main() -> int:
     arguments = parser.parse_args()
     jobs = [
         glass_buildings.Job(
-            building, lidar, seed, 0.0, arguments.max_scans, tuple(arguments.localizers), GlassMclParams()
+            building, lidar, seed, 0.0, arguments.max_scans, tuple(arguments.localizers), LocalizerParams()
         )
         for building in arguments.buildings
         for lidar in arguments.lidars

@@ -33,8 +33,8 @@ import baselines
 import drives
 from glass_nav import params
 from glass_nav.localization.particle_filter.importance_weights import BeamMixture
-from glass_nav.localization.localizer import GlassMcl
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer import Localizer
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.particle_filter.resampling import ParticleCount
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
@@ -73,28 +73,30 @@ def compare(arguments: argparse.Namespace) -> Dict[str, float]:
     drive = drives.drive_with(replace(model, beams=arguments.compared_beams), arguments.building, arguments.seed)
     fine = drives.drive_with(replace(model, beams=arguments.classified_beams), arguments.building, arguments.seed)
     count = ParticleCount(min_particles=arguments.particles, max_particles=arguments.particles)
-    settings = GlassMclParams(count=count, mixture=BeamMixture(laser_max_beams=arguments.compared_beams))
+    settings = LocalizerParams(count=count, mixture=BeamMixture(laser_max_beams=arguments.compared_beams))
     field = baselines.SETTINGS["ours_field"]._replace(max_beams=None)
 
     def rng() -> np.random.Generator:
         return np.random.default_rng(arguments.seed)
 
     likelihood = baselines.LikelihoodField(drive.grid_map, field)
-    filters: Dict[str, baselines.Localizer] = {
-        "ours": GlassMcl(settings, drive.grid_map, rng()),
+    filters: Dict[str, baselines.PoseFilter] = {
+        "ours": Localizer(settings, drive.grid_map, rng()),
         "ours, weights of the field": baselines.OtherWeights(settings, drive.grid_map, rng(), likelihood),
         "plain, weights of the field": baselines.PlainMcl(settings, drive.grid_map, rng(), likelihood, count),
     }
     times: Dict[str, List[float]] = {name: [] for name in [*filters, CLASSIFY]}
-    classifier = GlassMcl(GlassMclParams(), drive.grid_map, rng())
+    classifier = Localizer(LocalizerParams(), drive.grid_map, rng())
     covariance = np.diag([0.03, 0.03, 0.01]) ** 2
     for index in np.linspace(1, len(drive.frames) - 1, arguments.runs).astype(int):
         before, frame = drive.frames[index - 1], drive.frames[index]
-        for name, mcl in filters.items():
-            mcl.set_pose(before.map_from_base, covariance)
-            mcl.update(before.scan, before.odom_from_base)
-            mcl.request_update()
-            times[name].append(cpu_ms(lambda mcl=mcl, frame=frame: mcl.update(frame.scan, frame.odom_from_base)))
+        for name, localizer in filters.items():
+            localizer.set_pose(before.map_from_base, covariance)
+            localizer.update(before.scan, before.odom_from_base)
+            localizer.request_update()
+            times[name].append(
+                cpu_ms(lambda localizer=localizer, frame=frame: localizer.update(frame.scan, frame.odom_from_base))
+            )
         still = fine.frames[index]
         classifier.set_pose(still.map_from_base, covariance)
         classifier.update(still.scan, still.odom_from_base)  # the next one has not moved: cases only, no particles
@@ -121,7 +123,7 @@ def main() -> int:
 
     grid_map = map_file.load(arguments.map)
     settings = params.load(
-        GlassMclParams,
+        LocalizerParams,
         {
             "min_particles": arguments.particles,
             "max_particles": arguments.particles,
@@ -131,16 +133,16 @@ def main() -> int:
     )
     rng = np.random.default_rng(arguments.seed)
     caster = RayCaster(grid_map)
-    mcl = GlassMcl(settings, grid_map, rng)
+    localizer = Localizer(settings, grid_map, rng)
     whole: List[float] = []
     classified: List[float] = []
     for pose in places(grid_map, arguments.runs, rng):
-        mcl.set_pose(pose, np.diag([0.05, 0.05, 0.02]) ** 2)
-        mcl.update(scan_at(caster, pose, arguments.beams, 0, rng), np.zeros(3))
+        localizer.set_pose(pose, np.diag([0.05, 0.05, 0.02]) ** 2)
+        localizer.update(scan_at(caster, pose, arguments.beams, 0, rng), np.zeros(3))
         scan = scan_at(caster, pose, arguments.beams, 1, rng)
-        mcl.request_update()
-        whole.append(cpu_ms(lambda scan=scan: mcl.update(scan, np.zeros(3))))
-        classified.append(cpu_ms(lambda scan=scan: mcl.update(scan, np.zeros(3))))  # it has not moved: cases only
+        localizer.request_update()
+        whole.append(cpu_ms(lambda scan=scan: localizer.update(scan, np.zeros(3))))
+        classified.append(cpu_ms(lambda scan=scan: localizer.update(scan, np.zeros(3))))  # it has not moved: cases only
 
     print(
         f"{arguments.map}: {arguments.beams} beams classified by {settings.samples.sample_count} samples, "

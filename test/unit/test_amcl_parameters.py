@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from glass_nav import amcl_parameters, params
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.params import ParamError
 
 
 def loaded(**given):
-    return params.load(GlassMclParams, amcl_parameters.adapted(given, GlassMclParams), "/amcl")
+    return params.load(LocalizerParams, amcl_parameters.adapted(given, LocalizerParams), "/amcl")
 
 
 @pytest.mark.parametrize(
@@ -53,4 +53,4 @@ def test_what_is_said_and_contradicts_itself_is_refused(given, text):
 
 
 def test_a_struct_without_these_parameters_is_left_alone():
-    assert amcl_parameters.adapted({"max_particles": 10}, type(GlassMclParams().odometry)) == {"max_particles": 10}
+    assert amcl_parameters.adapted({"max_particles": 10}, type(LocalizerParams().odometry)) == {"max_particles": 10}

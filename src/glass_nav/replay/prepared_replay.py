@@ -10,7 +10,7 @@ import numpy as np
 
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.localization.initial_pose import StartPose
-from glass_nav.localization.localizer import Estimate, GlassMcl
+from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.recording.log_file import open_log
 from glass_nav.recording.recording import LogOptions, Recording, Step
 from glass_nav.replay import replay_params, replay_run
@@ -30,7 +30,7 @@ class PreparedReplay:
     settings: ReplayParams
     grid_map: GridMap
     recording: Recording
-    mcl: GlassMcl
+    localizer: Localizer
     start: Callable[[int], None]  # see replay_run.run()
     origin: str  # where the robot starts, in words
     notes: List[str]  # what was chosen or found odd
@@ -49,7 +49,7 @@ class PreparedReplay:
             RecordingError: not one scan of the log can be used.
         """
         options = self.options
-        return replay_run.run(self.recording, self.mcl, self.start, options.seed, options.use.window, step_done, listen)
+        return replay_run.run(self.recording, self.localizer, self.start, options.seed, options.use.window, step_done, listen)
 
 
 def prepare(options: ReplayOptions) -> PreparedReplay:
@@ -61,11 +61,11 @@ def prepare(options: ReplayOptions) -> PreparedReplay:
     settings, unused = (ReplayParams(), []) if options.params is None else replay_params.load(options.params)
     grid_map = map_file.load(options.map)
     recording = open_recording(options, settings)
-    mcl = GlassMcl(settings.mcl, grid_map, np.random.default_rng(options.seed))
-    start, origin = _start(mcl, recording, options.use.start, settings.start)
+    localizer = Localizer(settings.localizer, grid_map, np.random.default_rng(options.seed))
+    start, origin = _start(localizer, recording, options.use.start, settings.start)
     unused_note = [f"parameters that only a node uses: {', '.join(unused)}"] if unused else []
     notes = [*recording.notes, *unused_note, f"start: {origin}"]
-    return PreparedReplay(options, settings, grid_map, recording, mcl, start, origin, notes)
+    return PreparedReplay(options, settings, grid_map, recording, localizer, start, origin, notes)
 
 
 def open_recording(options: ReplayOptions, settings: ReplayParams) -> Recording:
@@ -91,15 +91,15 @@ def _source(given: LogOptions, settings: ReplayParams) -> LogOptions:
 
 
 def _start(
-    mcl: GlassMcl, recording: Recording, given: StartOptions, defaults: StartPose
+    localizer: Localizer, recording: Recording, given: StartOptions, defaults: StartPose
 ) -> Tuple[Callable[[int], None], str]:
     """What places the particles at the first scan, and a text that says where."""
     covariance = defaults.covariance if given.variance is None else np.diag(given.variance)
     pose, truth = given.pose, recording.ground_truth
     if given.everywhere:
-        return lambda stamp_ns: mcl.scatter(), "anywhere in the map"
+        return lambda stamp_ns: localizer.scatter(), "anywhere in the map"
     if pose is not None:
-        return lambda stamp_ns: mcl.set_pose(np.array(pose), covariance), "--initial-pose"
+        return lambda stamp_ns: localizer.set_pose(np.array(pose), covariance), "--initial-pose"
     if truth is not None and len(truth):
-        return lambda stamp_ns: mcl.set_pose(truth.at(np.int64(stamp_ns)), covariance), "the ground truth's first pose"
-    return lambda stamp_ns: mcl.set_pose(defaults.pose, covariance), "initial_pose_* of the parameters"
+        return lambda stamp_ns: localizer.set_pose(truth.at(np.int64(stamp_ns)), covariance), "the ground truth's first pose"
+    return lambda stamp_ns: localizer.set_pose(defaults.pose, covariance), "initial_pose_* of the parameters"

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Callable, Iterator
 
 from glass_nav.localization.beam_classification import beam_cloud
-from glass_nav.localization.localizer import Estimate, GlassMcl
+from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.recording.recording import Recording, Step
 from glass_nav.recording.result_bag import ResultBag
 from glass_nav.world.grid_map import GridMap
@@ -17,7 +17,7 @@ GLASS_PERIOD_NS = 30_000_000_000  # a map is large
 
 @contextmanager
 def listener(
-    path: Path, recording: Recording, mcl: GlassMcl, grid_map: GridMap
+    path: Path, recording: Recording, localizer: Localizer, grid_map: GridMap
 ) -> "Iterator[Callable[[Step, Estimate], None]]":
     """What replay_run.run() calls with each scan; the bag is there when the block has ended without an error.
 
@@ -25,14 +25,14 @@ def listener(
         RecordingError: the bag cannot be written; one line.
     """
     with ResultBag(path, ("map", recording.odom_frame, recording.base_frame)) as bag:
-        writer = _Writer(bag, recording, mcl, grid_map)
+        writer = _Writer(bag, recording, localizer, grid_map)
         yield writer.take
         writer.end()
 
 
 class _Writer:
-    def __init__(self, bag: ResultBag, recording: Recording, mcl: GlassMcl, grid_map: GridMap) -> None:
-        self._bag, self._truth, self._mcl, self._grid_map = bag, recording.ground_truth, mcl, grid_map
+    def __init__(self, bag: ResultBag, recording: Recording, localizer: Localizer, grid_map: GridMap) -> None:
+        self._bag, self._truth, self._localizer, self._grid_map = bag, recording.ground_truth, localizer, grid_map
         self._glass_ns = self._last_ns = -1
 
     def take(self, step: Step, estimate: Estimate) -> None:
@@ -67,4 +67,4 @@ class _Writer:
 
     def _send_glass(self) -> None:
         self._glass_ns = self._last_ns
-        self._bag.glass_map(self._last_ns, self._grid_map, self._mcl.glass_map.occupancy())
+        self._bag.glass_map(self._last_ns, self._grid_map, self._localizer.glass_map.occupancy())

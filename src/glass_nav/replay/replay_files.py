@@ -62,7 +62,7 @@ class FiledReplay:
         with ExitStack() as stack:
             listeners: List[Listener] = [] if self._watch is None else [self._watch.listen]
             if path is not None:
-                bag = replay_bag.listener(path, ready.recording, ready.mcl, ready.grid_map)
+                bag = replay_bag.listener(path, ready.recording, ready.localizer, ready.grid_map)
                 listeners.append(stack.enter_context(bag))
             return ready.run(step_done, _all_of(listeners))
 
@@ -77,12 +77,12 @@ class FiledReplay:
             "map": str(options.map),
             "start": ready.origin,
             "notes": ready.notes,
-            "params": params.as_mapping(ready.settings.mcl),
+            "params": params.as_mapping(ready.settings.localizer),
             "versions": versions(),
             **({} if topology is None else {"topology": topology.metrics()}),
         }
         replay_result.write(result, folder, about)
-        glass = GridMap(ready.mcl.glass_map.occupancy(), grid_map.resolution_m, grid_map.map_from_grid)
+        glass = GridMap(ready.localizer.glass_map.occupancy(), grid_map.resolution_m, grid_map.map_from_grid)
         map_file.save(glass, folder / "glass_map.yaml", image_suffix=".png")
         if self._outputs.pictures:
             run_pictures.draw_trajectory(folder / "trajectory.png", image, result, ready.recording.name)

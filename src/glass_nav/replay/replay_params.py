@@ -11,7 +11,7 @@ from typing import Any, Dict, List, Tuple
 
 from glass_nav import amcl_parameters, params
 from glass_nav.localization.initial_pose import StartPose
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.params import ParamError
 from glass_nav.sensing.deskew import Deskew
 
@@ -48,7 +48,7 @@ class ReplayParams:
     frames: Frames = field(default_factory=Frames)
     start: StartPose = field(default_factory=StartPose)
     deskew: Deskew = field(default_factory=Deskew)
-    mcl: GlassMclParams = field(default_factory=GlassMclParams)
+    localizer: LocalizerParams = field(default_factory=LocalizerParams)
 
 
 def load(path: Path) -> "Tuple[ReplayParams, List[str]]":

@@ -13,7 +13,7 @@ from glass_nav.evaluation.metrics.case_scores import CaseScores, SurfaceScores
 from glass_nav.evaluation.metrics.replay_result import NO_BEAM, BeamExample, KeptScan, ReplayResult
 from glass_nav.geometry import se2
 from glass_nav.localization.integrity.pose_state import GLOBAL_SEARCH, UNKNOWN
-from glass_nav.localization.localizer import Estimate, GlassMcl
+from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.recording.recording import BeamTruth, Recording, RecordingError, Refusal, Step
 from glass_nav.replay.window import Window
 from glass_nav.sensing.scan import Scan, ScanError
@@ -25,7 +25,7 @@ PARTS = 60  # of the log, so that they do not all show one moment
 
 def run(
     recording: Recording,
-    mcl: GlassMcl,
+    localizer: Localizer,
     start: Callable[[int], None],
     seed: int,
     window: Optional[Window] = None,
@@ -36,7 +36,7 @@ def run(
 
     Args:
         recording: the log.
-        mcl: a fresh filter.
+        localizer: a fresh filter.
         start: called once with the stamp [ns] of the first scan, before it is used: places the particles.
         seed: what the filter's random numbers were seeded with; for the result.
         window: the part of the log, all of it when not given.
@@ -60,7 +60,7 @@ def run(
                 if not rows:
                     start(entry.scan.stamp_ns)
                 before = time.process_time()
-                estimate = mcl.update(entry.scan, entry.odom_from_base)
+                estimate = localizer.update(entry.scan, entry.odom_from_base)
                 cpu_ms = 1e3 * (time.process_time() - before)
                 worst.take(len(rows), entry.scan, estimate)
                 rows.append(_Row(entry.odom_from_base, estimate, cpu_ms, scores.take(entry.scan, estimate)))

@@ -1,14 +1,12 @@
-"""From callback threads to the run loop: what came in, what is asked for, and scans waiting for tf.
-
-Callbacks only store; the run loop takes. No ROS in here: messages are opaque, stamps are integer ns.
-"""
+"""From callback threads to the run loop: callbacks only store, the run loop takes."""
 
 from __future__ import annotations
 
 import collections
+import concurrent.futures
 import threading
-from dataclasses import dataclass
-from typing import Any, Callable, Deque, Dict, Generic, List, Optional, Tuple, TypeVar
+from concurrent.futures import Future
+from typing import Any, Callable, Deque, Dict, List, TypeVar
 
 T = TypeVar("T")
 
@@ -31,6 +29,12 @@ class Mailbox:
             self._lanes[lane].append(item)
             self._changed.notify()
 
+    def submit(self, lane: str, work: Callable[[], T]) -> "Future[T]":
+        """Put a callable into a lane; the future completes when the run loop has called it. See outcome()."""
+        future: "Future[T]" = Future()
+        self.put(lane, lambda: _run(work, future))
+        return future
+
     def take(self, timeout_s: float) -> Dict[str, List[Any]]:
         """Lane -> what came since the last call, oldest first; waits for a first item up to the timeout."""
         with self._changed:
@@ -49,103 +53,23 @@ class Mailbox:
             return taken
 
 
-class Errand:
-    """Something the run loop shall do for another thread, which waits for the outcome."""
-
-    def __init__(self, work: Callable[[], Any]) -> None:
-        self._work = work
-        self._done = threading.Event()
-        self._error: Optional[Exception] = None
-        self._abandoned = False
-
-    def run(self) -> None:
-        """Do it (run loop); a ValueError goes to the thread that waits, nothing else is caught."""
-        if self._abandoned:  # nobody waits any more and was told so: doing it now would surprise
-            return
-        try:
-            self._work()
-        except ValueError as err:
-            self._error = err
-        finally:
-            self._done.set()
-
-    def wait(self, timeout_s: float) -> None:
-        """Block until done. Raises what the work raised, or TimeoutError."""
-        if not self._done.wait(timeout_s):
-            self._abandoned = True
-            raise TimeoutError(f"the node did not come to it within {timeout_s:g} s")
-        if self._error is not None:
-            raise self._error
+def outcome(future: "Future[T]", timeout_s: float) -> T:
+    """What the work of Mailbox.submit() returned or raised. TimeoutError if it has not finished; not begun, it never is."""
+    try:
+        return future.result(timeout_s)
+    except concurrent.futures.TimeoutError:
+        future.cancel()  # the caller is told that it failed: doing it later would surprise
+        raise TimeoutError(f"the node did not answer within {timeout_s:g} s") from None
 
 
-@dataclass
-class ScanCounts:
-    """Where the scans went since the start; received is the sum of the others.
-
-    WaitingScans counts the last three, its user the first three; those of several lidars share one.
-    """
-
-    received: int = 0
-    used: int = 0
-    refused: int = 0  # nonsense fields, or a stamp that is not after the last one used
-    superseded: int = 0  # a newer one was ready too: the lidar is faster than the node or tf
-    dropped_no_transform: int = 0  # no transform at its stamp within the limit
-    waiting: int = 0  # for their transform, now
-
-
-class WaitingScans(Generic[T]):
-    """Scans that wait for the transform at their stamp; the newest that has one wins.
-
-    tf2_ros for Python has no MessageFilter. A scan that arrives before its transform waits here. A scan
-    that is older than one already handed out is never handed out, so stamps only ascend.
-    """
-
-    def __init__(self, capacity: int, limit_s: float, counts: Optional[ScanCounts] = None) -> None:
-        """Args:
-        capacity: scans that may wait; the oldest goes first.
-        limit_s: how long one may wait, by the clock that add() and take_ready() are given.
-        counts: to be kept with those of other lidars; its own when not given.
-        """
-        self._waiting: List[Tuple[float, int, T]] = []  # arrival [s], stamp [ns], scan
-        self._capacity = capacity
-        self._newest_ns: Optional[int] = None
-        self.limit_s = limit_s
-        self.counts = ScanCounts() if counts is None else counts
-
-    def __len__(self) -> int:
-        return len(self._waiting)
-
-    def add(self, scan: T, stamp_ns: int, now_s: float) -> bool:
-        """Let a scan wait; False if its stamp is not after that of the last one handed out."""
-        if self._newest_ns is not None and stamp_ns <= self._newest_ns:
-            return False
-        waiting = [*self._waiting, (now_s, stamp_ns, scan)]
-        if len(waiting) > self._capacity:
-            self.counts.dropped_no_transform += 1
-        self._keep(waiting[-self._capacity :])
-        return True
-
-    def take_ready(self, is_ready: Callable[[T], bool], now_s: float) -> "Tuple[Optional[T], List[T]]":
-        """The scan with the newest stamp that is ready, and those that waited longer than the limit."""
-        ready: Optional[T] = None
-        for _, stamp_ns, scan in sorted(self._waiting, key=lambda waiting: -waiting[1]):
-            if is_ready(scan):
-                ready, self._newest_ns = scan, stamp_ns
-                newer = [waiting for waiting in self._waiting if waiting[1] > stamp_ns]
-                self.counts.superseded += len(self._waiting) - len(newer) - 1
-                self._keep(newer)
-                break
-        given_up = [scan for arrival_s, _, scan in self._waiting if now_s - arrival_s > self.limit_s]
-        self._keep([waiting for waiting in self._waiting if now_s - waiting[0] <= self.limit_s])
-        self.counts.dropped_no_transform += len(given_up)
-        return ready, given_up
-
-    def restart(self) -> None:
-        """Forget what waits and which stamps were used: time has jumped."""
-        self.counts.dropped_no_transform += len(self._waiting)
-        self._keep([])
-        self._newest_ns = None
-
-    def _keep(self, waiting: "List[Tuple[float, int, T]]") -> None:
-        self.counts.waiting += len(waiting) - len(self._waiting)
-        self._waiting = waiting
+def _run(work: Callable[[], T], future: "Future[T]") -> None:
+    """As an executor does, but only a ValueError is an answer; anything else also ends the run loop."""
+    if not future.set_running_or_notify_cancel():
+        return
+    try:
+        future.set_result(work())
+    except ValueError as err:
+        future.set_exception(err)
+    except BaseException as err:
+        future.set_exception(err)
+        raise

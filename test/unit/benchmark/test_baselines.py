@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from glass_nav.geometry import angles, se2
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import GridMap
 
@@ -124,10 +124,10 @@ def test_every_localizer_follows_a_robot_through_a_room_and_repeats_itself(name)
     scans = [scan_at(pose, 180, 0.01, rng, 10**9 * index) for index, pose in enumerate(true)]
     ways = []
     for _ in range(2):
-        mcl = baselines.localizer(name, GlassMclParams(), room_map(), seed=4)
-        mcl.set_pose(true[0] + [0.1, -0.1, 0.05], np.diag([0.1, 0.1, 0.05]) ** 2)
-        mcl.true_case = np.ones(180, np.uint8)
-        ways.append([mcl.update(scan, pose).map_from_base for scan, pose in zip(scans, true)])
+        localizer = baselines.localizer(name, LocalizerParams(), room_map(), seed=4)
+        localizer.set_pose(true[0] + [0.1, -0.1, 0.05], np.diag([0.1, 0.1, 0.05]) ** 2)
+        localizer.true_case = np.ones(180, np.uint8)
+        ways.append([localizer.update(scan, pose).map_from_base for scan, pose in zip(scans, true)])
     np.testing.assert_array_equal(ways[0], ways[1])
     off = ways[0] - true
     assert np.hypot(off[5:, 0], off[5:, 1]).max() < 0.06
@@ -136,10 +136,10 @@ def test_every_localizer_follows_a_robot_through_a_room_and_repeats_itself(name)
 
 def test_plain_localization_moves_on_by_odometry_between_updates():
     pose = np.array([2.3, 1.4, 0.4])
-    mcl = baselines.localizer("amcl_field60", GlassMclParams(), room_map(), seed=1)
-    mcl.set_pose(pose, np.diag([0.05, 0.05, 0.02]) ** 2)
-    first = mcl.update(scan_at(pose), np.zeros(3)).map_from_base
+    localizer = baselines.localizer("amcl_field60", LocalizerParams(), room_map(), seed=1)
+    localizer.set_pose(pose, np.diag([0.05, 0.05, 0.02]) ** 2)
+    first = localizer.update(scan_at(pose), np.zeros(3)).map_from_base
     step = np.array([0.05, 0.0, 0.02])  # below the thresholds
-    np.testing.assert_allclose(mcl.update(scan_at(pose), step).map_from_base, se2.compose(first, step))
-    mcl.request_update()
-    assert np.any(mcl.update(scan_at(pose), step).map_from_base != se2.compose(first, step))
+    np.testing.assert_allclose(localizer.update(scan_at(pose), step).map_from_base, se2.compose(first, step))
+    localizer.request_update()
+    assert np.any(localizer.update(scan_at(pose), step).map_from_base != se2.compose(first, step))

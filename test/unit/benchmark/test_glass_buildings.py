@@ -11,7 +11,7 @@ import pytest
 
 from glass_nav.evaluation.metrics import case_scores, replay_result
 from glass_nav.evaluation.metrics.case_scores import SurfaceScores
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer_params import LocalizerParams
 
 REPO = Path(__file__).resolve().parents[3]
 sys.path.append(str(REPO / "test" / "benchmark"))
@@ -53,7 +53,7 @@ def test_a_drive_is_the_same_for_the_same_seed_and_another_for_another():
 
 @pytest.mark.long_run
 def test_every_localizer_is_scored_on_the_same_drive():
-    job = Job("opaque_office", "sensitive", 100, 0.0, 4, ("ours", "ours_oracle", "amcl_field60"), GlassMclParams())
+    job = Job("opaque_office", "sensitive", 100, 0.0, 4, ("ours", "ours_oracle", "amcl_field60"), LocalizerParams())
     runs = {each.localizer: each for each in glass_buildings.run(job)}
     assert list(runs) == list(job.localizers)
     assert runs["ours"].cases.metrics()["beams"] == 4 * 541
@@ -89,7 +89,7 @@ def test_baselines_of_an_earlier_benchmark_count_where_they_drove_the_same(tmp_p
     runs = [a_run(name) for name in ("amcl_field60", "amcl_beam60", "ours", "ours_oracle")]
     runs.append(a_run("ours_case1", "yard"))
     replay_result.write_json(tmp_path / "x.json", {"changed": 0.0, "runs": [each.as_json() for each in runs]})
-    job = Job("hall", "weak", 100, 0.0, None, ("ours", "amcl_beam60"), GlassMclParams())
+    job = Job("hall", "weak", 100, 0.0, None, ("ours", "amcl_beam60"), LocalizerParams())
     assert glass_buildings.baselines_from(tmp_path / "x.json", [job]) == [a_run("amcl_field60")]
     assert glass_buildings.baselines_from(tmp_path / "x.json", [job._replace(changed=0.3)]) == []
     assert glass_buildings.baselines_from(tmp_path / "x.json", [job._replace(seed=101)]) == []

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from glass_nav.geometry import se2
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.recording.log_file import open_log
 from glass_nav.recording.recording import LogOptions, Refusal
 from glass_nav.sensing.scan import Scan
@@ -94,7 +94,7 @@ def test_a_setting_that_there_is_not_is_refused():
 
 
 def test_a_scan_is_taken_after_each_bit_of_way_and_of_every_lidar():
-    step_m = GlassMclParams().schedule.update_min_d
+    step_m = LocalizerParams().schedule.update_min_d
     track = a_track(np.array([0.0, 0.6, 1.1, 1.2, 2.2]) * step_m)
     assert [round(step.way_m / step_m, 6) for step in pf_localization.steps_of(track, 0)] == [0.0, 1.1, 2.2]
     assert [round(step.way_m / step_m, 6) for step in pf_localization.steps_of(track, 1)] == [0.0, 1.6]

@@ -12,8 +12,8 @@ from buildings import BASE_FROM_LASER, GLASS_ROOM, L_ROOM, SECOND_NS, Building, 
 
 from glass_nav import params
 from glass_nav.geometry import angles, se2
-from glass_nav.localization.localizer import GlassMcl
-from glass_nav.localization.localizer_params import GlassMclParams, LaserLimits, Schedule
+from glass_nav.localization.localizer import Localizer
+from glass_nav.localization.localizer_params import LaserLimits, LocalizerParams, Schedule
 from glass_nav.sensing import bearings
 from glass_nav.sensing.scan import Scan, ScanError
 from glass_nav.world import landmark_map
@@ -26,13 +26,13 @@ ALL_ROUND = np.linspace(-np.pi, np.pi, 56, endpoint=False)
 
 
 def parameters(**values):
-    return params.load(GlassMclParams, {"min_particles": 200, "max_particles": 800, **values}, "test")
+    return params.load(LocalizerParams, {"min_particles": 200, "max_particles": 800, **values}, "test")
 
 
 def started(building=L_ROOM, at=None, seed=0, grid_map=None, **values):
-    mcl = GlassMcl(parameters(**values), grid_map or MAPS[building], np.random.default_rng(seed))
-    mcl.set_pose(loop_drive(1)[0] if at is None else at, START_COVARIANCE)
-    return mcl
+    localizer = Localizer(parameters(**values), grid_map or MAPS[building], np.random.default_rng(seed))
+    localizer.set_pose(loop_drive(1)[0] if at is None else at, START_COVARIANCE)
+    return localizer
 
 
 class Drive:
@@ -49,8 +49,8 @@ class Drive:
             for index, pose in enumerate(self.true)
         ]
 
-    def through(self, mcl, first=0, last=None):
-        return [mcl.update(scan, odom) for scan, odom in list(zip(self.scans, self.odometry))[first:last]]
+    def through(self, localizer, first=0, last=None):
+        return [localizer.update(scan, odom) for scan, odom in list(zip(self.scans, self.odometry))[first:last]]
 
     def errors(self, estimates):
         """(S, 2) of position [m] and heading [rad]."""
@@ -154,10 +154,10 @@ class GlassDrive(Drive):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_pane_becomes_glass_over_a_drive_and_a_wall_does_not(seed):
     drive = GlassDrive(seed)
-    mcl = started(GLASS_ROOM, drive.true[0], seed)
-    assert (mcl.glass_map.occupancy() == -1).all()  # nothing is known before
-    drive.through(mcl)
-    picture = mcl.glass_map.occupancy()
+    localizer = started(GLASS_ROOM, drive.true[0], seed)
+    assert (localizer.glass_map.occupancy() == -1).all()  # nothing is known before
+    drive.through(localizer)
+    picture = localizer.glass_map.occupancy()
     pane, walls = GlassDrive.pane_and_walls()
     known_pane, known_walls = picture[pane & (picture >= 0)], picture[walls & (picture >= 0)]
     assert len(known_pane) > 30 and len(known_walls) > 100
@@ -169,9 +169,9 @@ def test_a_pane_becomes_glass_over_a_drive_and_a_wall_does_not(seed):
 @pytest.mark.parametrize("seed", range(2))
 def test_in_an_opaque_room_no_wall_becomes_glass(seed):
     drive = Drive(seed=seed, steps=40)
-    mcl = started(seed=seed)
-    drive.through(mcl)
-    picture = mcl.glass_map.occupancy()
+    localizer = started(seed=seed)
+    drive.through(localizer)
+    picture = localizer.glass_map.occupancy()
     assert np.count_nonzero(picture >= 0) > 100 and np.mean(picture[picture >= 0] > 30) < 0.01
 
 
@@ -188,36 +188,36 @@ def test_a_lidar_that_sees_no_glass_at_all_is_localized(seed):
 
 def test_another_map_has_other_glass():
     drive = GlassDrive()
-    mcl = started(GLASS_ROOM, drive.true[0])
-    drive.through(mcl, last=20)
-    assert (mcl.glass_map.occupancy() >= 0).any()
-    mcl.set_map(MAPS[GLASS_ROOM])  # the same cells, but who knows?
-    assert (mcl.glass_map.occupancy() == -1).all()
-    drive.through(mcl, first=20)
-    assert (mcl.glass_map.occupancy() >= 0).any()
+    localizer = started(GLASS_ROOM, drive.true[0])
+    drive.through(localizer, last=20)
+    assert (localizer.glass_map.occupancy() >= 0).any()
+    localizer.set_map(MAPS[GLASS_ROOM])  # the same cells, but who knows?
+    assert (localizer.glass_map.occupancy() == -1).all()
+    drive.through(localizer, first=20)
+    assert (localizer.glass_map.occupancy() >= 0).any()
 
 
 def test_a_new_pose_on_the_same_map_keeps_its_glass():
     drive = GlassDrive()
-    mcl = started(GLASS_ROOM, drive.true[0])
-    drive.through(mcl, last=20)
-    before = mcl.glass_map.occupancy()
-    mcl.set_pose(drive.true[0], START_COVARIANCE)
-    np.testing.assert_array_equal(mcl.glass_map.occupancy(), before)
+    localizer = started(GLASS_ROOM, drive.true[0])
+    drive.through(localizer, last=20)
+    before = localizer.glass_map.occupancy()
+    localizer.set_pose(drive.true[0], START_COVARIANCE)
+    np.testing.assert_array_equal(localizer.glass_map.occupancy(), before)
 
 
 @pytest.mark.long_run
 def test_scans_that_fit_nowhere_teach_nothing():
     """A robot that was carried away would take all walls for glass."""
     drive = GlassDrive(steps=20)
-    mcl = started(GLASS_ROOM, drive.true[0])
-    drive.through(mcl, last=12)
-    before = mcl.glass_map.occupancy()
+    localizer = started(GLASS_ROOM, drive.true[0])
+    drive.through(localizer, last=12)
+    before = localizer.glass_map.occupancy()
     rng = np.random.default_rng(0)
     for index in range(12, 20):
         drive.scans[index] = replace(drive.scans[index], ranges_m=rng.uniform(4.0, 11.0, 180))
-    drive.through(mcl, first=12)
-    np.testing.assert_array_equal(mcl.glass_map.occupancy(), before)
+    drive.through(localizer, first=12)
+    np.testing.assert_array_equal(localizer.glass_map.occupancy(), before)
 
 
 # -- the scan in which glass is an obstacle
@@ -264,17 +264,17 @@ def test_a_surface_scan_is_trusted_where_the_robot_is_localized_and_nowhere_else
 
 def test_while_a_robot_is_searched_for_nothing_is_cut():
     drive = GlassDrive(steps=2)
-    mcl = GlassMcl(parameters(max_particles=2000), MAPS[GLASS_ROOM], np.random.default_rng(0))
-    mcl.scatter()
-    first = drive.through(mcl, last=1)[0]
+    localizer = Localizer(parameters(max_particles=2000), MAPS[GLASS_ROOM], np.random.default_rng(0))
+    localizer.scatter()
+    first = drive.through(localizer, last=1)[0]
     assert first.state != "LOCALIZED" and not first.surface_scan.trusted and not first.surface_scan.cut.any()
 
 
 def test_a_scan_between_updates_is_cut_too():
     drive = GlassDrive(steps=12)
-    mcl = started(GLASS_ROOM, drive.true[0])
-    last = drive.through(mcl)[-1]
-    again = mcl.update(replace(drive.scans[-1], stamp_ns=drive.scans[-1].stamp_ns + 1), drive.odometry[-1])
+    localizer = started(GLASS_ROOM, drive.true[0])
+    last = drive.through(localizer)[-1]
+    again = localizer.update(replace(drive.scans[-1], stamp_ns=drive.scans[-1].stamp_ns + 1), drive.odometry[-1])
     assert not again.updated and again.surface_scan.trusted
     assert np.mean(again.surface_scan.cut == last.surface_scan.cut) > 0.97 and again.surface_scan.cut.any()
 
@@ -283,11 +283,11 @@ def test_a_scan_between_updates_is_cut_too():
 def test_between_updates_beams_are_told_apart_as_in_one(vote_mode):
     """The same scans from where the robot stands, once with an update and once between updates."""
     drive = Drive(GLASS_ROOM, glass_share=0.5)
-    mcl = started(GLASS_ROOM, at=drive.true[0], vote_mode=vote_mode)
+    localizer = started(GLASS_ROOM, at=drive.true[0], vote_mode=vote_mode)
     told = []
     for scan, odom in zip(drive.scans, drive.odometry):
         at_update, between = (
-            mcl.update(replace(scan, stamp_ns=scan.stamp_ns + later_ns), odom) for later_ns in (0, 1000)
+            localizer.update(replace(scan, stamp_ns=scan.stamp_ns + later_ns), odom) for later_ns in (0, 1000)
         )
         assert at_update.updated and not between.updated
         told.append((at_update.cases.case, between.cases.case))
@@ -336,9 +336,9 @@ def test_where_the_map_lies_and_how_it_is_turned_does_not_matter(drive, where):
 @pytest.mark.parametrize("seed", range(4))
 def test_from_anywhere_scans_lead_to_the_right_place(seed):
     drive = Drive(seed=seed, steps=40)
-    mcl = GlassMcl(parameters(), MAPS[L_ROOM], np.random.default_rng(seed))
-    mcl.scatter()
-    estimates = drive.through(mcl)
+    localizer = Localizer(parameters(), MAPS[L_ROOM], np.random.default_rng(seed))
+    localizer.scatter()
+    estimates = drive.through(localizer)
     states = [estimate.state for estimate in estimates]
     assert states[0] == "GLOBAL_SEARCH" and states[-1] == "LOCALIZED"
     way_m, _ = drive.errors(estimates).T
@@ -348,10 +348,10 @@ def test_from_anywhere_scans_lead_to_the_right_place(seed):
 def test_while_places_look_alike_all_of_them_are_told():
     """In a square room without a mark there are four."""
     room = Building([(0, 0), (6, 0), (6, 6), (0, 6)])
-    mcl = GlassMcl(parameters(), room.grid_map(), np.random.default_rng(0))
-    mcl.scatter()
+    localizer = Localizer(parameters(), room.grid_map(), np.random.default_rng(0))
+    localizer.scatter()
     true = np.array([2.0, 2.5, 0.3])
-    told = mcl.update(room.scan(true), np.zeros(3))
+    told = localizer.update(room.scan(true), np.zeros(3))
     assert told.state == "GLOBAL_SEARCH" and "places are possible, the best at x " in told.reason
     centre = np.array([3.0, 3.0])
     for quarter in range(4):
@@ -364,42 +364,42 @@ def test_while_places_look_alike_all_of_them_are_told():
 
 def test_in_an_area_only_what_lies_in_it_is_a_candidate():
     room = Building([(0, 0), (6, 0), (6, 6), (0, 6)])
-    mcl = GlassMcl(parameters(), room.grid_map(), np.random.default_rng(0))
-    mcl.scatter(np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0]]))
+    localizer = Localizer(parameters(), room.grid_map(), np.random.default_rng(0))
+    localizer.scatter(np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [0.0, 3.0]]))
     true = np.array([2.0, 2.5, 0.3])
-    told = mcl.update(room.scan(true), np.zeros(3))
+    told = localizer.update(room.scan(true), np.zeros(3))
     assert np.all(told.particles[:, :2] < 3.7)  # an alignment may lead out by decimetres
     assert off(told.map_from_base, true)[0] < 0.1
 
 
 def test_a_pose_given_too_vaguely_to_track_is_looked_for_within_its_reach():
     drive = Drive(seed=1, steps=40)
-    mcl = GlassMcl(parameters(), MAPS[L_ROOM], np.random.default_rng(1))
-    mcl.set_pose(drive.true[0] + [0.8, -0.5, 0.5], np.diag([1.5, 1.5, 1.0]) ** 2)
-    estimates = drive.through(mcl)
+    localizer = Localizer(parameters(), MAPS[L_ROOM], np.random.default_rng(1))
+    localizer.set_pose(drive.true[0] + [0.8, -0.5, 0.5], np.diag([1.5, 1.5, 1.0]) ** 2)
+    estimates = drive.through(localizer)
     assert estimates[0].state == "GLOBAL_SEARCH" and estimates[-1].state == "LOCALIZED"
     assert drive.errors(estimates)[-1, 0] < 0.05
 
 
 def test_a_scan_without_answers_leaves_a_search_where_it_is():
     drive = Drive(steps=2)
-    mcl = GlassMcl(parameters(), MAPS[L_ROOM], np.random.default_rng(0))
-    mcl.scatter()
-    blind = mcl.update(replace(drive.scans[0], ranges_m=np.full(len(drive.scans[0]), np.nan)), drive.odometry[0])
+    localizer = Localizer(parameters(), MAPS[L_ROOM], np.random.default_rng(0))
+    localizer.scatter()
+    blind = localizer.update(replace(drive.scans[0], ranges_m=np.full(len(drive.scans[0]), np.nan)), drive.odometry[0])
     assert blind.state == "GLOBAL_SEARCH" and blind.reason == "no scan has told anything yet"
     assert np.isfinite(blind.map_from_base).all() and blind.reliability < 0.5
-    seen = mcl.update(drive.scans[1], drive.odometry[1])
+    seen = localizer.update(drive.scans[1], drive.odometry[1])
     assert "possible" in seen.reason
 
 
 @pytest.mark.long_run
 def test_a_robot_that_was_carried_away_says_so_and_is_found_again():
     drive = Drive(seed=3, steps=90)
-    mcl = started(at=drive.true[0], seed=3)
-    drive.through(mcl, last=20)
+    localizer = started(at=drive.true[0], seed=3)
+    drive.through(localizer, last=20)
     moved = se2.compose(drive.odometry[19], se2.inverse(drive.odometry[40]))  # what odometry did not notice
     estimates = [
-        mcl.update(scan, se2.compose(moved, odom)) for scan, odom in zip(drive.scans[40:], drive.odometry[40:])
+        localizer.update(scan, se2.compose(moved, odom)) for scan, odom in zip(drive.scans[40:], drive.odometry[40:])
     ]
     way_m, _ = drive.errors(estimates).T
     left = next(index for index, estimate in enumerate(estimates) if estimate.state != "LOCALIZED")
@@ -423,12 +423,12 @@ def test_a_robot_that_stands_for_five_minutes_stays_where_it_is(forced):
     """A scan a second; odometry trembles by half a millimetre."""
     rng = np.random.default_rng(5)
     true = loop_drive(1)[0]
-    mcl = started(at=true, seed=5)
+    localizer = started(at=true, seed=5)
     told = []
     for second in range(300):
         if forced:
-            mcl.request_update()
-        told.append(mcl.update(L_ROOM.scan(true, second * SECOND_NS, rng), rng.normal(0.0, 0.0005, 3)))
+            localizer.request_update()
+        told.append(localizer.update(L_ROOM.scan(true, second * SECOND_NS, rng), rng.normal(0.0, 0.0005, 3)))
     assert sum(estimate.updated for estimate in told) == (300 if forced else 1)
     drift_m, _ = np.array([off(estimate.map_from_base, told[10].map_from_base) for estimate in told[10:]]).T
     assert drift_m.max() < 0.01
@@ -467,8 +467,8 @@ def test_without_answers_the_robot_goes_where_odometry_leads(nothing, seed):
     drive = Drive(seed=seed, way_share=0.01)
     for index in range(10, 20):
         drive.scans[index] = replace(drive.scans[index], ranges_m=np.full(180, nothing))
-    mcl = started(seed=seed)
-    estimates = drive.through(mcl)
+    localizer = started(seed=seed)
+    estimates = drive.through(localizer)
     blind = estimates[10:20]
     for index in range(10, 20):
         expected = se2.compose(estimates[9].map_from_odom, drive.odometry[index])
@@ -499,11 +499,12 @@ def test_a_robot_that_sees_what_cannot_be_is_called_lost():
 
 
 def test_who_stands_still_is_not_moved(drive):
-    mcl = started()
-    drive.through(mcl, last=5)
+    localizer = started()
+    drive.through(localizer, last=5)
     rng = np.random.default_rng(1)
     still = [
-        mcl.update(L_ROOM.scan(drive.true[4], (10 + index) * SECOND_NS, rng), drive.odometry[4]) for index in range(50)
+        localizer.update(L_ROOM.scan(drive.true[4], (10 + index) * SECOND_NS, rng), drive.odometry[4])
+        for index in range(50)
     ]
     assert not any(estimate.updated for estimate in still)
     poses = np.array([estimate.map_from_base for estimate in still])
@@ -513,22 +514,22 @@ def test_who_stands_still_is_not_moved(drive):
 
 
 def test_below_the_least_way_and_turn_odometry_alone_carries_on(drive):
-    mcl = started(update_min_d=0.2, update_min_a=0.2)
-    before = drive.through(mcl, last=1)[0]
+    localizer = started(update_min_d=0.2, update_min_a=0.2)
+    before = drive.through(localizer, last=1)[0]
     odom = se2.compose(drive.odometry[0], np.array([0.15, 0.0, 0.15]))
-    after = mcl.update(replace(drive.scans[1]), odom)
+    after = localizer.update(replace(drive.scans[1]), odom)
     assert before.updated and not after.updated
     np.testing.assert_allclose(after.map_from_base, se2.compose(before.map_from_base, [0.15, 0.0, 0.15]), atol=1e-12)
-    turned = mcl.update(replace(drive.scans[2]), se2.compose(drive.odometry[0], np.array([0.0, 0.0, 0.21])))
+    turned = localizer.update(replace(drive.scans[2]), se2.compose(drive.odometry[0], np.array([0.0, 0.0, 0.21])))
     assert turned.updated
 
 
 def test_a_requested_update_uses_the_next_scan_of_a_robot_that_stands(drive):
-    mcl = started()
-    drive.through(mcl, last=1)
-    mcl.request_update()
+    localizer = started()
+    drive.through(localizer, last=1)
+    localizer.request_update()
     scans = [replace(drive.scans[0], stamp_ns=stamp_ns) for stamp_ns in (1, 2)]
-    assert [mcl.update(scan, drive.odometry[0]).updated for scan in scans] == [True, False]
+    assert [localizer.update(scan, drive.odometry[0]).updated for scan in scans] == [True, False]
 
 
 def seen_by(scan, lidar, later_ns=0):
@@ -536,10 +537,10 @@ def seen_by(scan, lidar, later_ns=0):
 
 
 def test_of_two_lidars_each_has_its_update_after_a_move(drive):
-    mcl = started(update_min_d=0.2, update_min_a=0.2)
+    localizer = started(update_min_d=0.2, update_min_a=0.2)
     still, moved = drive.odometry[0], se2.compose(drive.odometry[0], np.array([0.21, 0.0, 0.0]))
     updated = [
-        mcl.update(seen_by(drive.scans[index], lidar), odom).updated
+        localizer.update(seen_by(drive.scans[index], lidar), odom).updated
         for index, (lidar, odom) in enumerate(
             [
                 ("front", still),
@@ -557,14 +558,14 @@ def test_of_two_lidars_each_has_its_update_after_a_move(drive):
 
 
 def test_two_lidars_need_not_agree_on_the_order_of_their_stamps(drive):
-    mcl = started()
-    mcl.update(seen_by(drive.scans[1], "front"), drive.odometry[1])
-    mcl.update(seen_by(drive.scans[1], "rear", -20_000_000), drive.odometry[1])  # its scan came late
+    localizer = started()
+    localizer.update(seen_by(drive.scans[1], "front"), drive.odometry[1])
+    localizer.update(seen_by(drive.scans[1], "rear", -20_000_000), drive.odometry[1])  # its scan came late
     refused(
-        mcl,
+        localizer,
         ScanError,
         "scan at 0.970 s: time runs backwards, the last scan was at 0.980 s",
-        lambda mcl: mcl.update(seen_by(drive.scans[1], "rear", -30_000_000), drive.odometry[1]),
+        lambda localizer: localizer.update(seen_by(drive.scans[1], "rear", -30_000_000), drive.odometry[1]),
     )
 
 
@@ -572,24 +573,26 @@ def test_two_lidars_need_not_agree_on_the_order_of_their_stamps(drive):
 @pytest.mark.parametrize("seed", range(2))
 def test_two_half_blind_lidars_track_like_one_that_sees_all(seed):
     whole = Drive(seed=seed)
-    mcl = started(at=whole.true[0])
+    localizer = started(at=whole.true[0])
     halves = {"front": slice(45, 135), "rear": np.r_[0:45, 135:180]}
     off_m = []
     for scan, odom, true in zip(whole.scans, whole.odometry, whole.true):
         for late, (lidar, beams) in enumerate(halves.items()):
             part = replace(scan, ranges_m=scan.ranges_m[beams], angles_rad=scan.angles_rad[beams])
-            estimate = mcl.update(seen_by(part, lidar, late), odom)
+            estimate = localizer.update(seen_by(part, lidar, late), odom)
             off_m.append(off(estimate.map_from_base, true)[0])
     assert max(off_m) < 0.05
 
 
 def test_other_parameters_leave_what_the_filter_knows(drive):
-    mcl, twin = started(min_particles=300), started(min_particles=300)
-    for each in (mcl, twin):
+    localizer, twin = started(min_particles=300), started(min_particles=300)
+    for each in (localizer, twin):
         drive.through(each, last=10)
-    mcl.reconfigure(parameters(min_particles=300))
-    same(drive.through(mcl, 10, 11)[0], drive.through(twin, 10, 11)[0])  # to the last bit, random numbers included
-    mcl.reconfigure(
+    localizer.reconfigure(parameters(min_particles=300))
+    same(
+        drive.through(localizer, 10, 11)[0], drive.through(twin, 10, 11)[0]
+    )  # to the last bit, random numbers included
+    localizer.reconfigure(
         parameters(
             min_particles=700,
             max_particles=700,
@@ -598,26 +601,28 @@ def test_other_parameters_leave_what_the_filter_knows(drive):
             raycast_threads=2,
         )
     )
-    after = drive.through(mcl, 11, 12)[0]
+    after = drive.through(localizer, 11, 12)[0]
     assert len(after.particles) == 700
     assert after.state == "UNCERTAIN"  # by the new limit
     assert off(after.map_from_base, drive.true[11])[0] < 0.05
     wall = np.array([0])
-    assert mcl.glass_map.chances(wall)[0] != twin.glass_map.chances(wall)[0]
-    np.testing.assert_array_equal(mcl.glass_map.occupancy() >= 0, drive_on(twin, drive, 11).glass_map.occupancy() >= 0)
+    assert localizer.glass_map.chances(wall)[0] != twin.glass_map.chances(wall)[0]
+    np.testing.assert_array_equal(
+        localizer.glass_map.occupancy() >= 0, drive_on(twin, drive, 11).glass_map.occupancy() >= 0
+    )
 
 
-def drive_on(mcl, drive, index):
-    drive.through(mcl, index, index + 1)
-    return mcl
+def drive_on(localizer, drive, index):
+    drive.through(localizer, index, index + 1)
+    return localizer
 
 
 def test_another_map_leaves_the_particles_where_they_are(drive):
-    mcl = started(odom_alpha1=0.0, odom_alpha2=0.0, odom_alpha3=0.0, odom_alpha4=0.0)
-    before = drive.through(mcl, last=3)[-1]
-    mcl.set_map(MAPS[GLASS_ROOM])
+    localizer = started(odom_alpha1=0.0, odom_alpha2=0.0, odom_alpha3=0.0, odom_alpha4=0.0)
+    before = drive.through(localizer, last=3)[-1]
+    localizer.set_map(MAPS[GLASS_ROOM])
     blind = replace(drive.scans[2], stamp_ns=drive.scans[2].stamp_ns + 1, ranges_m=np.full(180, np.nan))
-    after = mcl.update(blind, drive.odometry[2])
+    after = localizer.update(blind, drive.odometry[2])
     assert after.updated  # a new map makes an update due
 
     def places(estimate):
@@ -628,26 +633,26 @@ def test_another_map_leaves_the_particles_where_they_are(drive):
 
 def test_in_another_map_the_robot_is_tracked_by_its_walls():
     drive = Drive(GLASS_ROOM, seed=2, centre=(3.0, 1.6), glass_share=0.3)
-    mcl = started(L_ROOM, drive.true[0])
-    mcl.set_map(MAPS[GLASS_ROOM])
-    assert drive.errors(drive.through(mcl))[:, 0].max() < 0.05
+    localizer = started(L_ROOM, drive.true[0])
+    localizer.set_map(MAPS[GLASS_ROOM])
+    assert drive.errors(drive.through(localizer))[:, 0].max() < 0.05
 
 
 def test_a_new_pose_starts_over(drive):
-    mcl = started()
-    drive.through(mcl, last=12)
-    mcl.set_pose(drive.true[0], START_COVARIANCE)  # the robot was carried back; its stamps start over, too
-    assert drive.errors(drive.through(mcl, last=12))[:, 0].max() < 0.05
+    localizer = started()
+    drive.through(localizer, last=12)
+    localizer.set_pose(drive.true[0], START_COVARIANCE)  # the robot was carried back; its stamps start over, too
+    assert drive.errors(drive.through(localizer, last=12))[:, 0].max() < 0.05
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_particles_start_as_the_covariance_says(seed):
     turn = np.array([[np.cos(0.5), -np.sin(0.5), 0.0], [np.sin(0.5), np.cos(0.5), 0.0], [0.0, 0.0, 1.0]])
     covariance = turn @ np.diag([0.2, 0.05, 0.1]) ** 2 @ turn.T
-    mcl = GlassMcl(parameters(max_particles=5000, min_particles=5000), MAPS[L_ROOM], np.random.default_rng(seed))
+    localizer = Localizer(parameters(max_particles=5000, min_particles=5000), MAPS[L_ROOM], np.random.default_rng(seed))
     pose = np.array([2.0, 1.5, np.pi])
-    mcl.set_pose(pose, covariance)
-    estimate = mcl.update(Scan(0, np.full(4, np.nan), np.arange(4.0), 0.1, 10.0, np.zeros(3)), np.zeros(3))
+    localizer.set_pose(pose, covariance)
+    estimate = localizer.update(Scan(0, np.full(4, np.nan), np.arange(4.0), 0.1, 10.0, np.zeros(3)), np.zeros(3))
     off_pose = estimate.particles - pose
     off_pose[:, 2] = angles.wrap(off_pose[:, 2])
     np.testing.assert_allclose(np.cov(off_pose.T), covariance, atol=0.06 * 0.2**2)
@@ -655,9 +660,9 @@ def test_particles_start_as_the_covariance_says(seed):
 
 
 def test_a_start_may_be_exact(drive):
-    mcl = started()
-    mcl.set_pose(drive.true[0], np.zeros((3, 3)))
-    assert drive.errors(drive.through(mcl))[:, 0].max() < 0.05
+    localizer = started()
+    localizer.set_pose(drive.true[0], np.zeros((3, 3)))
+    assert drive.errors(drive.through(localizer))[:, 0].max() < 0.05
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -666,9 +671,9 @@ def test_a_scatter_covers_the_free_cells_and_nothing_else(seed):
     occupancy[5:20, 10:30] = 0
     occupancy[30:35, 50:55] = 0
     grid_map = GridMap(occupancy, 0.1, np.array([3.0, -1.0, 0.4]))
-    mcl = GlassMcl(parameters(max_particles=3000, min_particles=3000), grid_map, np.random.default_rng(seed))
-    mcl.scatter()
-    found = mcl.update(Scan(0, np.full(4, np.nan), np.arange(4.0), 0.1, 10.0, np.zeros(3)), np.zeros(3)).particles
+    localizer = Localizer(parameters(max_particles=3000, min_particles=3000), grid_map, np.random.default_rng(seed))
+    localizer.scatter()
+    found = localizer.update(Scan(0, np.full(4, np.nan), np.arange(4.0), 0.1, 10.0, np.zeros(3)), np.zeros(3)).particles
     assert grid_map.is_free(found[:, :2]).all()
     rows, _ = grid_map.cells(found[:, :2])
     assert np.mean(rows >= 30) == pytest.approx(25.0 / 325.0, abs=0.03)  # by area
@@ -679,9 +684,9 @@ CORNER = np.array([[0.2, 0.2], [2.0, 0.2], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [
 
 
 def test_in_an_area_particles_are_scattered_nowhere_else():
-    mcl = GlassMcl(parameters(max_particles=3000, min_particles=3000), MAPS[L_ROOM], np.random.default_rng(1))
-    mcl.scatter(CORNER)
-    estimate = mcl.update(Scan(0, np.full(4, np.nan), np.arange(4.0), 0.1, 10.0, np.zeros(3)), np.zeros(3))
+    localizer = Localizer(parameters(max_particles=3000, min_particles=3000), MAPS[L_ROOM], np.random.default_rng(1))
+    localizer.scatter(CORNER)
+    estimate = localizer.update(Scan(0, np.full(4, np.nan), np.arange(4.0), 0.1, 10.0, np.zeros(3)), np.zeros(3))
     found = estimate.particles[:, :2]
     assert MAPS[L_ROOM].is_free(found).all()
     half_cell_m = 0.5 * MAPS[L_ROOM].resolution_m
@@ -705,10 +710,10 @@ def test_in_an_area_particles_are_scattered_nowhere_else():
     ],
 )
 def test_an_area_that_is_none_changes_nothing(drive, area, text):
-    mcl = started()
-    drive.through(mcl, last=3)
-    refused(mcl, ValueError, text, lambda mcl: mcl.scatter(area))
-    assert drive.errors(drive.through(mcl, 3, 8))[:, 0].max() < 0.05
+    localizer = started()
+    drive.through(localizer, last=3)
+    refused(localizer, ValueError, text, lambda localizer: localizer.scatter(area))
+    assert drive.errors(drive.through(localizer, 3, 8))[:, 0].max() < 0.05
 
 
 # -- what it says
@@ -779,18 +784,18 @@ def test_ranges_outside_the_limits_do_not_matter(drive, limits, garbage):
 
 @pytest.mark.parametrize("nothing", [np.nan, np.inf, -np.inf])
 def test_single_beams_without_answer_are_uncertain_and_do_no_harm(drive, nothing):
-    mcl = started()
+    localizer = started()
     for index, (scan, odom, true) in enumerate(zip(drive.scans, drive.odometry, drive.true)):
         ranges_m = scan.ranges_m.copy()
         ranges_m[index % 3 :: 3] = nothing
-        estimate = mcl.update(replace(scan, ranges_m=ranges_m), odom)
+        estimate = localizer.update(replace(scan, ranges_m=ranges_m), odom)
         assert not estimate.cases.case[index % 3 :: 3].any()
         assert off(estimate.map_from_base, true)[0] < 0.05
 
 
-def refused(mcl, kind, text, call):
+def refused(localizer, kind, text, call):
     with pytest.raises(kind) as err:
-        call(mcl)
+        call(localizer)
     assert type(err.value) is kind
     assert str(err.value) == text
 
@@ -799,49 +804,49 @@ BAD_INPUT = [
     pytest.param(
         ScanError,
         "scan at 1.000 s: time runs backwards, the last scan was at 3.000 s",
-        lambda mcl, drive: mcl.update(drive.scans[1], drive.odometry[4]),
+        lambda localizer, drive: localizer.update(drive.scans[1], drive.odometry[4]),
         id="time runs backwards",
     ),
     pytest.param(
         ScanError,
         "scan at 4.000 s: odometry must be finite x, y, yaw, got [ 0. nan  0.]",
-        lambda mcl, drive: mcl.update(drive.scans[4], np.array([0.0, np.nan, 0.0])),
+        lambda localizer, drive: localizer.update(drive.scans[4], np.array([0.0, np.nan, 0.0])),
         id="odometry NaN",
     ),
     pytest.param(
         ScanError,
         "scan at 4.000 s: odometry must be finite x, y, yaw, got [0. 0.]",
-        lambda mcl, drive: mcl.update(drive.scans[4], np.zeros(2)),
+        lambda localizer, drive: localizer.update(drive.scans[4], np.zeros(2)),
         id="odometry of two numbers",
     ),
     pytest.param(
         ValueError,
         "a pose needs finite x, y, yaw, got [ 0.  0. inf]",
-        lambda mcl, drive: mcl.set_pose(np.array([0.0, 0.0, np.inf]), np.zeros((3, 3))),
+        lambda localizer, drive: localizer.set_pose(np.array([0.0, 0.0, np.inf]), np.zeros((3, 3))),
         id="pose inf",
     ),
     pytest.param(
         ValueError,
         "a pose needs finite x, y, yaw, got [0. 0.]",
-        lambda mcl, drive: mcl.set_pose(np.zeros(2), np.zeros((3, 3))),
+        lambda localizer, drive: localizer.set_pose(np.zeros(2), np.zeros((3, 3))),
         id="pose of two numbers",
     ),
     pytest.param(
         ValueError,
         "a pose needs a finite covariance (3, 3), got [[nan, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]",
-        lambda mcl, drive: mcl.set_pose(np.zeros(3), np.diag([np.nan, 1.0, 1.0])),
+        lambda localizer, drive: localizer.set_pose(np.zeros(3), np.diag([np.nan, 1.0, 1.0])),
         id="covariance NaN",
     ),
     pytest.param(
         ValueError,
         "a pose needs a finite covariance (3, 3), got [[1.0, 0.0], [0.0, 1.0]]",
-        lambda mcl, drive: mcl.set_pose(np.zeros(3), np.eye(2)),
+        lambda localizer, drive: localizer.set_pose(np.zeros(3), np.eye(2)),
         id="covariance (2, 2)",
     ),
     pytest.param(
         ValueError,
         "the covariance of a pose must be symmetric, got [[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]",
-        lambda mcl, drive: mcl.set_pose(
+        lambda localizer, drive: localizer.set_pose(
             np.zeros(3), np.eye(3) + 0.5 * np.eye(3)[[1, 1, 1]] * np.array([[1.0], [0.0], [0.0]])
         ),
         id="asymmetric covariance",
@@ -849,7 +854,7 @@ BAD_INPUT = [
     pytest.param(
         ValueError,
         "the covariance of a pose must not be negative, got [[1.0, 0.0, 0.0], [0.0, -0.1, 0.0], [0.0, 0.0, 1.0]]",
-        lambda mcl, drive: mcl.set_pose(np.zeros(3), np.diag([1.0, -0.1, 1.0])),
+        lambda localizer, drive: localizer.set_pose(np.zeros(3), np.diag([1.0, -0.1, 1.0])),
         id="negative covariance",
     ),
 ]
@@ -861,7 +866,7 @@ def test_what_cannot_be_used_is_refused_in_one_line_and_changes_nothing(drive, k
     asked, twin = started(seed=9), started(seed=9)
     drive.through(asked, last=4)
     drive.through(twin, last=4)
-    refused(asked, kind, text, lambda mcl: call(mcl, drive))
+    refused(asked, kind, text, lambda localizer: call(localizer, drive))
     for one, other in zip(drive.through(asked, 4, 7), drive.through(twin, 4, 7)):
         same(one, other)
 
@@ -875,62 +880,64 @@ def test_limits_that_leave_nothing_of_a_scan_refuse_it_and_change_nothing(drive)
         asked,
         ScanError,
         "scan at 5.000 s: no range is left between 0.1 m and 0.08 m",
-        lambda mcl: mcl.update(short, drive.odometry[5]),
+        lambda localizer: localizer.update(short, drive.odometry[5]),
     )
     same(drive.through(asked, 5, 6)[0], drive.through(twin, 5, 6)[0])
 
 
 def test_two_scans_may_bear_the_same_stamp(drive):
-    mcl = started()
-    drive.through(mcl, last=3)
-    assert mcl.update(drive.scans[2], drive.odometry[2]).stamp_ns == drive.scans[2].stamp_ns
+    localizer = started()
+    drive.through(localizer, last=3)
+    assert localizer.update(drive.scans[2], drive.odometry[2]).stamp_ns == drive.scans[2].stamp_ns
 
 
 def test_before_a_start_there_is_nothing_to_update(drive):
-    mcl = GlassMcl(parameters(), MAPS[L_ROOM], np.random.default_rng(0))
+    localizer = Localizer(parameters(), MAPS[L_ROOM], np.random.default_rng(0))
     refused(
-        mcl,
+        localizer,
         RuntimeError,
         "update() needs set_pose() or scatter() first",
-        lambda mcl: mcl.update(drive.scans[0], drive.odometry[0]),
+        lambda localizer: localizer.update(drive.scans[0], drive.odometry[0]),
     )
-    mcl.set_pose(drive.true[0], START_COVARIANCE)
-    assert drive.errors(drive.through(mcl))[:, 0].max() < 0.05
+    localizer.set_pose(drive.true[0], START_COVARIANCE)
+    assert drive.errors(drive.through(localizer))[:, 0].max() < 0.05
 
 
 @pytest.mark.parametrize("cell", [100, -1, 50])
 def test_on_a_map_without_free_cells_nothing_can_be_scattered(drive, cell):
-    mcl = started()
-    drive.through(mcl, last=3)
-    mcl.set_map(GridMap(np.full((20, 20), cell, np.int8), 0.1, np.zeros(3)))
-    refused(mcl, ValueError, "the map has no free cell to put particles on", lambda mcl: mcl.scatter())
-    mcl.set_map(MAPS[L_ROOM])
-    assert drive.errors(drive.through(mcl, 3, 8))[:, 0].max() < 0.05  # it still knows where it was
+    localizer = started()
+    drive.through(localizer, last=3)
+    localizer.set_map(GridMap(np.full((20, 20), cell, np.int8), 0.1, np.zeros(3)))
+    refused(
+        localizer, ValueError, "the map has no free cell to put particles on", lambda localizer: localizer.scatter()
+    )
+    localizer.set_map(MAPS[L_ROOM])
+    assert drive.errors(drive.through(localizer, 3, 8))[:, 0].max() < 0.05  # it still knows where it was
 
 
 @pytest.mark.parametrize("cell", [100, -1])
 @pytest.mark.parametrize("start", ["placed", "placed vaguely", "searched for"])
 def test_a_robot_on_a_map_without_room_goes_on_by_odometry(drive, cell, start):
-    mcl = started()
+    localizer = started()
     if start == "searched for":
-        mcl.scatter()
-    mcl.set_map(GridMap(np.full((200, 200), cell, np.int8), 0.05, np.array([-2.0, -2.0, 0.0])))
+        localizer.scatter()
+    localizer.set_map(GridMap(np.full((200, 200), cell, np.int8), 0.05, np.array([-2.0, -2.0, 0.0])))
     if start == "placed vaguely":
-        mcl.set_pose(drive.true[0], np.diag([4.0, 4.0, 1.0]))
-    estimates = drive.through(mcl, last=20)
+        localizer.set_pose(drive.true[0], np.diag([4.0, 4.0, 1.0]))
+    estimates = drive.through(localizer, last=20)
     assert all(np.all(np.isfinite(estimate.map_from_base)) for estimate in estimates)
     assert not any(estimate.state == "LOCALIZED" for estimate in estimates[5:])
 
 
 def test_a_filter_that_is_given_up_leaves_the_memory_at_once(drive):
-    mcl = started()
-    drive.through(mcl, last=3)
-    mcl.scatter()
-    drive.through(mcl, last=3)
-    gone = weakref.ref(mcl)
+    localizer = started()
+    drive.through(localizer, last=3)
+    localizer.scatter()
+    drive.through(localizer, last=3)
+    gone = weakref.ref(localizer)
     gc.disable()  # a cycle of references would wait for it, with all that hangs on it
     try:
-        del mcl
+        del localizer
         assert gone() is None
     finally:
         gc.enable()
@@ -938,10 +945,10 @@ def test_a_filter_that_is_given_up_leaves_the_memory_at_once(drive):
 
 def test_a_search_goes_on_in_another_map():
     drive = Drive(GLASS_ROOM, seed=2, centre=(3.0, 1.6), glass_share=0.3)
-    mcl = started(L_ROOM, drive.true[0])
-    mcl.scatter()
-    mcl.set_map(MAPS[GLASS_ROOM])
-    assert drive.errors(drive.through(mcl))[-5:, 0].max() < 0.1
+    localizer = started(L_ROOM, drive.true[0])
+    localizer.scatter()
+    localizer.set_map(MAPS[GLASS_ROOM])
+    assert drive.errors(drive.through(localizer))[-5:, 0].max() < 0.1
 
 
 def test_on_a_map_without_walls_odometry_alone_leads():
@@ -993,9 +1000,9 @@ def test_one_absurd_scan_moves_nobody(seed):
 @pytest.mark.parametrize("seed", range(4))
 def test_a_robot_that_knows_nothing_finds_itself(seed):
     drive = Drive(seed=seed, steps=20)
-    mcl = GlassMcl(parameters(min_particles=2000, max_particles=5000), MAPS[L_ROOM], np.random.default_rng(seed))
-    mcl.scatter()
-    estimates = drive.through(mcl)
+    localizer = Localizer(parameters(min_particles=2000, max_particles=5000), MAPS[L_ROOM], np.random.default_rng(seed))
+    localizer.scatter()
+    estimates = drive.through(localizer)
     assert estimates[-1].state == "LOCALIZED"
     way_m, turn_rad = drive.errors(estimates)[-1]
     assert way_m < 0.05 and turn_rad < np.radians(1.5)
@@ -1044,12 +1051,12 @@ def blind(scan):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_bearings_place_a_robot_that_sees_nothing_else(drive, seed):
-    mcl = GlassMcl(parameters(max_particles=3000), MAPS[L_ROOM], np.random.default_rng(seed))
-    mcl.set_pose(drive.true[0] + [0.4, -0.4, 0.2], np.diag([0.5, 0.5, 0.3]) ** 2)
-    spread = np.sqrt(np.trace(mcl.update(blind(drive.scans[0]), drive.odometry[0]).covariance[:2, :2]))
+    localizer = Localizer(parameters(max_particles=3000), MAPS[L_ROOM], np.random.default_rng(seed))
+    localizer.set_pose(drive.true[0] + [0.4, -0.4, 0.2], np.diag([0.5, 0.5, 0.3]) ** 2)
+    spread = np.sqrt(np.trace(localizer.update(blind(drive.scans[0]), drive.odometry[0]).covariance[:2, :2]))
     for scan, odom, true in list(zip(drive.scans, drive.odometry, drive.true))[1:5]:
-        mcl.add_bearings(tags_seen(true), TAGS, odom)
-        estimate = mcl.update(blind(scan), odom)
+        localizer.add_bearings(tags_seen(true), TAGS, odom)
+        estimate = localizer.update(blind(scan), odom)
     way_m, turn_rad = off(estimate.map_from_base, true)
     assert way_m < 0.12 and turn_rad < 0.06
     assert np.sqrt(np.trace(estimate.covariance[:2, :2])) < 0.4 * spread
@@ -1059,60 +1066,60 @@ def test_bearings_are_carried_along_by_odometry_to_the_next_scan():
     exact = Drive(way_share=0.0)
     true, odom, step = exact.true[0], exact.odometry[0], np.array([0.8, 0.1, 0.5])
     later, moved = se2.compose(true, step), se2.compose(odom, step)
-    mcl = GlassMcl(parameters(max_particles=3000), MAPS[L_ROOM], np.random.default_rng(0))
-    mcl.set_pose(later + [0.3, -0.3, 0.1], np.diag([0.4, 0.4, 0.2]) ** 2)
-    mcl.add_bearings(tags_seen(true), TAGS, odom)  # taken before the step
-    estimate = mcl.update(blind(exact.scans[0]), moved)
+    localizer = Localizer(parameters(max_particles=3000), MAPS[L_ROOM], np.random.default_rng(0))
+    localizer.set_pose(later + [0.3, -0.3, 0.1], np.diag([0.4, 0.4, 0.2]) ** 2)
+    localizer.add_bearings(tags_seen(true), TAGS, odom)  # taken before the step
+    estimate = localizer.update(blind(exact.scans[0]), moved)
     assert off(estimate.map_from_base, later)[0] < 0.2  # 0.42 before, and 0.8 if the step were left out
 
 
 def test_bearings_make_a_standing_robot_update_once(drive):
-    mcl = started()
-    assert mcl.update(drive.scans[0], drive.odometry[0]).updated
+    localizer = started()
+    assert localizer.update(drive.scans[0], drive.odometry[0]).updated
     again = replace(drive.scans[0], stamp_ns=drive.scans[0].stamp_ns + 1)
-    assert not mcl.update(again, drive.odometry[0]).updated
-    mcl.add_bearings(tags_seen(drive.true[0]), TAGS, drive.odometry[0])
-    assert mcl.update(again, drive.odometry[0]).updated
-    assert not mcl.update(again, drive.odometry[0]).updated
+    assert not localizer.update(again, drive.odometry[0]).updated
+    localizer.add_bearings(tags_seen(drive.true[0]), TAGS, drive.odometry[0])
+    assert localizer.update(again, drive.odometry[0]).updated
+    assert not localizer.update(again, drive.odometry[0]).updated
 
 
 def test_a_new_start_forgets_the_bearings_before_it(drive):
-    mcl, fresh = started(seed=4), started(seed=4)
-    mcl.add_bearings(tags_seen(drive.true[0] + [1.0, 0.0, 0.0]), TAGS, drive.odometry[0])
-    for each in (mcl, fresh):
+    localizer, fresh = started(seed=4), started(seed=4)
+    localizer.add_bearings(tags_seen(drive.true[0] + [1.0, 0.0, 0.0]), TAGS, drive.odometry[0])
+    for each in (localizer, fresh):
         each.set_pose(drive.true[0], START_COVARIANCE)
-    same(mcl.update(drive.scans[0], drive.odometry[0]), fresh.update(drive.scans[0], drive.odometry[0]))
+    same(localizer.update(drive.scans[0], drive.odometry[0]), fresh.update(drive.scans[0], drive.odometry[0]))
 
 
 def test_bearings_agree_with_a_drive_and_one_wrong_does_no_harm(drive):
-    mcl = started()
+    localizer = started()
     for number, (scan, odom, true) in enumerate(zip(drive.scans, drive.odometry, drive.true)):
         if number % 5 == 4:
             taken = tags_seen(true)
             taken.angles_rad[1] += 1.0
-            mcl.add_bearings(taken, TAGS, odom)
-        assert off(mcl.update(scan, odom).map_from_base, true)[0] < 0.06
+            localizer.add_bearings(taken, TAGS, odom)
+        assert off(localizer.update(scan, odom).map_from_base, true)[0] < 0.06
 
 
 def test_bearings_end_a_search_among_places_that_look_alike():
     square = Building([(0, 0), (6, 0), (6, 6), (0, 6)])
     true, rng = np.array([2.0, 1.5, 0.4]), np.random.default_rng(0)
-    mcl = GlassMcl(parameters(), square.grid_map(), np.random.default_rng(0))
-    mcl.scatter()
+    localizer = Localizer(parameters(), square.grid_map(), np.random.default_rng(0))
+    localizer.scatter()
     states = []
     for second in range(4):
         if second == 2:
-            mcl.add_bearings(tags_seen(true), TAGS, np.zeros(3))
-        estimate = mcl.update(square.scan(true, second * SECOND_NS, rng), np.zeros(3))
+            localizer.add_bearings(tags_seen(true), TAGS, np.zeros(3))
+        estimate = localizer.update(square.scan(true, second * SECOND_NS, rng), np.zeros(3))
         states.append(estimate.state)
     assert states[:2] == ["GLOBAL_SEARCH"] * 2 and "GLOBAL_SEARCH" not in states[2:]
     assert off(estimate.map_from_base, true)[0] < 0.1
 
 
 def test_bearings_that_cannot_be_used_are_refused_and_change_nothing(drive):
-    mcl, other = started(seed=2), started(seed=2)
+    localizer, other = started(seed=2), started(seed=2)
     with pytest.raises(UnknownLandmark, match="^landmark 'z' is not on the map"):
-        mcl.add_bearings(bearings.standing(["z"], np.zeros(1), 0.1), TAGS, np.zeros(3))
+        localizer.add_bearings(bearings.standing(["z"], np.zeros(1), 0.1), TAGS, np.zeros(3))
     with pytest.raises(ValueError, match="^odometry of bearings must be finite x, y, yaw, got "):
-        mcl.add_bearings(tags_seen(drive.true[0]), TAGS, np.array([0.0, np.nan, 0.0]))
-    same(mcl.update(drive.scans[0], drive.odometry[0]), other.update(drive.scans[0], drive.odometry[0]))
+        localizer.add_bearings(tags_seen(drive.true[0]), TAGS, np.array([0.0, np.nan, 0.0]))
+    same(localizer.update(drive.scans[0], drive.odometry[0]), other.update(drive.scans[0], drive.odometry[0]))

@@ -37,18 +37,18 @@ from glass_nav.localization.bearings import triangulation
 from glass_nav.localization.bearings.triangulation import Fix, TriangulationLimits
 from glass_nav.msg import LandmarkBearings as LandmarkBearingsMsg
 from glass_nav.msg import LocalizationStatus
-from glass_nav.ros import conversions, shutdown
+from glass_nav.ros import conversions, mailbox, shutdown
 from glass_nav.ros.landmarks import bearing_messages, landmark_display
 from glass_nav.ros.log_throttle import LogThrottle
-from glass_nav.ros.mailbox import Errand, Mailbox
+from glass_nav.ros.loop_clock import LoopClock
+from glass_nav.ros.mailbox import Mailbox
 from glass_nav.sensing import bearings
 from glass_nav.sensing.bearings import LandmarkBearing, LandmarkBearings, OdometryDrift
 from glass_nav.world import landmark_file
 from glass_nav.world.landmark_map import LandmarkMap
 
 METHODS = ("least_squares", "document")
-TIME_JUMP_S = 0.5  # a clock that goes back by less is noise between machines
-ERRAND_TIMEOUT_S = 10.0
+SERVICE_TIMEOUT_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class LandmarksNode:
         self._why_none = "no bearings came yet"
         self._state = ""
         self._sent_ns = self._rescued_ns = 0  # stamps of fixes
-        self._now_s = rospy.get_time()
+        self._clock = LoopClock()
 
         self._tf = tf2_ros.Buffer(rospy.Duration(bearing_messages.LONGEST_TURN_S))
         self._poses = rospy.Publisher("~pose", PoseWithCovarianceStamped, queue_size=5)
@@ -163,7 +163,7 @@ class LandmarksNode:
                 command()
             for msg in mail["states"]:
                 self._state = msg.state_name
-            self._waiting += [(self._now_s, msg) for msg in mail["bearings"]]
+            self._waiting += [(self._clock.now_s, msg) for msg in mail["bearings"]]
             self._work_off()
             if self._state in self._p.rescue_states.split():
                 self._rescue()
@@ -175,7 +175,7 @@ class LandmarksNode:
         while self._waiting:
             arrival_s, msg = self._waiting[0]
             missing = self._missing_transform(msg)
-            if missing and self._now_s - arrival_s <= self._p.transform_wait_s:
+            if missing and self._clock.now_s - arrival_s <= self._p.transform_wait_s:
                 return
             del self._waiting[0]
             if missing:
@@ -256,10 +256,8 @@ class LandmarksNode:
     # -- initialpose
 
     def _serve_send(self, _request: TriggerRequest) -> TriggerResponse:
-        errand = Errand(self._send_on_request)
-        self._inbox.put("commands", errand.run)
         try:
-            errand.wait(ERRAND_TIMEOUT_S)
+            mailbox.outcome(self._inbox.submit("commands", self._send_on_request), SERVICE_TIMEOUT_S)
         except (ValueError, TimeoutError) as err:
             return TriggerResponse(success=False, message=str(err))
         return TriggerResponse(success=True, message="sent to initialpose")
@@ -267,7 +265,7 @@ class LandmarksNode:
     def _send_on_request(self) -> None:
         if self._fix is None:
             raise ValueError(f"there is no position: {self._why_none}")
-        age_s = self._now_s - self._fix.stamp_ns * 1e-9
+        age_s = self._clock.now_s - self._fix.stamp_ns * 1e-9
         if age_s > self._p.max_age_s:
             raise ValueError(
                 f"the last position is {age_s:.0f} s old, allowed {self._p.max_age_s:g} s; since then: {self._why_none}"
@@ -307,10 +305,10 @@ class LandmarksNode:
         rospy.loginfo(f"initialpose sent, {why}")
 
     def _clock_jumped_back(self) -> bool:
-        before_s, self._now_s = self._now_s, rospy.get_time()
-        if self._now_s >= before_s - TIME_JUMP_S:
+        jump = self._clock.tick()
+        if jump is None:
             return False
-        rospy.logwarn(f"time jumped back by {before_s - self._now_s:.3f} s: bearings start over")
+        rospy.logwarn(f"{jump}: bearings start over")
         self._tf.clear()
         self._waiting, self._newest, self._fix, self._state = [], {}, None, ""
         self._why_none = "no bearings came since time jumped back"

@@ -9,7 +9,7 @@ import numpy as np
 import rospy
 import tf2_ros
 
-from glass_nav.localization.localizer import GlassMcl
+from glass_nav.localization.localizer import Localizer
 from glass_nav.msg import LandmarkBearings
 from glass_nav.ros import conversions
 from glass_nav.ros.landmarks import bearing_messages
@@ -41,14 +41,14 @@ class BearingInput:
         """Let a message wait for the next scan."""
         self._waiting.append(msg)
 
-    def give(self, mcl: GlassMcl, scan_ns: int) -> None:
+    def give(self, localizer: Localizer, scan_ns: int) -> None:
         """Hand the filter what is not newer than the scan that it is about to see, and whose odometry is there then."""
         for msg in list(self._waiting):
             if conversions.ns_from_stamp(msg.header.stamp) > scan_ns:
                 continue
             self._waiting.remove(msg)
             try:
-                self._add(mcl, msg)
+                self._add(localizer, msg)
             except (ValueError, tf2_ros.TransformException) as err:
                 self._log.warn(f"bearings not used: {err}")
 
@@ -56,7 +56,7 @@ class BearingInput:
         """Forget what waits: time has jumped."""
         self._waiting.clear()
 
-    def _add(self, mcl: GlassMcl, msg: LandmarkBearings) -> None:
+    def _add(self, localizer: Localizer, msg: LandmarkBearings) -> None:
         """One message, those of its bearings that are to known landmarks."""
         mounting = conversions.mounting_from_transform(
             self._tf.lookup_transform(
@@ -72,7 +72,7 @@ class BearingInput:
             self._log.warn(f"bearings to landmarks that are not in {self._p.landmark_file} are not used")
         if known:
             odometry = np.array([self._odom_from_base(bearing.stamp_ns) for bearing in known])
-            mcl.add_bearings(
+            localizer.add_bearings(
                 bearings.collected(known, odometry, mounting.base_from_laser), self._landmarks, odometry[-1]
             )
 

@@ -11,7 +11,7 @@ import tf2_ros
 
 from glass_nav.geometry import se2
 from glass_nav.localization import saved_pose
-from glass_nav.localization.localizer import GlassMcl
+from glass_nav.localization.localizer import Localizer
 from glass_nav.ros import conversions
 from glass_nav.ros.conversions import PoseGuess
 from glass_nav.ros.localization.params import LocalizationParams
@@ -39,17 +39,17 @@ class InitialPoses:
         self._home: Optional[Tuple[np.ndarray, np.ndarray]] = None if p.node.start_without_guess else self._default
         self._whose = "the pose of its parameters"
 
-    def begin(self, mcl: GlassMcl) -> str:
+    def begin(self, localizer: Localizer) -> str:
         """Place the particles of a new filter; where, in words that go on a sentence."""
         if self._home is None:
             try:
-                mcl.scatter()
+                localizer.scatter()
             except ValueError as err:
                 rospy.logwarn(f"no search of the whole map: {err}; starting at ~initial_pose_x, _y, _a")
             else:
                 return "anywhere in the map"
         pose, covariance = self._default if self._home is None else self._home
-        mcl.set_pose(pose, covariance)
+        localizer.set_pose(pose, covariance)
         return f"at {self._whose}, x {pose[0]:.3f} m, y {pose[1]:.3f} m, yaw {pose[2]:.3f} rad"
 
     def give(self, guess: PoseGuess, now_s: float) -> None:
@@ -66,11 +66,13 @@ class InitialPoses:
         """Where begin() places the particles from now on: the last pose of a filter."""
         self._home, self._whose = (map_from_base, covariance), "its last pose"
 
-    def apply(self, mcl: GlassMcl, grid_map: GridMap, scan_ns: int, odom_from_base: np.ndarray, now_s: float) -> bool:
+    def apply(
+        self, localizer: Localizer, grid_map: GridMap, scan_ns: int, odom_from_base: np.ndarray, now_s: float
+    ) -> bool:
         """Start over at the pose that waits, if one does and it is its time; whether it was done."""
         if self._pose_file_waits:
             self._pose_file_waits = False
-            return self._resume(mcl, grid_map, scan_ns, odom_from_base)
+            return self._resume(localizer, grid_map, scan_ns, odom_from_base)
         if self._waiting is None:
             return False
         guess = self._waiting.guess
@@ -81,7 +83,7 @@ class InitialPoses:
         map_from_base = self._moved_on(guess, odom_from_base)
         try:
             refuse_outside(guess, grid_map)
-            mcl.set_pose(map_from_base, guess.covariance)
+            localizer.set_pose(map_from_base, guess.covariance)
         except ValueError as err:
             rospy.logwarn(f"initialpose refused: {err}")
             return False
@@ -90,20 +92,20 @@ class InitialPoses:
         rospy.loginfo(f"starting at x {x:.3f} m, y {y:.3f} m, yaw {yaw:.3f} rad")
         return True
 
-    def _resume(self, mcl: GlassMcl, grid_map: GridMap, scan_ns: int, odom_from_base: np.ndarray) -> bool:
+    def _resume(self, localizer: Localizer, grid_map: GridMap, scan_ns: int, odom_from_base: np.ndarray) -> bool:
         """Start where the pose file says, or search the whole map if it is not to be believed; whether one was done."""
         limits = self._p.pose_file
         try:
             saved = saved_pose.load(limits.path)
             pose, covariance, why = saved_pose.resumed(saved, scan_ns, grid_map.digest, odom_from_base, limits)
-            mcl.set_pose(pose, covariance)
+            localizer.set_pose(pose, covariance)
         except FileNotFoundError:
             rospy.loginfo(f"no pose file {limits.path} yet")
             return False
         except ValueError as err:
             rospy.logwarn(f"the pose file {limits.path} is not used: {err}; the robot may be anywhere in the map")
             self._home = None
-            self.begin(mcl)
+            self.begin(localizer)
             return True
         self.begin_at(pose, covariance)
         x, y, yaw = pose

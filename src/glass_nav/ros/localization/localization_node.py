@@ -1,6 +1,6 @@
 """localization_node: where is the robot in a map of walls and glass? Also startable as `amcl`.
 
-Wiring only; the answer comes from GlassMcl. Callbacks store, one loop works: nothing else touches the filter.
+Wiring only; the answer comes from the Localizer. Callbacks store, one loop works: nothing else touches the filter.
 
 Subscribes: scan (LaserScan; or each of ~scan_topics), initialpose (PoseWithCovarianceStamped), map (OccupancyGrid, if
     ~use_map_topic), global_localization_area (PolygonStamped in the map's frame: the robot is searched for in it),
@@ -17,7 +17,7 @@ Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseAr
     (Image, latched).
 Services: global_localization, request_nomotion_update (Empty), set_map (SetMap), ~set_parameters (Reconfigure, with
     its topics ~parameter_descriptions and ~parameter_updates). Calls static_map (GetMap).
-Parameters: LocalizationNodeParams and GlassMclParams; explained in config/localization.yaml.
+Parameters: LocalizationNodeParams and LocalizerParams; explained in config/localization.yaml.
 """
 
 from __future__ import annotations
@@ -39,29 +39,31 @@ from nav_msgs.srv import SetMap, SetMapRequest, SetMapResponse
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
-from glass_nav.localization.localizer import Estimate, GlassMcl
-from glass_nav.ros import conversions, shutdown
+from glass_nav.localization import health
+from glass_nav.localization.health import LocalizationHealth, Situation
+from glass_nav.localization.localizer import Estimate, Localizer
+from glass_nav.ros import conversions, mailbox, shutdown
+from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.landmarks.bearing_messages import LONGEST_TURN_S
 from glass_nav.ros.localization import initial_poses, params, reconfigure
 from glass_nav.ros.localization.bearing_input import BearingInput
-from glass_nav.ros.localization.diagnostics import Diagnostics, Situation
 from glass_nav.ros.localization.initial_poses import InitialPoses
 from glass_nav.ros.localization.map_source import MapSource
 from glass_nav.ros.localization.pose_memory import PoseMemory
 from glass_nav.ros.localization.publishers import Publishers
 from glass_nav.ros.localization.reconfigure import ReconfigureServer
 from glass_nav.ros.log_throttle import LogThrottle
-from glass_nav.ros.mailbox import Errand, Mailbox
+from glass_nav.ros.loop_clock import LoopClock
+from glass_nav.ros.mailbox import Mailbox
 from glass_nav.ros.scan_input import STALE_SCANS, ScanInput
 from glass_nav.sensing.scan import Scan, ScanError
 from glass_nav.world import landmark_file
 from glass_nav.world.grid_map import GridMap
 
-TIME_JUMP_S = 0.5  # a clock that goes back by less is noise between machines
 NO_SCAN_WARNING_S = 15.0  # as AMCL
 SILENCE_S = 3.0  # without a used scan for that long, ~status says why
 SETTLING_S = 5.0  # a player of a launch file needs some seconds: no warning before
-ERRAND_TIMEOUT_S = 30.0
+SERVICE_TIMEOUT_S = 30.0
 
 
 class LocalizationNode:
@@ -70,7 +72,7 @@ class LocalizationNode:
     def __init__(self, p: params.LocalizationParams) -> None:
         self._p = p
         self._rng = p.node.rng
-        self._mcl: Optional[GlassMcl] = None
+        self._localizer: Optional[Localizer] = None
         self._map: Optional[GridMap] = None
         self._map_origin = ""  # where it came from, in words
         self._waits = p.node.wait_for_initialpose  # with a map, without a filter
@@ -79,7 +81,8 @@ class LocalizationNode:
         self._pose_is_news = True
         self._log = LogThrottle()
         self._inbox = Mailbox(scans=100, commands=100)
-        self._now_s = self._last_estimate_s = rospy.get_time()
+        self._clock = LoopClock()
+        self._last_estimate_s = self._clock.now_s
         self._started_s = time.monotonic()
         self._simulated = bool(rospy.get_param("/use_sim_time", False))
         self._next_report_s = 0.0  # by the monotonic clock
@@ -91,7 +94,8 @@ class LocalizationNode:
         self._starts = InitialPoses(p, self._tf)
         self._memory = PoseMemory(p.pose_file, self._log)
         self._outputs = Publishers(p.node)
-        self._diagnostics = Diagnostics(p.node, self._scans.counts)
+        self._health = LocalizationHealth(p.node.warn_deviations, self._scans.counts)
+        self._diagnostics = Diagnostics(*health.ENTRIES)
 
         rospy.Service("global_localization", Empty, self._serve_global_localization)
         rospy.Service("request_nomotion_update", Empty, self._serve_nomotion_update)
@@ -99,7 +103,7 @@ class LocalizationNode:
         self._reconfigure = ReconfigureServer(
             params.changeable(p),
             reconfigure.explanations(_parameter_file()),
-            lambda values: self._run_errand(lambda: self._take_parameters(values)),
+            lambda values: self._in_run_loop(lambda: self._take_parameters(values)),
         )
         # Subscribers last: they may fire at once.
         self._listener = tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
@@ -121,17 +125,17 @@ class LocalizationNode:
             self._maps.request()
             mail["scans"] += self._inbox.take_now("scans")  # a new map takes a while
             if self._waits and mail["scans"]:
-                mail["scans"], self._scans.last_arrival_s = [], self._now_s
-            unusable = "there is no map yet" if self._mcl is None else None
+                mail["scans"], self._scans.last_arrival_s = [], self._clock.now_s
+            unusable = "there is no map yet" if self._localizer is None else None
             for msg in mail["scans"]:
-                if self._scans.receive(msg, self._now_s, unusable):
+                if self._scans.receive(msg, self._clock.now_s, unusable):
                     self._restart(f"the last {STALE_SCANS} scans are older than the one before them")
-            if self._mcl is not None:
-                for msg in self._scans.take_ready(self._now_s):
+            if self._localizer is not None:
+                for msg in self._scans.take_ready(self._clock.now_s):
                     self._step(msg)
-            if self._mcl is not None and self._map is not None:
+            if self._localizer is not None and self._map is not None:
                 stamp_ns = 0 if self._estimate is None else self._estimate.stamp_ns
-                self._outputs.send_glass_map(self._mcl, self._map, stamp_ns, self._now_s)
+                self._outputs.send_glass_map(self._localizer, self._map, stamp_ns, self._clock.now_s)
             self._report()
 
     def save_pose(self) -> None:
@@ -143,14 +147,12 @@ class LocalizationNode:
     def _command(self, handle: Callable[[Any], None]) -> Callable[[Any], None]:
         return lambda msg: self._inbox.put("commands", lambda: handle(msg))
 
-    def _run_errand(self, work: Callable[[], None]) -> None:
-        errand = Errand(work)
-        self._inbox.put("commands", errand.run)
-        errand.wait(ERRAND_TIMEOUT_S)
+    def _in_run_loop(self, work: Callable[[], None]) -> None:
+        mailbox.outcome(self._inbox.submit("commands", work), SERVICE_TIMEOUT_S)
 
     def _serve_global_localization(self, _request: EmptyRequest) -> EmptyResponse:
         try:
-            self._run_errand(self._search)
+            self._in_run_loop(self._search)
         except (ValueError, TimeoutError) as err:
             rospy.logwarn(f"global_localization refused: {err}")
             raise rospy.ServiceException(str(err)) from err
@@ -158,14 +160,14 @@ class LocalizationNode:
 
     def _serve_nomotion_update(self, _request: EmptyRequest) -> EmptyResponse:
         try:
-            self._run_errand(lambda: self._core().request_update())
+            self._in_run_loop(lambda: self._core().request_update())
         except (ValueError, TimeoutError) as err:
             raise rospy.ServiceException(str(err)) from err
         return EmptyResponse()
 
     def _serve_set_map(self, request: SetMapRequest) -> SetMapResponse:
         try:
-            self._run_errand(lambda: self._set_map_and_pose(request))
+            self._in_run_loop(lambda: self._set_map_and_pose(request))
         except (ValueError, TimeoutError) as err:
             rospy.logwarn(f"set_map refused: {err}")
             return SetMapResponse(success=False)
@@ -173,14 +175,14 @@ class LocalizationNode:
 
     # -- maps, poses and parameters from outside
 
-    def _core(self) -> GlassMcl:
-        if self._mcl is None:
+    def _core(self) -> Localizer:
+        if self._localizer is None:
             raise ValueError("there is no map yet")
-        return self._mcl
+        return self._localizer
 
     def _use_map(self, grid_map: GridMap, frame: str, origin: str) -> None:
         """Build the filter around the first map; a later one leaves the particles where they are."""
-        if self._mcl is None:
+        if self._localizer is None:
             self._map = grid_map
             if not self._waits:
                 self._begin()
@@ -188,7 +190,7 @@ class LocalizationNode:
             rospy.loginfo(f"the map from {origin} is the one that is in use: nothing changes")
             return
         else:
-            self._mcl.set_map(grid_map)
+            self._localizer.set_map(grid_map)
             self._map = grid_map
         self._map_origin = origin
         self._outputs.glass_is_news()
@@ -205,7 +207,7 @@ class LocalizationNode:
         grid_map = conversions.map_from_msg(request.map)
         initial_poses.refuse_outside(guess, grid_map)
         self._maps.take(grid_map, request.map.header.frame_id, "service set_map")
-        self._starts.give(guess, self._now_s)
+        self._starts.give(guess, self._clock.now_s)
         self._wait_no_more()
         if self._p.node.force_update_after_set_map:
             self._core().request_update()
@@ -213,10 +215,10 @@ class LocalizationNode:
     def _begin(self) -> str:
         """A new filter, at the start that there is; where, in words."""
         assert self._map is not None
-        self._mcl = GlassMcl(self._p.mcl, self._map, self._rng)
+        self._localizer = Localizer(self._p.localizer, self._map, self._rng)
         self._outputs.start_over()
         self._pose_is_news = True
-        return self._starts.begin(self._mcl)
+        return self._starts.begin(self._localizer)
 
     def _take_guess(self, msg: PoseWithCovarianceStamped) -> None:
         try:
@@ -226,7 +228,7 @@ class LocalizationNode:
         except ValueError as err:
             rospy.logwarn(f"initialpose refused: {err}")
             return
-        self._starts.give(guess, self._now_s)
+        self._starts.give(guess, self._clock.now_s)
         self._wait_no_more()
 
     def _wait_no_more(self) -> None:
@@ -255,44 +257,46 @@ class LocalizationNode:
     def _take_parameters(self, values: Dict[str, Any]) -> None:
         """Other parameters; what the filter knows stays. ParamError if one cannot be used, and then none is."""
         p = params.changed(self._p, values, rospy.get_name())
-        if self._mcl is not None:
-            self._mcl.reconfigure(p.mcl)
+        if self._localizer is not None:
+            self._localizer.reconfigure(p.localizer)
         self._p = p
         self._scans.reconfigure(p.node, p.deskew)
         self._outputs.reconfigure(p.node)
-        self._diagnostics.reconfigure(p.node)
+        self._health.warn_deviations = p.node.warn_deviations
 
     # -- scans
 
     def _step(self, msg: LaserScan) -> None:
         """One scan through the filter."""
-        assert self._mcl is not None and self._map is not None
+        assert self._localizer is not None and self._map is not None
         try:
             placed = self._scans.place(msg)
         except ScanError as err:
             self._pass_over(msg, str(err))
             return
         began_cpu_s, began_s = time.process_time(), time.monotonic()
-        if self._starts.apply(self._mcl, self._map, placed.scan.stamp_ns, placed.odom_from_base, self._now_s):
+        if self._starts.apply(
+            self._localizer, self._map, placed.scan.stamp_ns, placed.odom_from_base, self._clock.now_s
+        ):
             self._pose_is_news = True
             if self._p.node.force_update_after_initialpose:
-                self._mcl.request_update()
-        self._bearings.give(self._mcl, placed.scan.stamp_ns)
+                self._localizer.request_update()
+        self._bearings.give(self._localizer, placed.scan.stamp_ns)
         try:
-            estimate = self._mcl.update(placed.scan, placed.odom_from_base)
+            estimate = self._localizer.update(placed.scan, placed.odom_from_base)
         except ValueError as err:  # ScanError, and what the filter cannot work out: a robot drives on by odometry
             self._pass_over(msg, str(err))
             return
-        self._diagnostics.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
+        self._health.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
         if not conversions.is_finite(estimate):
             self._scans.counts.refused += 1
             self._log.error("the filter's pose is not finite: nothing is published")
             return
         self._scans.counts.used += 1
-        self._estimate, self._scan, self._last_estimate_s = estimate, placed.scan, self._now_s
-        self._outputs.send(msg, placed, estimate, self._now_s, self._pose_is_news)
+        self._estimate, self._scan, self._last_estimate_s = estimate, placed.scan, self._clock.now_s
+        self._outputs.send(msg, placed, estimate, self._clock.now_s, self._pose_is_news)
         self._pose_is_news = False
-        self._memory.take(estimate, self._map.digest, self._p.node.save_pose_rate, self._now_s)
+        self._memory.take(estimate, self._map.digest, self._p.node.save_pose_rate, self._clock.now_s)
 
     def _pass_over(self, msg: LaserScan, why: str) -> None:
         """A scan that cannot be used: the pose moves on with the odometry all the same."""
@@ -303,27 +307,26 @@ class LocalizationNode:
     # -- time, and what is missing
 
     def _clock_jumped_back(self) -> bool:
-        before_s, self._now_s = self._now_s, rospy.get_time()
-        if before_s == 0.0:  # the first /clock
-            self._scans.last_arrival_s = self._last_estimate_s = self._now_s
-        if self._now_s >= before_s - TIME_JUMP_S:
-            return False
-        self._restart(f"time jumped back by {before_s - self._now_s:.3f} s")
-        return True
+        jump = self._clock.tick()
+        if self._clock.has_begun:
+            self._scans.last_arrival_s = self._last_estimate_s = self._clock.now_s
+        if jump is not None:
+            self._restart(jump)
+        return jump is not None
 
     def _restart(self, why: str) -> None:
         """Stamps start over: forget them. In simulated time the robot starts over too, else it stays."""
-        self._scans.restart(self._now_s)
+        self._scans.restart(self._clock.now_s)
         self._bearings.restart()
         self._tf.clear()
         self._starts.forget()
-        self._last_estimate_s = self._now_s
+        self._last_estimate_s = self._clock.now_s
         if not self._simulated and self._estimate is not None:
             self._starts.begin_at(self._estimate.map_from_base, self._estimate.covariance)
         self._estimate = None
         self._rng = self._p.node.rng  # a bag that starts over gives the same poses again
         if self._simulated and self._p.node.wait_for_initialpose:
-            self._waits, self._mcl = True, None
+            self._waits, self._localizer = True, None
             rospy.logwarn(f"{why}: it waits for initialpose again")
         elif self._map is not None:
             rospy.logwarn(f"{why}: the filter starts over {self._begin()}")
@@ -336,33 +339,32 @@ class LocalizationNode:
         trouble = self._missing()
         if trouble is not None:
             self._outputs.send_trouble(self._estimate, trouble)
-        self._diagnostics.publish(
-            Situation(
-                self._estimate,
-                self._scan,
-                trouble,
-                self._map,
-                self._map_origin if self._map else self._maps.trouble or "no map yet",
-                self._scans.period_s,
-                self._scans.lidars,
-            )
+        situation = Situation(
+            self._estimate,
+            self._scan,
+            trouble,
+            self._map,
+            self._map_origin if self._map else self._maps.trouble or "no map yet",
+            self._scans.period_s,
+            self._scans.lidars,
         )
+        self._diagnostics.publish(self._health.report(situation))
 
     def _missing(self) -> Optional[str]:
         """Why no scan is being used; None while all is well."""
-        if self._now_s == 0.0:
+        if self._clock.now_s == 0.0:
             trouble = "time stands still: /use_sim_time is set and nothing publishes /clock"
             if time.monotonic() - self._started_s > SETTLING_S:
                 self._log.warn(trouble, NO_SCAN_WARNING_S)
             return trouble
-        without_scan_s = self._now_s - self._scans.last_arrival_s
+        without_scan_s = self._clock.now_s - self._scans.last_arrival_s
         if without_scan_s > NO_SCAN_WARNING_S:
-            self._log.warn(self._scans.silence(self._now_s), NO_SCAN_WARNING_S)
-        if self._mcl is None:
+            self._log.warn(self._scans.silence(self._clock.now_s), NO_SCAN_WARNING_S)
+        if self._localizer is None:
             return self._maps.trouble or ("it waits for initialpose" if self._map is not None else "no map yet")
         if without_scan_s > SILENCE_S:
-            return self._scans.silence(self._now_s)
-        if self._now_s - self._last_estimate_s > SILENCE_S or self._estimate is None:
+            return self._scans.silence(self._clock.now_s)
+        if self._clock.now_s - self._last_estimate_s > SILENCE_S or self._estimate is None:
             return self._scans.trouble
         return None
 

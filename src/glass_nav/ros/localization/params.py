@@ -16,7 +16,7 @@ import numpy as np
 
 from glass_nav import amcl_parameters, params
 from glass_nav.localization.initial_pose import StartPose
-from glass_nav.localization.localizer_params import GlassMclParams
+from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.saved_pose import PoseFile
 from glass_nav.params import ParamError
 from glass_nav.sensing.deskew import Deskew
@@ -80,6 +80,11 @@ class LocalizationNodeParams:
                 raise ValueError(f"~{name} must be >= 0, got {getattr(self, name)}")
 
     @property
+    def warn_deviations(self) -> np.ndarray:
+        """(3,) ~std_warn_level of x [m], y [m], yaw [rad]."""
+        return np.array([self.std_warn_level_x, self.std_warn_level_y, self.std_warn_level_yaw])
+
+    @property
     def rng(self) -> np.random.Generator:
         """A generator that repeats itself from start to start, unless ~random_seed is negative."""
         return np.random.default_rng(None if self.random_seed < 0 else self.random_seed)
@@ -93,7 +98,7 @@ class LocalizationParams:
     start: StartPose = field(default_factory=StartPose)
     pose_file: PoseFile = field(default_factory=PoseFile)
     deskew: Deskew = field(default_factory=Deskew)
-    mcl: GlassMclParams = field(default_factory=GlassMclParams)
+    localizer: LocalizerParams = field(default_factory=LocalizerParams)
 
 
 # Of the node's own parameters, those that may change while it runs; of the filter's, all.
@@ -116,7 +121,7 @@ CHANGEABLE = (
 def changeable(p: LocalizationParams) -> Dict[str, Any]:
     """Name -> value of the parameters that may change while the node runs."""
     own = params.as_mapping(p.node)
-    return {**params.as_mapping(p.mcl), **params.as_mapping(p.deskew), **{name: own[name] for name in CHANGEABLE}}
+    return {**params.as_mapping(p.localizer), **params.as_mapping(p.deskew), **{name: own[name] for name in CHANGEABLE}}
 
 
 def changed(p: LocalizationParams, values: Mapping[str, Any], owner: str) -> LocalizationParams:

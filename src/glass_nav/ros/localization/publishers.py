@@ -13,7 +13,7 @@ from sensor_msgs.msg import Image, LaserScan, PointCloud2
 from visualization_msgs.msg import MarkerArray
 
 from glass_nav.localization.integrity.pose_state import LOCALIZED
-from glass_nav.localization.localizer import Estimate, GlassMcl
+from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.msg import BeamCases, LocalizationStatus
 from glass_nav.ros import conversions
 from glass_nav.ros.localization import beam_displays, legend, wall_display
@@ -120,13 +120,13 @@ class Publishers:
                 MarkerArray([beam_displays.status_marker(where, self._frame, state, trouble, NOT_KNOWN)])
             )
 
-    def send_glass_map(self, mcl: GlassMcl, grid_map: GridMap, stamp_ns: int, now_s: float) -> None:
+    def send_glass_map(self, localizer: Localizer, grid_map: GridMap, stamp_ns: int, now_s: float) -> None:
         """The glass map, if it is news to somebody and it is time."""
         listeners = self._glass_map.get_num_connections() + self._wall_markers.get_num_connections()
         if not (self._glass_is_news and listeners and self._glass_pace.is_due(now_s, self._p.glass_map_period_s)):
             return
         self._glass_is_news = False
-        glass = mcl.glass_map.occupancy()
+        glass = localizer.glass_map.occupancy()
         self._glass_map.publish(conversions.glass_map_msg(stamp_ns, self._frame, grid_map, glass))
         self._wall_markers.publish(wall_display.wall_markers(self._frame, grid_map, glass))
 

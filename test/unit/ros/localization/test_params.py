@@ -84,6 +84,7 @@ def test_all_of_amcls_parameters_are_known_at_once():
     "given, text",
     [
         ({"min_particle": 3}, "/n: unknown parameter ~min_particle; did you mean ~min_particles?"),
+        ({"polish_with_segments": True}, "/n: unknown parameter ~polish_with_segments"),  # removed
         ({"odom_frame": "odom"}, "did you mean ~odom_frame_id?"),
         ({"tf_broadcast": 1}, "/n: ~tf_broadcast must be bool, got 1"),
         ({"save_pose_rate": "0.5"}, "/n: ~save_pose_rate must be float, got '0.5'"),
@@ -131,7 +132,7 @@ def test_names_that_nobody_knows_are_taken_off_and_said():
 def test_all_parameters_of_the_filter_may_change_and_no_frame():
     p = LocalizationParams()
     values = changeable(p)
-    assert set(as_mapping(p.mcl)) <= set(values)
+    assert set(as_mapping(p.localizer)) <= set(values)
     assert {"transform_tolerance", "tf_broadcast"} <= set(values)
     assert not {"odom_frame_id", "scan_topics", "random_seed", "initial_pose_x"} & set(values)
 
@@ -139,8 +140,8 @@ def test_all_parameters_of_the_filter_may_change_and_no_frame():
 def test_changed_values_reach_their_struct_and_the_rest_stays():
     before, _ = localization_params({"odom_frame_id": "o", "max_particles": 100}, "/n")
     after = changed(before, {"laser_z_hit": 0.5, "transform_tolerance": 0.3}, "/n")
-    assert (after.mcl.mixture.laser_z_hit, after.node.transform_tolerance) == (0.5, 0.3)
-    assert (after.node.odom_frame_id, after.mcl.count) == ("o", before.mcl.count)
+    assert (after.localizer.mixture.laser_z_hit, after.node.transform_tolerance) == (0.5, 0.3)
+    assert (after.node.odom_frame_id, after.localizer.count) == ("o", before.localizer.count)
     with pytest.raises(ParamError, match="/n: ~laser_z_hit must be > 0, got 0.0"):
         changed(before, {"laser_z_hit": 0.0}, "/n")
 

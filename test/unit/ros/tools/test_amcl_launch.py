@@ -71,7 +71,7 @@ def test_what_is_printed_serves_the_replay(capsys, tmp_path, name):
     assert code == 0
     (tmp_path / "ours.yaml").write_text(out)
     loaded, _ = replay_params.load(tmp_path / "ours.yaml")
-    assert loaded.mcl.count.max_particles == {"turtlebot3": 3000, "fetch": 2000}[name]
+    assert loaded.localizer.count.max_particles == {"turtlebot3": 3000, "fetch": 2000}[name]
 
 
 def test_every_parameter_of_amcl_is_taken_or_has_a_reason():
