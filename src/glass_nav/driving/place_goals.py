@@ -29,7 +29,8 @@ class PlaceGoal:
 
     @property
     def name(self) -> str:
-        return f"node {self.node}" if self.node >= 0 else "pose"
+        """For people."""
+        return str(self.node) if self.node >= 0 else "pose"
 
 
 class PlaceTasks:
