@@ -288,7 +288,7 @@ class TopologyNode(unittest.TestCase):
         self.report(observations.Meetpoint(3, 1.5), observations.Traversal(self.turns.last.rank, 8.0, 8.0))
         self.assertTrue(other.wait_for_result(rospy.Duration(30)))
         self.assertEqual(other.get_state(), GoalStatus.ABORTED)
-        self.assertIn("not found behind 1 edges", other.get_goal_status_text())
+        self.assertIn("not found after 1 edges", other.get_goal_status_text())
 
     def test_restart_forgets_the_search(self) -> None:
         self.report(observations.Meetpoint(3, 1.5))

@@ -19,10 +19,10 @@ from glass_nav.ros import conversions
 from glass_nav.ros.conversions import Mounting
 from glass_nav.ros.localization.params import LocalizationNodeParams
 from glass_nav.ros.log_throttle import LogThrottle
-from glass_nav.ros.mailbox import ScanCounts, WaitingScans
 from glass_nav.sensing import deskew
 from glass_nav.sensing.deskew import Deskew
 from glass_nav.sensing.scan import Scan, ScanError
+from glass_nav.sensing.waiting_scans import ScanCounts, WaitingScans
 
 STALE_SCANS = 20  # that many older scans of one lidar in a row: its clock was set back
 MAX_LIDARS = 16  # a driver that makes up a frame for every scan must not fill the memory

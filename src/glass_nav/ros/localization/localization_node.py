@@ -39,12 +39,14 @@ from nav_msgs.srv import SetMap, SetMapRequest, SetMapResponse
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
+from glass_nav.localization import health
+from glass_nav.localization.health import LocalizationHealth, Situation
 from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.ros import conversions, mailbox, shutdown
+from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.landmarks.bearing_messages import LONGEST_TURN_S
 from glass_nav.ros.localization import initial_poses, params, reconfigure
 from glass_nav.ros.localization.bearing_input import BearingInput
-from glass_nav.ros.localization.diagnostics import Diagnostics, Situation
 from glass_nav.ros.localization.initial_poses import InitialPoses
 from glass_nav.ros.localization.map_source import MapSource
 from glass_nav.ros.localization.pose_memory import PoseMemory
@@ -92,7 +94,8 @@ class LocalizationNode:
         self._starts = InitialPoses(p, self._tf)
         self._memory = PoseMemory(p.pose_file, self._log)
         self._outputs = Publishers(p.node)
-        self._diagnostics = Diagnostics(p.node, self._scans.counts)
+        self._health = LocalizationHealth(p.node.warn_deviations, self._scans.counts)
+        self._diagnostics = Diagnostics(*health.ENTRIES)
 
         rospy.Service("global_localization", Empty, self._serve_global_localization)
         rospy.Service("request_nomotion_update", Empty, self._serve_nomotion_update)
@@ -259,7 +262,7 @@ class LocalizationNode:
         self._p = p
         self._scans.reconfigure(p.node, p.deskew)
         self._outputs.reconfigure(p.node)
-        self._diagnostics.reconfigure(p.node)
+        self._health.warn_deviations = p.node.warn_deviations
 
     # -- scans
 
@@ -284,7 +287,7 @@ class LocalizationNode:
         except ValueError as err:  # ScanError, and what the filter cannot work out: a robot drives on by odometry
             self._pass_over(msg, str(err))
             return
-        self._diagnostics.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
+        self._health.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
         if not conversions.is_finite(estimate):
             self._scans.counts.refused += 1
             self._log.error("the filter's pose is not finite: nothing is published")
@@ -336,17 +339,16 @@ class LocalizationNode:
         trouble = self._missing()
         if trouble is not None:
             self._outputs.send_trouble(self._estimate, trouble)
-        self._diagnostics.publish(
-            Situation(
-                self._estimate,
-                self._scan,
-                trouble,
-                self._map,
-                self._map_origin if self._map else self._maps.trouble or "no map yet",
-                self._scans.period_s,
-                self._scans.lidars,
-            )
+        situation = Situation(
+            self._estimate,
+            self._scan,
+            trouble,
+            self._map,
+            self._map_origin if self._map else self._maps.trouble or "no map yet",
+            self._scans.period_s,
+            self._scans.lidars,
         )
+        self._diagnostics.publish(self._health.report(situation))
 
     def _missing(self) -> Optional[str]:
         """Why no scan is being used; None while all is well."""

@@ -23,8 +23,8 @@ from glass_nav.topology.search.followed_poses import MAX_LEAD, FollowedPoses, Ma
 from glass_nav.topology.search.matching import Explained, Matcher, Tolerances, poses_at
 from glass_nav.topology.search.passed_edges import PassedEdges
 from glass_nav.topology.search.search_forest import SearchForest
+from glass_nav.vocabulary import SEARCH_IS_OVER, SearchState
 
-SEARCHING, TENTATIVE, CONFIRMED, AMBIGUOUS, LOST = "SEARCHING", "TENTATIVE", "CONFIRMED", "AMBIGUOUS", "LOST"
 VOTE_MODES = ("best", "seed")
 
 _TREE_EDGES = 2000  # searched for an edge that was not driven yet
@@ -81,10 +81,10 @@ class TurnChoice:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class SearchEstimate:
     """What is known after a meetpoint."""
 
-    state: str
+    state: SearchState
     reason: str  # why, in one sentence
     depth: int  # edges driven so far
     dart: np.ndarray  # (C,) candidates: where the edge that the robot came along leads back
@@ -96,7 +96,7 @@ class Estimate:
     @property
     def done(self) -> bool:
         """Whether the search is over."""
-        return self.state in (CONFIRMED, AMBIGUOUS, LOST)
+        return self.state in SEARCH_IS_OVER
 
 
 class AtlasLocalizer:
@@ -133,7 +133,7 @@ class AtlasLocalizer:
         self._passed = PassedEdges()
         self._seen_places = 0  # by the followed poses, when the last search began
         self._claim: Optional[_Claim] = None
-        self._estimate: Optional[Estimate] = None
+        self._estimate: Optional[SearchEstimate] = None
         self._edges_before = 0  # driven in searches in which nothing fitted at last
         self._search = 1
 
@@ -154,7 +154,7 @@ class AtlasLocalizer:
         return self._matcher
 
     @property
-    def estimate(self) -> Optional[Estimate]:
+    def estimate(self) -> Optional[SearchEstimate]:
         """The last one; None before the first meetpoint."""
         return self._estimate
 
@@ -163,7 +163,7 @@ class AtlasLocalizer:
         """What the scans say of the poses that are followed; None: nothing yet, or none is followed."""
         return None if self._followed is None else self._followed.standing
 
-    def start(self, meetpoint: Meetpoint) -> Estimate:
+    def start(self, meetpoint: Meetpoint) -> SearchEstimate:
         """Begin a search; what was known before is forgotten."""
         self._edges_before, self._search, self._seen_places = 0, 1, 0
         self._passed.begin(meetpoint)
@@ -171,7 +171,7 @@ class AtlasLocalizer:
             self._followed.begin(meetpoint)
         return self._begin(meetpoint)
 
-    def update(self, traversal: Traversal, meetpoint: Meetpoint) -> Estimate:
+    def update(self, traversal: Traversal, meetpoint: Meetpoint) -> SearchEstimate:
         """Take in an edge and the meetpoint at its end.
 
         Raises:
@@ -189,7 +189,7 @@ class AtlasLocalizer:
         """
         return poses_at(self._atlas, dart, self._forest.meetpoints[-1])
 
-    def poses(self, estimate: Estimate, most: Optional[int] = None) -> np.ndarray:
+    def poses(self, estimate: SearchEstimate, most: Optional[int] = None) -> np.ndarray:
         """(C, 3) map_from_base at the last meetpoint, of the first so many candidates of the last estimate; if scans
         confirmed one, where it fits them.
         """
@@ -221,12 +221,12 @@ class AtlasLocalizer:
 
     # -- judgement
 
-    def _begin(self, meetpoint: Meetpoint) -> Estimate:
+    def _begin(self, meetpoint: Meetpoint) -> SearchEstimate:
         self._claim = None
         self._forest.begin(meetpoint)
         return self._judged()
 
-    def _judged(self) -> Estimate:
+    def _judged(self) -> SearchEstimate:
         dart, errors = self._forest.candidates()
         if not len(dart):
             self._claim = None
@@ -240,7 +240,12 @@ class AtlasLocalizer:
         if standing is not None:
             self._estimate = self._with_followed(self._estimate, standing)
         judged = self._matcher.judges_scans and self._forest.meetpoints[-1].scan is not None
-        if self._estimate.state == LOST and judged and self._search < self._params.searches and self._forest.depth > 0:
+        if (
+            self._estimate.state == SearchState.LOST
+            and judged
+            and self._search < self._params.searches
+            and self._forest.depth > 0
+        ):
             self._search += 1
             self._edges_before += self._forest.depth
             begun = self._begin(self._forest.meetpoints[-1])
@@ -262,7 +267,7 @@ class AtlasLocalizer:
         least = np.flatnonzero(times == times.min())
         return TurnChoice(int(least[-1]), by_graph.degree)  # back only if there is no other
 
-    def _with_followed(self, by_graph: Estimate, standing: Standing) -> Estimate:
+    def _with_followed(self, by_graph: SearchEstimate, standing: Standing) -> SearchEstimate:
         """What the graph and the followed poses say together."""
         least, lead = self._params.least_explained, self._params.follow_lead
         if standing.share >= least and standing.places > self._seen_places:
@@ -280,10 +285,12 @@ class AtlasLocalizer:
         agree = np.flatnonzero(
             (np.hypot(off[:, 0], off[:, 1]) < _AGREE_M) & (np.abs(angles.wrap(off[:, 2])) < _AGREE_RAD)
         )
-        if by_graph.state in (CONFIRMED, AMBIGUOUS):
+        if by_graph.state in (SearchState.CONFIRMED, SearchState.AMBIGUOUS):
             if len(agree):
                 return by_graph
-            return replace(by_graph, state=LOST, reason="graph and scans contradict each other", choice=None)
+            return replace(
+                by_graph, state=SearchState.LOST, reason="graph and scans contradict each other", choice=None
+            )
         next_best = standing.share - min(standing.lead, MAX_LEAD)
         reason = (
             f"one pose explains {standing.share:.0%} of the scans of {standing.places} places, the next best "
@@ -291,7 +298,7 @@ class AtlasLocalizer:
         )
         return replace(
             by_graph,
-            state=CONFIRMED,
+            state=SearchState.CONFIRMED,
             reason=reason,
             choice=None,
             dart=by_graph.dart[agree[:1]],
@@ -299,11 +306,11 @@ class AtlasLocalizer:
             map_from_base=standing.map_from_base,
         )
 
-    def _without_candidates(self, dart: np.ndarray, errors: np.ndarray) -> Estimate:
+    def _without_candidates(self, dart: np.ndarray, errors: np.ndarray) -> SearchEstimate:
         if self._forest.between_meetpoints():
             here = self._forest.meetpoints[-1]
-            return Estimate(
-                SEARCHING,
+            return SearchEstimate(
+                SearchState.SEARCHING,
                 "no place fits, unless this meetpoint is none",
                 self._forest.depth,
                 dart,
@@ -312,15 +319,17 @@ class AtlasLocalizer:
             )
         allowed = self._forest.errors
         but = f", not even with {allowed} error{'s' * (allowed > 1)} of the detector" if allowed else ""
-        return Estimate(LOST, f"no place of the atlas fits what was seen{but}", self._forest.depth, dart, errors, None)
+        return SearchEstimate(
+            SearchState.LOST, f"no place of the atlas fits what was seen{but}", self._forest.depth, dart, errors, None
+        )
 
-    def _among_several(self, dart: np.ndarray, errors: np.ndarray) -> Estimate:
+    def _among_several(self, dart: np.ndarray, errors: np.ndarray) -> SearchEstimate:
         depth, count = self._forest.depth, len(dart)
         if self._params.document:
             self._claim = None
             nodes = len(np.unique(self._atlas.darts.node[dart]))
-            return Estimate(
-                SEARCHING,
+            return SearchEstimate(
+                SearchState.SEARCHING,
                 f"{nodes if depth == 0 else count} candidates",
                 depth,
                 dart,
@@ -331,7 +340,7 @@ class AtlasLocalizer:
         if voted.splits or depth == 0:
             self._claim = None
             reason = f"{count} candidates, {voted.survivors[voted.rank]:.3g} expected after this turn"
-            return Estimate(SEARCHING, reason, depth, dart, errors, self._choice(voted.rank, dart))
+            return SearchEstimate(SearchState.SEARCHING, reason, depth, dart, errors, self._choice(voted.rank, dart))
         if self._claim is not None and self._claim.holds(self._forest.path(int(dart[0])), count):
             return self._claimed(dart, errors)  # proved already, and all moved on by one turn
         proof = ambiguity.prove(self._matcher, dart)
@@ -340,8 +349,8 @@ class AtlasLocalizer:
         self._claim = None
         if proof.ranks is None:
             rank = self._towards_new_edges(int(dart[0]))
-            return Estimate(
-                SEARCHING,
+            return SearchEstimate(
+                SearchState.SEARCHING,
                 f"{count} candidates, alike for {proof.pairs} pairs of places",
                 depth,
                 dart,
@@ -349,9 +358,9 @@ class AtlasLocalizer:
                 self._choice(rank, dart),
             )
         reason = f"{count} candidates, the next difference is {len(proof.ranks)} edges away"
-        return Estimate(SEARCHING, reason, depth, dart, errors, self._choice(proof.ranks[0], dart))
+        return SearchEstimate(SearchState.SEARCHING, reason, depth, dart, errors, self._choice(proof.ranks[0], dart))
 
-    def _claimed(self, dart: np.ndarray, errors: np.ndarray) -> Estimate:
+    def _claimed(self, dart: np.ndarray, errors: np.ndarray) -> SearchEstimate:
         """One candidate, or several that nothing tells apart: more edges must confirm it."""
         depth, count = self._forest.depth, len(dart)
         path = self._forest.path(int(dart[0]))
@@ -367,18 +376,25 @@ class AtlasLocalizer:
             rank = self._towards_new_edges(int(dart[0]))
             if rival:
                 reason = "one candidate, but if a meetpoint was missed just now it is the next"
-                return Estimate(
-                    TENTATIVE if count == 1 else SEARCHING, reason, depth, dart, errors, self._choice(rank, dart)
+                return SearchEstimate(
+                    SearchState.TENTATIVE if count == 1 else SearchState.SEARCHING,
+                    reason,
+                    depth,
+                    dart,
+                    errors,
+                    self._choice(rank, dart),
                 )
             if count == 1:
                 reason = f"one candidate, {needed - confirmed} edges must confirm it"
-                return Estimate(TENTATIVE, reason, depth, dart, errors, self._choice(rank, dart))
+                return SearchEstimate(SearchState.TENTATIVE, reason, depth, dart, errors, self._choice(rank, dart))
             reason = f"{count} candidates, proved alike; {needed - confirmed} edges must confirm them"
-            return Estimate(SEARCHING, reason, depth, dart, errors, self._choice(rank, dart))
+            return SearchEstimate(SearchState.SEARCHING, reason, depth, dart, errors, self._choice(rank, dart))
         if count == 1:
             reason = f"the only place that fits, confirmed by {confirmed} edges"
-            return Estimate(CONFIRMED, reason, depth, dart, errors, None)
-        return Estimate(AMBIGUOUS, f"{count} places fit that no turn can tell apart", depth, dart, errors, None)
+            return SearchEstimate(SearchState.CONFIRMED, reason, depth, dart, errors, None)
+        return SearchEstimate(
+            SearchState.AMBIGUOUS, f"{count} places fit that no turn can tell apart", depth, dart, errors, None
+        )
 
     def _choice(self, rank: int, dart: np.ndarray) -> TurnChoice:
         return TurnChoice(rank, int(self._atlas.degree[self._atlas.darts.node[dart[0]]]))
