@@ -35,6 +35,11 @@ PAGES = [
 MAX_README_LINES = 150
 MAX_PICTURE_BYTES = 150_000
 MAX_SCANS = "60"  # of each log that a command replays
+FIRST_COMMANDS = (  # of the quickstart: their files are there for every page
+    "glass_nav simulate glass_office --path first --out run.bag",
+    "glass_nav replay run.bag --map run.map.yaml --out results/",
+    "glass_nav params --from-amcl my_robot.launch > mine.yaml",
+)
 SUBCOMMANDS = {
     "atlas": atlas,
     "compare": compare,
@@ -144,9 +149,9 @@ def test_fences_say_what_they_are(page: Path) -> None:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where the commands are run; the reader's launch file, which starts amcl, is there."""
     path = tmp_path_factory.mktemp("reader")
-    shutil.copy(REPO / "test" / "rostest" / "amcl_launch" / "turtlebot3.launch", path / "my_robot.launch")
-    run(path, "glass_nav simulate glass_office --path first --out run.bag")
-    run(path, "glass_nav replay run.bag --map run.map.yaml --out results/")
+    shutil.copy(REPO / "test" / "rostest" / "amcl_launch" / "jackal.launch", path / "my_robot.launch")
+    for command in FIRST_COMMANDS:
+        run(path, command)
     return path
 
 
