@@ -24,6 +24,7 @@ MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or les
     "localization/bearings": "geometry world sensing",
     "topology": "geometry world sensing hypotheses",
     "topology/atlas": "geometry world sensing",
+    "topology/atlas/voronoi": "geometry world topology/atlas/components",
     "topology/search": "geometry world sensing hypotheses topology/atlas topology/observations",
     "driving": "geometry world sensing hypotheses localization topology",
     "recording": "geometry world sensing",
