@@ -51,7 +51,18 @@ SUBCOMMANDS = {
     "report": report,
     "simulate": simulate,
 }
-SETUP_WORDS = {"catkin_make", "cd", "git", "pip", "rosdep", "scripts/demo", "scripts/setup", "scripts/test", "sed", "source"}
+SETUP_WORDS = {
+    "catkin_make",
+    "cd",
+    "git",
+    "pip",
+    "rosdep",
+    "scripts/demo",
+    "scripts/setup",
+    "scripts/test",
+    "sed",
+    "source",
+}
 FOLDERS = sorted(path.name for path in REPO.iterdir() if path.is_dir() and path.name not in (".git", ".build"))
 _LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 _PATH = re.compile(rf"(?<![\w/.~-])(?:{'|'.join(re.escape(name) for name in FOLDERS)})/[\w./*-]*[\w*]")
