@@ -44,7 +44,9 @@ from glass_nav.hypotheses.scan_explanation import ScanExplanation
 from glass_nav.simulation import lidar, shipped_buildings, start_place
 from glass_nav.simulation.simulation import Frame, Simulation
 from glass_nav.vocabulary import SearchState
-from glass_nav.topology.search.atlas_localizer import AtlasLocalizer, SearchEstimate, SearchParams
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search.search_estimate import SearchEstimate
+from glass_nav.topology.search.search_params import SearchParams
 
 CONTROL_S = 0.05
 SEARCH_S, LEG_S = 900.0, 120.0  # simulated, at most

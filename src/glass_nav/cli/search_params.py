@@ -10,7 +10,7 @@ from typing import Optional
 
 from glass_nav import params
 from glass_nav.replay import replay_params
-from glass_nav.topology.search.atlas_localizer import SearchParams
+from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.topology.search_session import SessionParams
 
 NODE_ONLY = frozenset(

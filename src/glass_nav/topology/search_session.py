@@ -19,7 +19,9 @@ import numpy as np
 from glass_nav.topology.atlas import atlas_file
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
-from glass_nav.topology.search.atlas_localizer import AtlasLocalizer, SearchEstimate, SearchParams, TurnChoice
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search.search_estimate import SearchEstimate, TurnChoice
+from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.topology.search.served_explanation import ServedExplanation
 from glass_nav.vocabulary import SearchState
 from glass_nav.world.grid_map import GridMap

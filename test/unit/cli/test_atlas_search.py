@@ -14,7 +14,7 @@ from glass_nav.cli import search_params
 from glass_nav.ros.topology import topology_params
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import Atlas, Darts, Edges, MapReference, Nodes, Ragged, Visits, rings_clockwise
-from glass_nav.topology.search.atlas_localizer import SearchParams
+from glass_nav.topology.search.search_params import SearchParams
 
 REPO = Path(__file__).parents[3]
 

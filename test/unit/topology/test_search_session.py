@@ -14,7 +14,7 @@ from glass_nav.topology import search_session
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.topology.observations import Meetpoint, Traversal
-from glass_nav.topology.search.atlas_localizer import SearchParams
+from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.topology.search_session import (
     Decision,
     Goal,
@@ -282,7 +282,7 @@ def test_a_goal_is_aborted_when_the_robot_is_lost() -> None:
     end = only(decisions, GoalEnd)
     assert (end.outcome, end.reason, end.status.state) == (
         GoalOutcome.ABORTED,
-        "no place of the atlas fits what was seen",
+        "no node of the atlas matches what was seen",
         SearchState.LOST,
     )
     assert end.status.map_from_base is None

@@ -14,7 +14,7 @@ from glass_nav.msg import TurnChoice as TurnChoiceMsg
 from glass_nav.ros import conversions
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.observations import UNKNOWN, Meetpoint, ObservationError, Traversal
-from glass_nav.topology.search.atlas_localizer import TurnChoice
+from glass_nav.topology.search.search_estimate import TurnChoice
 from glass_nav.topology.search_session import SearchStatus, Turn
 
 AS_TOLD = -1  # rank of a traversal: as the last turn_choice said

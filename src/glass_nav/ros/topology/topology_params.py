@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from glass_nav.topology.search.atlas_localizer import SearchParams
+from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.topology.search_session import SessionParams
 
 

@@ -13,7 +13,8 @@ import numpy as np
 from glass_nav.topology.atlas.atlas import Atlas, twin
 from glass_nav.topology.observations import Meetpoint, Traversal, turn_name
 from glass_nav.topology.search import vote
-from glass_nav.topology.search.atlas_localizer import AtlasLocalizer, SearchEstimate
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search.search_estimate import SearchEstimate
 from glass_nav.topology.search.search_forest import NO_PARENT
 
 MAX_LINES = 40  # of a row; large atlases have rows of thousands

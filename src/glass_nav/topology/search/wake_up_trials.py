@@ -17,8 +17,10 @@ import numpy as np
 from glass_nav.geometry import angles
 from glass_nav.topology.atlas.atlas import Atlas, twin
 from glass_nav.topology.observations import Meetpoint, Traversal
-from glass_nav.topology.search.atlas_localizer import AtlasLocalizer, SearchEstimate, SearchParams
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search.matching import Tolerances
+from glass_nav.topology.search.search_estimate import SearchEstimate
+from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.vocabulary import SearchState
 
 WRONG, UNDECIDED = "WRONG", "UNDECIDED"

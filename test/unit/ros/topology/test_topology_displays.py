@@ -10,7 +10,9 @@ from glass_nav.msg import EdgeTraversal
 from glass_nav.ros.topology import topology_displays, topology_messages
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
-from glass_nav.topology.search.atlas_localizer import AtlasLocalizer, SearchParams, TurnChoice
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search.search_estimate import TurnChoice
+from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.topology.search_session import SearchStatus
 from glass_nav.vocabulary import SearchState
 

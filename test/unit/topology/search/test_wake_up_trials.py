@@ -10,7 +10,7 @@ import pytest
 
 from glass_nav.geometry import angles
 from glass_nav.topology.search import distinguishability, wake_up_trials
-from glass_nav.topology.search.atlas_localizer import SearchParams
+from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.topology.search.wake_up_trials import AtlasRobot, Surroundings, TrialParams
 from glass_nav.vocabulary import SearchState
 
