@@ -36,9 +36,11 @@ MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or les
     "evaluation/pages": "geometry evaluation/metrics evaluation/plots",
     "replay": "geometry world sensing hypotheses localization topology driving recording evaluation",
     "compare": "geometry world sensing hypotheses localization topology driving recording evaluation replay",
+    "demo": "geometry world topology evaluation",
     "cli": "geometry world sensing hypotheses localization topology driving recording simulation evaluation checkup "
     "replay compare",
-    "ros": "geometry world sensing hypotheses localization topology driving recording simulation evaluation checkup",
+    "ros": "geometry world sensing hypotheses localization topology driving recording simulation evaluation checkup "
+    "demo",
 }
 FOR_ALL = {"amcl_parameters", "health", "log_line", "package_files", "params", "vocabulary"}  # modules of no room
 ONLY_BY = {  # compiled modules, each behind its face; and what is heavy, where it is needed
