@@ -17,6 +17,8 @@ from glass_nav.msg import Meetpoint as MeetpointMsg
 from glass_nav.ros import conversions
 from glass_nav.vocabulary import SearchState
 
+_SEARCH_STATES = {getattr(TopologyStatus, state.name): state for state in SearchState}
+
 
 def meetpoint_msg(arrival: Arrival, frame: str) -> MeetpointMsg:
     """Where the robot stands."""
@@ -107,10 +109,9 @@ def place_goal(msg: GotoNodeGoal) -> PlaceGoal:
 
 def search_state(msg: TopologyStatus) -> SearchState:
     """Raises ValueError if there is no such state."""
-    for state in SearchState:
-        if getattr(TopologyStatus, state.name) == msg.state:
-            return state
-    raise ValueError(f"topology_status: state must be 0 to {len(SearchState) - 1}, got {msg.state}")
+    if msg.state not in _SEARCH_STATES:
+        raise ValueError(f"topology_status: state must be 0 to {len(SearchState) - 1}, got {msg.state}")
+    return _SEARCH_STATES[msg.state]
 
 
 def twist_msg(velocity: np.ndarray) -> Twist:
