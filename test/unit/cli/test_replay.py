@@ -533,7 +533,7 @@ def test_a_scan_that_the_filter_refuses_is_counted():
 
     class Filter:
         def update(self, scan, odom_from_base):
-            raise ScanError("scan at 1.000 s: no good")
+            raise ScanError("no good", 1_000_000_000)
 
     from glass_nav.recording.recording import RecordingError
 

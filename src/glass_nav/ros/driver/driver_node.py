@@ -31,7 +31,6 @@ import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import OccupancyGrid
-from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
@@ -65,8 +64,9 @@ from glass_nav.ros.driver.move_base_task import MoveBase, MoveBaseTask
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Mailbox
 from glass_nav.ros.rate_limiter import RateLimiter
-from glass_nav.ros.scan_input import STALE_SCANS, ScanInput
+from glass_nav.ros.scan_input import ScanInput
 from glass_nav.sensing.scan import ScanError
+from glass_nav.sensing.scan_placement import RawScan
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.topology.observations import ObservationError
@@ -581,8 +581,9 @@ class DriverNode:
         """What came in, from whichever of the two topics is to be believed now."""
         for lane, source in (("scans", self._scans), ("surfaces", self._surfaces)):
             for msg in mail[lane]:
-                if source.receive(msg, self._now_s, None):
-                    self._reset(f"the last {STALE_SCANS} scans are older than the one before them")
+                stale = source.receive(msg, self._now_s, None)
+                if stale is not None:
+                    self._reset(stale)
         surfaces = (
             self._localization == "LOCALIZED"
             and self._surfaces.counts.received > 0
@@ -590,13 +591,13 @@ class DriverNode:
             and self._now_s - self._surfaces.last_arrival_s < self._node.scan_timeout_s
         )
         for source in (self._scans, self._surfaces):
-            for msg in source.take_ready(self._now_s):
+            for raw in source.take_ready(self._now_s):
                 if (source is self._surfaces) == surfaces:
-                    self._take_scan(source, msg)
+                    self._take_scan(source, raw)
 
-    def _take_scan(self, source: ScanInput, msg: LaserScan) -> None:
+    def _take_scan(self, source: ScanInput, raw: RawScan) -> None:
         try:
-            placed = source.place(msg)
+            placed = source.place(raw)
         except ScanError as err:
             source.refuse(str(err))
             return

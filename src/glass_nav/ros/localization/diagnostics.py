@@ -13,8 +13,8 @@ from glass_nav.localization.integrity.pose_state import LOCALIZED, LOST
 from glass_nav.localization.localizer import Estimate
 from glass_nav.ros.localization.beam_displays import CASE_NAMES
 from glass_nav.ros.localization.params import LocalizationNodeParams
-from glass_nav.ros.mailbox import ScanCounts
 from glass_nav.sensing.scan import Scan
+from glass_nav.sensing.scan_queue import ScanCounts
 from glass_nav.world.grid_map import GridMap
 
 FEW_BEAMS = 20  # that answered; a pose does not follow from fewer

@@ -4,9 +4,9 @@ Wiring only; the answer comes from AtlasLocalizer. Callbacks store, one loop wor
 
 Subscribes: meetpoint (Meetpoint), edge_traversal (EdgeTraversal): of the driver, or by hand; in either order, the
     traversal and the meetpoint at its end belong together. map (OccupancyGrid, if ~check_map): the atlas must be its.
-    scan (LaserScan) and tf to the frame of the meetpoint, with map, if ~judge_by_scans: candidates from where the map
-    does not explain the scan of a meetpoint's stamp are ruled out; where meetpoints have odometry, the poses that
-    explain the scans are followed from one to the next, too.
+    scan (LaserScan), tf ~odom_frame_id <- frame of the meetpoint <- laser, and map, if ~judge_by_scans: candidates from
+    where the map does not explain the scan of a meetpoint's stamp are ruled out; where meetpoints have odometry, the
+    poses that explain the scans are followed from one to the next, too.
 Publishes: turn_choice (TurnChoice): the answer to each meetpoint while there is something to find out;
     initialpose (PoseWithCovarianceStamped) once when CONFIRMED, with the stamp of the meetpoint;
     ~candidates (TopologyCandidates, latched), ~status (TopologyStatus, latched), ~markers (MarkerArray, latched):
@@ -69,7 +69,7 @@ class TopologyNode:
         self._p, self._search_params = p.node, p.search
         self._map_fingerprint: Optional[str] = None
         self._explanation = ServedExplanation()
-        self._scans = ScanMemory() if p.node.judge_by_scans else None
+        self._scans = ScanMemory(p.node.odom_frame_id) if p.node.judge_by_scans else None
         self._localizer: Optional[AtlasLocalizer] = self._loaded(p.node.atlas)
         self._show_atlas()
         self._state, self._reason = IDLE, "no search was asked for"

@@ -14,6 +14,7 @@ class TopologyNodeParams:
 
     atlas: str = ""  # atlas.json, atlas.npz, the folder of one, or the name of a shipped one
     global_frame_id: str = "map"
+    odom_frame_id: str = "odom"  # of the odometry by which scans are deskewed
     check_map: bool = True  # refuse the atlas if the topic map has another map
     judge_by_scans: bool = True  # candidates by the scan at a meetpoint, where there are scans and a map
     search_at_start: bool = True  # with the first meetpoint; else when asked
@@ -25,9 +26,10 @@ class TopologyNodeParams:
     visits_file: str = ""  # the atlas with its statistics is saved there; empty: nowhere
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "global_frame_id", self.global_frame_id.lstrip("/"))
-        if not self.global_frame_id.strip():
-            raise ValueError(f"~global_frame_id must name a frame, got {self.global_frame_id!r}")
+        for name in ("global_frame_id", "odom_frame_id"):
+            object.__setattr__(self, name, getattr(self, name).lstrip("/"))
+            if not getattr(self, name).strip():
+                raise ValueError(f"~{name} must name a frame, got {getattr(self, name)!r}")
         for name in ("initial_pose_sigma_m", "initial_pose_sigma_rad", "pairing_tolerance_s"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise ValueError(f"~{name} must be finite and > 0, got {getattr(self, name)}")

@@ -11,8 +11,8 @@ from glass_nav.localization.localizer import BeamCases, Estimate
 from glass_nav.ros.localization import diagnostics
 from glass_nav.ros.localization.diagnostics import Diagnostics, Situation
 from glass_nav.ros.localization.params import LocalizationNodeParams
-from glass_nav.ros.mailbox import ScanCounts
 from glass_nav.sensing.scan import Scan
+from glass_nav.sensing.scan_queue import ScanCounts
 from glass_nav.world.grid_map import GridMap
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
