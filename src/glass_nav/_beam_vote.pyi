@@ -1,4 +1,16 @@
-# For mypy: the vote of cases, compiled from cpp/; its typed face is localization/beam_classification/case_votes.py.
-from typing import Any
+# cpp/vote; its face is localization/beam_classification/case_votes.py. N samples, B beams.
+import numpy as np
 
-def __getattr__(name: str) -> Any: ...
+def case_votes(
+    measured_m: np.ndarray,  # (B,) float64
+    range_m: np.ndarray,  # (4, N, B) float64
+    cos: np.ndarray,  # (4, N, B) float64
+    thickness_m: np.ndarray,  # (4, N, B) float32
+    prior: np.ndarray,  # (5, B) float64
+    nothing: float,
+    depth_share: float,
+    sigma_m: float,
+    gate_m: float,
+    min_cos: float,
+    temper: float,
+) -> np.ndarray: ...  # (5, B) float64

@@ -1,4 +1,73 @@
-# For mypy: ray caster and scan matcher, compiled from cpp/; their typed faces are the Python modules that import it.
-from typing import Any
+# cpp/grid; its faces are sensing/raycast.py and hypotheses/scan_matcher.py. P poses, B beams, H x W cells.
+from typing import TypedDict
 
-def __getattr__(name: str) -> Any: ...
+import numpy as np
+
+class _Surfaces(TypedDict):
+    first_m: np.ndarray  # (P, B) float64, as all but the cells
+    first_cell: np.ndarray  # (P, B) int32, as all cells
+    first_thickness_m: np.ndarray
+    second_m: np.ndarray
+    second_cell: np.ndarray
+    second_thickness_m: np.ndarray
+    third_m: np.ndarray
+    third_cell: np.ndarray
+    normal_rad: np.ndarray
+    linearity: np.ndarray
+    mirrored_m: np.ndarray
+    mirrored_cell: np.ndarray
+
+class Grid:
+    def __init__(
+        self,
+        occupancy: np.ndarray,  # (H, W) int8
+        resolution_m: float,
+        occupied_percent: int,
+        backend: str,
+        unknown_stops: bool,
+    ) -> None: ...
+    def cast(
+        self,
+        poses: np.ndarray,  # (P, 3) float64
+        angles: np.ndarray,  # (B,) float64
+        max_range_m: float,
+        threads: int,
+    ) -> np.ndarray: ...  # (P, B) float64
+    def cast_first(
+        self, poses: np.ndarray, angles: np.ndarray, max_range_m: float, threads: int
+    ) -> tuple[np.ndarray, np.ndarray]: ...  # (P, B) float64 ranges, int32 cells
+    def cast_surfaces(
+        self,
+        poses: np.ndarray,
+        angles: np.ndarray,
+        max_range_m: float,
+        max_thickness_m: float,
+        min_linearity: float,
+        min_gap_m: float,
+        threads: int,
+    ) -> _Surfaces: ...
+    def cast_paths(
+        self,
+        poses: np.ndarray,
+        angles: np.ndarray,
+        reach_m: np.ndarray,  # (B,) float64
+        max_thickness_m: float,
+        min_linearity: float,
+        min_gap_m: float,
+        threads: int,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...  # (4, P, B) float64 ranges, float64 cosines, int32 cells
+    def simulate_scan_ray_raw(self, poses: np.ndarray, angles: np.ndarray, max_range_m: float) -> np.ndarray: ...
+    def normals(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...  # (H * W,) float32 each
+
+class ScanMatcher:
+    def __init__(
+        self,
+        scores: np.ndarray,  # (H, W) uint8
+        allowed: np.ndarray,  # (H, W) uint8 or bool
+    ) -> None: ...
+    def search(
+        self,
+        points: np.ndarray,  # (B, 2) float64
+        headings_rad: np.ndarray,  # (A,) float64
+        keep: int,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]: ...  # row, column, heading int32, score float32

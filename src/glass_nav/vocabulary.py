@@ -114,6 +114,12 @@ class SearchState(Word):
     LOST = "LOST"
 
 
+SEARCH_RGB: Dict[SearchState, Rgb] = {  # of the candidates, in the states that have any; Okabe and Ito as well
+    SearchState.SEARCHING: (230, 159, 0),
+    SearchState.TENTATIVE: (86, 180, 233),
+    SearchState.CONFIRMED: (0, 158, 115),
+    SearchState.AMBIGUOUS: (204, 121, 167),
+}
 SEARCH_IS_OVER = (SearchState.CONFIRMED, SearchState.AMBIGUOUS, SearchState.LOST)
 
 

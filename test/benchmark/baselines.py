@@ -13,20 +13,24 @@ weak, seed 100, the first 150 scans). P particles, B beams.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Callable, Dict, NamedTuple, Optional, Tuple, Union
 
 import numpy as np
 
 from glass_nav.geometry import angles, se2
 from glass_nav.localization.particle_filter import motion, pose_estimate, resampling
-from glass_nav.localization.beam_classification.case_votes import DIFFUSE, UNCERTAIN, BeamCases
-from glass_nav.localization.localizer import Localizer
+from glass_nav.localization.beam_classification.beam_classifier import BeamClassifier
+from glass_nav.localization.beam_classification.case_votes import BeamCases
+from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.beam_classification.expected_ranges import ExpectedRanges
+from glass_nav.localization.particle_filter.particle_filter import ParticleFilter
 from glass_nav.localization.particle_filter.resampling import ParticleCount
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
+from glass_nav.vocabulary import BeamCase
 from glass_nav.world.grid_map import GridMap
 
 _PARTS = 4  # of a cell's edge: how finely the likelihood field is tabulated
@@ -197,36 +201,50 @@ class PlainMcl:
         return way >= self._params.schedule.update_min_d or turn >= self._params.schedule.update_min_a
 
 
-class OtherWeights(Localizer):
+class OtherWeights(ParticleFilter):
     """Our filter, start to end, but the particles weighed by another sensor model."""
 
-    def __init__(
-        self, params: LocalizerParams, grid_map: GridMap, rng: np.random.Generator, model: SensorModel
-    ) -> None:
-        super().__init__(params, grid_map, rng)
+    def __init__(self, *ours: Any, model: SensorModel) -> None:
+        super().__init__(*ours)
         self._model = model
 
-    def _log_weights(self, scan: Scan, particles: np.ndarray, *_: Any) -> np.ndarray:
-        return self._model.log_weights(particles, scan)
+    def _log_weights(self, scan: Scan, cases: BeamCases, classifier: BeamClassifier) -> np.ndarray:
+        return self._model.log_weights(self.particles, scan)
 
 
-class DiffuseOnly(Localizer):
+class DiffuseOnly(BeamClassifier):
     """Our filter, going only by the beams that it takes for ended at the first surface."""
 
-    def _vote(self, scan: Scan, *pose: np.ndarray) -> Tuple[BeamCases, ExpectedRanges]:
-        cases, references = super()._vote(scan, *pose)
-        diffuse = np.where(cases.case == DIFFUSE, cases.case, UNCERTAIN).astype(np.uint8)
-        return replace(cases, case=diffuse), references
+    def classify(self, scan: Scan, *pose: Any, **options: Any) -> Tuple[BeamCases, ExpectedRanges]:
+        cases, expected = super().classify(scan, *pose, **options)
+        diffuse = np.where(cases.case == BeamCase.DIFFUSE, cases.case, BeamCase.UNCERTAIN).astype(np.uint8)
+        return replace(cases, case=diffuse), expected
+
+
+class TrueCases(BeamClassifier):
+    """Goes by the true cases, which somebody tells it."""
+
+    true_case = np.zeros(0, np.uint8)
+
+    def classify(self, scan: Scan, *pose: Any, **options: Any) -> Tuple[BeamCases, ExpectedRanges]:
+        cases, expected = super().classify(scan, *pose, **options)
+        case = np.where(scan.answered, self.true_case, BeamCase.UNCERTAIN).astype(np.uint8)
+        return replace(cases, case=case), expected
 
 
 class OracleCases(Localizer):
     """Our filter, going by the true cases; set `true_case` (B,) before each update()."""
 
-    true_case = np.zeros(0, np.uint8)
+    _classifier: TrueCases
 
-    def _vote(self, scan: Scan, *pose: np.ndarray) -> Tuple[BeamCases, ExpectedRanges]:
-        cases, references = super()._vote(scan, *pose)
-        return replace(cases, case=np.where(scan.answered, self.true_case, UNCERTAIN).astype(np.uint8)), references
+    def __init__(self, params: LocalizerParams, grid_map: GridMap, rng: np.random.Generator) -> None:
+        super().__init__(params, grid_map, rng, classifier=TrueCases)
+
+    def update(self, scan: Scan, odom_from_base: np.ndarray) -> Estimate:
+        self._classifier.true_case = self.true_case
+        return super().update(scan, odom_from_base)
+
+    true_case = np.zeros(0, np.uint8)
 
 
 SETTINGS = {
@@ -260,7 +278,9 @@ def localizer(
         return OURS[name](params, grid_map, rng)
     chosen = SETTINGS[name] if settings is None else settings
     model: SensorModel = (LikelihoodField if "field" in name else BeamModel)(grid_map, chosen)
-    return (PlainMcl if name.startswith("amcl") else OtherWeights)(params, grid_map, rng, model)
+    if name.startswith("amcl"):
+        return PlainMcl(params, grid_map, rng, model)
+    return Localizer(params, grid_map, rng, particle_filter=partial(OtherWeights, model=model))
 
 
 def _with_vote(mode: str) -> Callable[[LocalizerParams, GridMap, np.random.Generator], Localizer]:
@@ -272,7 +292,7 @@ def _with_vote(mode: str) -> Callable[[LocalizerParams, GridMap, np.random.Gener
 OURS: Dict[str, Callable[[LocalizerParams, GridMap, np.random.Generator], Localizer]] = {
     "ours": Localizer,
     "ours_paper": _with_vote("paper"),
-    "ours_case1": DiffuseOnly,
+    "ours_case1": partial(Localizer, classifier=DiffuseOnly),
     "ours_oracle": OracleCases,
 }
 LOCALIZERS = (*OURS, *SETTINGS)

@@ -1,6 +1,7 @@
 // Writes a track and its map as MRPT files, for pf_localization.py, which compiles it.
 //
-//   mrpt_track_writer FOLDER    reads FOLDER/{map.bin,track.bin,config.ini}, writes FOLDER/{map.gridmap.gz,track.rawlog}
+//   mrpt_track_writer FOLDER    reads FOLDER/{map.bin,track.bin,config.ini}, writes
+//   FOLDER/{map.gridmap.gz,track.rawlog}
 #include <mrpt/config/CConfigFile.h>
 #include <mrpt/io/CFileGZOutputStream.h>
 #include <mrpt/maps/COccupancyGridMap2D.h>

@@ -4,15 +4,15 @@
     python test/benchmark/segment_correction.py                   the simulated buildings, some minutes
     python test/benchmark/segment_correction.py --out pictures/   also draws Emse, Ecf and the combined measure
     python test/benchmark/segment_correction.py --tasks speed
-    python test/benchmark/segment_correction.py --tasks filter --logs intel uob_trace0
+    python test/benchmark/segment_correction.py --tasks judge --logs intel uob_trace0
 
 quality: Emse, Ecf and the combined measure over a grid of offsets from the true pose, of scans as they are and with a
 third of the beams ending at people. basin: share of random starts within 0.5 m and 10 degrees that end within 2 cm and
 0.3 degrees of the truth; where the walls leave a direction free (a hallway), apart from that. By beams whose true case
 is 1, 3 or 4, by all beams, and as `glass_nav locate` does it, which has to find the cases out; beside it the
 document's method, and point-to-point ICP on the wall cells by scipy's KD-tree. speed: CPU time of a correction of 541
-points against 500 segments. filter: the particle filter on real logs with polished poses and without. judge: do the
-measures tell right poses from wrong ones that a scan was aligned to, better than the fit that `~status` goes by?
+points against 500 segments. judge: do the measures tell right poses from wrong ones that a scan was aligned to, better
+than the fit that `~status` goes by?
 
 Exit 1 if a best value is not at the truth, if fewer than 95 % of the starts in rooms get there by known cases, or a
 correction takes more than 3 ms of CPU time.
@@ -41,17 +41,14 @@ import tracks
 from glass_nav.geometry import angles, se2
 from glass_nav.localization.particle_filter import importance_weights
 from glass_nav.hypotheses import scan_alignment
-from glass_nav.localization.localizer import Localizer
-from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.segments.segment_correction import SegmentCorrectionParams, SegmentCorrector
 from glass_nav.localization.segments.segment_locator import SegmentLocator
-from glass_nav.localization.segments.segment_polish import Polish
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.world import wall_segments
 from glass_nav.world.grid_map import GridMap
 
-TASKS = ("quality", "basin", "speed", "filter", "judge")
+TASKS = ("quality", "basin", "speed", "judge")
 REACH_M, REACH_RAD = 0.5, np.radians(10.0)
 RIGHT_M, RIGHT_RAD = 0.02, np.radians(0.3)
 BAR_SHARE, BAR_MS = 0.95, 3.0
@@ -312,40 +309,6 @@ def speed(arguments: argparse.Namespace) -> bool:
     return median["least_squares"] <= BAR_MS
 
 
-# -- filter
-
-
-def filter_errors(arguments: argparse.Namespace, name: str, polished: bool) -> np.ndarray:
-    """(2,) mean errors of position [m] and yaw [deg] over the seeds, of a log or a building."""
-    settings = LocalizerParams(polish=Polish(polished))
-    found = []
-    for seed in range(arguments.filter_seed, arguments.filter_seed + 2):
-        if name in replay_logs.PEERS:
-            figures = replay_logs.run((name, seed, settings, False))
-            found.append([figures["position_mean_m"], figures["yaw_mean_deg"]])
-            continue
-        grid_map, frames = drives.drive(name, arguments.lidar, seed, max_scans=200)
-        localizer = Localizer(settings, grid_map, np.random.default_rng(seed))
-        localizer.set_pose(frames[0].map_from_base, np.diag([0.1, 0.1, 0.05]) ** 2)
-        off = np.array(
-            [localizer.update(frame.scan, frame.odom_from_base).map_from_base - frame.map_from_base for frame in frames]
-        )
-        found.append([np.hypot(off[:, 0], off[:, 1]).mean(), np.degrees(np.abs(angles.wrap(off[:, 2]))).mean()])
-    return np.mean(found, axis=0)
-
-
-def filter_table(arguments: argparse.Namespace) -> bool:
-    """Means of the filter's errors as it is, and polished; no bar, the table says it."""
-    print("filter: mean errors of position [m] and yaw [deg], two seeds, without and with polish_with_segments")
-    print("| log or building | position | polished | times | yaw | polished | times |\n|---|---|---|---|---|---|---|")
-    for name in [*arguments.logs, *arguments.buildings]:
-        plain, polished = (filter_errors(arguments, name, on) for on in (False, True))
-        cells = [f"{plain[each]:.4f} | {polished[each]:.4f} | {polished[each] / plain[each]:.2f}" for each in (0, 1)]
-        print(f"| {name} | {' | '.join(cells)} |", flush=True)
-    print()
-    return True
-
-
 # -- judge
 
 
@@ -396,7 +359,6 @@ def main() -> int:
         help="default: quality basin speed; the others take long",
     )
     parser.add_argument("--logs", nargs="*", choices=sorted(replay_logs.PEERS), default=list(replay_logs.PEERS))
-    parser.add_argument("--filter-seed", type=int, default=10, help="first of two of the filter (default 10)")
     parser.add_argument("--buildings", nargs="+", default=drives.buildings())
     parser.add_argument("--lidar", default="sensitive", choices=drives.lidars())
     parser.add_argument("--seed", type=int, default=200)
@@ -404,7 +366,7 @@ def main() -> int:
     parser.add_argument("--starts", type=int, default=10, help="at each place (default 10)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="for the pictures of the measures")
     arguments = parser.parse_args()
-    run = {"quality": quality, "basin": basin, "speed": speed, "filter": filter_table, "judge": judge}
+    run = {"quality": quality, "basin": basin, "speed": speed, "judge": judge}
     missed = [task for task in arguments.tasks if not run[task](arguments)]
     print(f"missed: {', '.join(missed)}" if missed else "all bars met")
     return 1 if missed else 0

@@ -132,7 +132,7 @@ class Soak:
             values = {each.key: each.value for each in status.values}
             if status.name.endswith(": timing") and "longest update [ms]" in values:
                 self.watch.update_s.append(1e-3 * float(values["longest update [ms]"]))
-            if status.name.endswith(": scans"):
+            if status.name.endswith(": scans") and "used" in values:  # not "Node starting up"
                 self.watch.used, self.watch.received = int(values["used"]), int(values["received"])
 
     # -- faults

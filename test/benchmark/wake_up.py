@@ -43,7 +43,10 @@ from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.hypotheses.scan_explanation import ScanExplanation
 from glass_nav.simulation import lidar, shipped_buildings, start_place
 from glass_nav.simulation.simulation import Frame, Simulation
-from glass_nav.topology.search.atlas_localizer import AMBIGUOUS, CONFIRMED, AtlasLocalizer, Estimate, SearchParams
+from glass_nav.vocabulary import SearchState
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search.search_estimate import SearchEstimate
+from glass_nav.topology.search.search_params import SearchParams
 
 CONTROL_S = 0.05
 SEARCH_S, LEG_S = 900.0, 120.0  # simulated, at most
@@ -123,7 +126,7 @@ class Trial:
 
     def search(self) -> Dict[str, Any]:
         """Until the search is over."""
-        estimate: Optional[Estimate] = None
+        estimate: Optional[SearchEstimate] = None
         rank: Optional[int] = None
         failures: List[str] = []
         while self.now_s < SEARCH_S:
@@ -157,7 +160,7 @@ class Trial:
             **self._errors(estimate),
         }
 
-    def _told(self, arrival: Arrival, rank: Optional[int]) -> Estimate:
+    def _told(self, arrival: Arrival, rank: Optional[int]) -> SearchEstimate:
         last = self.localizer.estimate
         meetpoint = replace(arrival.meetpoint, odom_from_base=arrival.odom_from_base)
         if arrival.traversal is None or last is None or last.done:
@@ -199,11 +202,11 @@ class Trial:
             f"{' or '.join(lengths) or 'no edge'}"
         )
 
-    def _errors(self, estimate: Optional[Estimate]) -> Dict[str, Any]:
+    def _errors(self, estimate: Optional[SearchEstimate]) -> Dict[str, Any]:
         truth = self.simulation.map_from_base
-        if self.elsewhere and estimate is not None and estimate.state in (CONFIRMED, AMBIGUOUS):
+        if self.elsewhere and estimate is not None and estimate.state in (SearchState.CONFIRMED, SearchState.AMBIGUOUS):
             return {"right": False, "wrong": True, "error_m": math.nan}
-        if estimate is None or estimate.state != CONFIRMED:
+        if estimate is None or estimate.state != SearchState.CONFIRMED:
             return {"right": False, "wrong": False, "error_m": math.nan}
         pose = self.localizer.poses(estimate)[0]
         off_m = float(np.hypot(*(pose[:2] - truth[:2])))

@@ -1,23 +1,27 @@
-"""The linters, each as a test: one command runs what CI runs."""
+"""The linters, each as a test: the commands are the hooks of .pre-commit-config.yaml."""
 
 from __future__ import annotations
 
 import os
-import shutil
+import shlex
 import subprocess
-import sys
 from pathlib import Path
-from typing import List
+from typing import Any, Dict
 
 import pytest
+import yaml
 
 REPO = Path(__file__).parents[2]
-WORKSPACE_PACKAGE = REPO / ".build" / "ws" / "src" / "glass_nav"  # catkin_lint wants the folder named like the package
+CONFIG = yaml.safe_load((REPO / ".pre-commit-config.yaml").read_text())
+HOOKS = [hook for repo in CONFIG["repos"] for hook in repo["hooks"]]
+WORKFLOW = yaml.safe_load((REPO / ".github" / "workflows" / "ci.yaml").read_text())
 
 
-def run(command: List[str]) -> None:
+@pytest.mark.skipif(not (REPO / ".build" / "ws").exists(), reason="no catkin workspace: run by scripts/test")
+@pytest.mark.parametrize("hook", HOOKS, ids=lambda hook: hook["id"])
+def test_hook(hook: Dict[str, Any]) -> None:
     done = subprocess.run(
-        command,
+        shlex.split(hook["entry"]),
         cwd=REPO,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
@@ -27,51 +31,35 @@ def run(command: List[str]) -> None:
     )
     if done.returncode:
         print(done.stdout)
-        pytest.fail(f"exit code {done.returncode}: {' '.join(command)}", pytrace=False)
+        pytest.fail(f"exit code {done.returncode}: {hook['entry']}", pytrace=False)
 
 
-def test_ruff() -> None:
-    run([sys.executable, "-m", "ruff", "check", "--no-fix", "."])
+def test_no_linter_is_missing() -> None:
+    assert [hook["id"] for hook in HOOKS] == [
+        "ruff",
+        "ruff-format",
+        "mypy",
+        "clang-format",
+        "catkin-lint",
+        "yamllint",
+        "bash",
+    ]
 
 
-def test_ruff_format() -> None:
-    run([sys.executable, "-m", "ruff", "format", "--check", "."])
-
-
-def test_mypy() -> None:
-    """The types of all but ros/: ROS has none."""
-    run(
-        [
-            sys.executable,
-            "-m",
-            "mypy",
-            "--package",
-            "glass_nav",
-            "--exclude",
-            "/ros/",
-            "--cache-dir",
-            str(REPO / ".build" / "mypy"),
-        ]
-    )
-
-
-@pytest.mark.skipif(not WORKSPACE_PACKAGE.exists(), reason="no catkin workspace: run by scripts/test")
-def test_catkin_lint() -> None:
-    linter = shutil.which("catkin_lint")
-    assert linter, "catkin_lint is not installed: run by scripts/test"
-    run(
-        [
-            linter,
-            "-W2",
-            "--strict",
-            "--ignore",
-            "subproject",  # cpp/ is also built alone, for Python 3.8
-            str(WORKSPACE_PACKAGE),
-        ]
-    )
+def test_hooks_download_nothing_and_look_at_the_whole_checkout() -> None:
+    assert [repo["repo"] for repo in CONFIG["repos"]] == ["local"]
+    for hook in HOOKS:
+        assert (hook["language"], hook["always_run"], hook["pass_filenames"]) == ("system", True, False), hook["id"]
 
 
 @pytest.mark.parametrize("script", ["scripts/setup", "scripts/demo", "scripts/test", ".ci/run"])
-def test_shell_scripts_parse_and_may_be_executed(script: str) -> None:
+def test_scripts_may_be_executed(script: str) -> None:
     assert os.access(REPO / script, os.X_OK)
-    run(["/bin/bash", "-n", script])
+
+
+def test_the_workflow_runs_all_of_ci_on_every_platform() -> None:
+    (job,) = WORKFLOW["jobs"].values()
+    assert job["strategy"]["matrix"]["image"] == ["debian:12", "debian:11", "ros:noetic"]
+    assert job["container"] == "${{ matrix.image }}"
+    assert [step["run"] for step in job["steps"] if "run" in step] == [".ci/run"]
+    assert job["steps"][0]["uses"].startswith("actions/checkout@")

@@ -7,7 +7,8 @@ import pytest
 from scipy import ndimage
 
 from glass_nav.topology.atlas import voronoi_graph
-from glass_nav.topology.atlas.voronoi_graph import SEPARATION_CELLS, VoronoiParams
+from glass_nav.topology.atlas.voronoi.ridges import SEPARATION_CELLS
+from glass_nav.topology.atlas.voronoi_graph import VoronoiParams
 from glass_nav.world import map_file
 
 MAPS = (

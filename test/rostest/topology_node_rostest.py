@@ -41,7 +41,7 @@ from glass_nav.ros import conversions
 from glass_nav.topology import observations
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import Atlas, Darts, Edges, MapReference, Nodes, Ragged, Visits, rings_clockwise
-from glass_nav.topology.search.atlas_localizer import poses_at
+from glass_nav.topology.search.matching import poses_at
 from glass_nav.topology.search.wake_up_trials import AtlasRobot, Surroundings, TrialParams
 from glass_nav.world import map_file
 
@@ -288,7 +288,7 @@ class TopologyNode(unittest.TestCase):
         self.report(observations.Meetpoint(3, 1.5), observations.Traversal(self.turns.last.rank, 8.0, 8.0))
         self.assertTrue(other.wait_for_result(rospy.Duration(30)))
         self.assertEqual(other.get_state(), GoalStatus.ABORTED)
-        self.assertIn("not found behind 1 edges", other.get_goal_status_text())
+        self.assertIn("not found after 1 edges", other.get_goal_status_text())
 
     def test_restart_forgets_the_search(self) -> None:
         self.report(observations.Meetpoint(3, 1.5))

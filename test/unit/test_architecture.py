@@ -24,6 +24,7 @@ MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or les
     "localization/bearings": "geometry world sensing",
     "topology": "geometry world sensing hypotheses",
     "topology/atlas": "geometry world sensing",
+    "topology/atlas/voronoi": "geometry world topology/atlas/components",
     "topology/search": "geometry world sensing hypotheses topology/atlas topology/observations",
     "driving": "geometry world sensing hypotheses localization topology",
     "recording": "geometry world sensing",
@@ -39,7 +40,7 @@ MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or les
     "replay compare",
     "ros": "geometry world sensing hypotheses localization topology driving recording simulation evaluation checkup",
 }
-FOR_ALL = {"amcl_parameters", "params", "vocabulary"}  # modules of no room
+FOR_ALL = {"amcl_parameters", "health", "package_files", "params", "vocabulary"}  # modules of no room
 ONLY_BY = {  # compiled modules, each behind its face; and what is heavy, where it is needed
     "glass_nav._beam_vote": "localization",
     "glass_nav._mrpt_grid": "hypotheses sensing",

@@ -13,7 +13,8 @@ from glass_nav.topology.atlas import atlas_builder, atlas_file
 from glass_nav.topology.atlas.atlas import KINDS, Atlas
 from glass_nav.topology.atlas.atlas_builder import BuildParams
 from glass_nav.topology.atlas.edge_views import ViewParams
-from glass_nav.topology.atlas.voronoi_graph import VoronoiGraph, VoronoiParams
+from glass_nav.topology.atlas.voronoi.graph import VoronoiGraph
+from glass_nav.topology.atlas.voronoi_graph import VoronoiParams
 from glass_nav.world import map_file
 
 HELP = "make the atlas of a map"

@@ -7,17 +7,15 @@ import sys
 from pathlib import Path
 from typing import Dict, List, Optional, Tuple
 
-from glass_nav.cli import replay
+from glass_nav.cli import log_arguments
 from glass_nav.cli.progress import Progress
-from glass_nav.compare import compare_runs, engine
-from glass_nav.compare.compare_runs import Contestant, Job, Log
+from glass_nav.compare import compare_files, compare_runs, compared_logs, contestants, engine
+from glass_nav.compare.compare_runs import Job
 from glass_nav.compare.engine import Failed
 from glass_nav.evaluation.metrics import comparison, thresholds
-from glass_nav.evaluation.metrics.comparison import Comparison, Run
+from glass_nav.evaluation.metrics.comparison import Run
 from glass_nav.evaluation.metrics.thresholds import Threshold
-from glass_nav.evaluation.pages import comparison_page
-from glass_nav.evaluation.plots import comparison_pictures, run_pictures
-from glass_nav.world import map_file
+from glass_nav.evaluation.pages import comparison_table
 
 HELP = "runs, parameters or recorded poses side by side, with confidence over seeds"
 DESCRIPTION = """Compares contestants over logs and seeds: prints a table and writes compare.html, one file that needs
@@ -74,7 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="exit with 1 if a contestant's mean over all logs and seeds is beyond a limit, such as "
         "'position_p95_m>0.3'; metrics as in runs.csv, cpu_ms_per_scan too; may be repeated",
     )
-    replay.add_log_arguments(parser)
+    log_arguments.add_log_arguments(parser)
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
@@ -86,16 +84,15 @@ def usage_error(arguments: argparse.Namespace) -> Optional[str]:
     if arguments.scheduler is not None and arguments.jobs > 1:
         return "--jobs and --scheduler exclude each other"
     try:
-        running = [each.name for each in compare_runs.contestants(arguments.contestants) if each.runs]
-        compare_runs.logs(arguments.log, None)
+        running = [each.name for each in contestants.parse(arguments.contestants) if each.runs]
+        compared_logs.parse(arguments.log, None)
         _limits(arguments)
+        log_arguments.log_use(arguments)
     except ValueError as err:
         return str(err)
     if running and not (arguments.log or arguments.logs):
         return f"{running[0]} needs a log: --log BAG=MAP"
-    given = argparse.Namespace(**vars(arguments))
-    given.seed, given.fail_if = arguments.first_seed, []
-    return replay.usage_error(given)
+    return None
 
 
 def main(arguments: argparse.Namespace) -> bool:
@@ -107,15 +104,16 @@ def main(arguments: argparse.Namespace) -> bool:
     Raises:
         ValueError, OSError: bad input; one line. Where only some runs fail the others are compared and written first.
     """
-    everyone = compare_runs.contestants(arguments.contestants)
-    logs = compare_runs.logs(arguments.log, arguments.logs)
+    everyone = contestants.parse(arguments.contestants)
+    logs = compared_logs.parse(arguments.log, arguments.logs)
     compare_runs.check(everyone)
     read = [found for contestant in everyone for found in compare_runs.read(contestant, logs)]
     maps: Dict[str, Path] = {log.name: log.map for log in logs}
     for run, path in read:
         maps.setdefault(run.log, path)
     seeds = range(arguments.first_seed, arguments.first_seed + arguments.seeds)
-    made, failed = _run(compare_runs.jobs(everyone, logs, seeds, arguments), logs, arguments)
+    jobs = compare_runs.jobs(everyone, logs, seeds, log_arguments.log_use(arguments))
+    made, failed = _run(jobs, arguments)
     runs = [run for run, _ in read] + made
     for each in failed:
         _say(f"{each.job}: {each.reason}")
@@ -125,9 +123,9 @@ def main(arguments: argparse.Namespace) -> bool:
     compared = comparison.of(runs, names, list(maps))
     for note in compared.notes:
         _say(note)
-    _write(compared, maps, everyone, arguments)
-    print(table(compared))
-    print(f"written to {arguments.out / 'compare.html'}")
+    page = compare_files.write(arguments.out, compared, maps, everyone)
+    print("\n".join(comparison_table.lines(compared)))
+    print(f"written to {page}")
     if failed:
         raise ValueError(
             f"{len(failed)} of {len(failed) + len(made)} runs could not be made, see above; the others are compared"
@@ -138,74 +136,27 @@ def main(arguments: argparse.Namespace) -> bool:
     return not missed
 
 
-def _run(jobs: List[Job], logs: List[Log], arguments: argparse.Namespace) -> "Tuple[List[Run], List[Failed]]":
+def _run(jobs: List[Job], arguments: argparse.Namespace) -> "Tuple[List[Run], List[Failed]]":
     """All jobs, with one progress over all of them."""
     if not jobs:
         return [], []
-    scans, opened = {}, []
-    for log in logs:
-        of_log = [job for job in jobs if job.log == log.name]
-        scans[log.name], placed = _opened(log, of_log)
-        opened += placed
-    jobs = opened
-    progress = Progress("compare", sum(scans[job.log] for job in jobs))
+    opened: List[Job] = []
+    scans = 0
+    for log in dict.fromkeys(job.log for job in jobs):
+        found = compare_runs.open_log([job for job in jobs if job.log == log])
+        for note in found.notes:
+            _say(f"{log}: {note}")
+        opened += found.jobs
+        scans += found.expected_scans * len(found.jobs)
+    progress = Progress("compare", scans)
     try:
-        answers = engine.run(jobs, compare_runs.make, progress.step, arguments.jobs, arguments.scheduler)
+        answers = engine.run(opened, compare_runs.make, progress.step, arguments.jobs, arguments.scheduler)
     finally:
         progress.finish()
     return (
         [each for each in answers if not isinstance(each, Failed)],
         [each for each in answers if isinstance(each, Failed)],
     )
-
-
-def _opened(log: Log, jobs: List[Job]) -> "Tuple[int, List[Job]]":
-    """About how many scans it has, and the jobs with where they start; says what was chosen in the log, and refuses one
-    that cannot be used before anything runs.
-    """
-    ready = replay.prepare(jobs[0].arguments)
-    jobs, start = compare_runs.started(jobs, ready)
-    for note in ready.notes:
-        if not (start and note.startswith("start: ")):
-            _say(f"{log.name}: {note}")
-    if start:
-        _say(f"{log.name}: {start}")
-    return ready.expected_scans, jobs
-
-
-def _write(
-    compared: Comparison, maps: Dict[str, Path], everyone: List[Contestant], arguments: argparse.Namespace
-) -> None:
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    about = {
-        "versions": replay.versions(),
-        "maps": {log: str(maps[log]) for log in compared.logs},
-        "what": {each.name: _what(each) for each in everyone},
-    }
-    comparison.write(compared, arguments.out, about)
-    grids = {}
-    for log in compared.logs[: comparison_pictures.MAX_LOGS]:
-        if maps[log].exists():  # results may come from elsewhere
-            grid = map_file.load(maps[log])
-            grids[log] = run_pictures.MapImage(grid.occupancy, grid.resolution_m, grid.map_from_grid)
-    drawn = comparison_pictures.draw_all(arguments.out, compared, grids)
-    comparison_page.write(arguments.out / "compare.html", compared, drawn, about)
-
-
-def _what(contestant: Contestant) -> str:
-    if contestant.results:
-        return "results " + ", ".join(map(str, contestant.results))
-    if contestant.recorded:
-        return f"recorded poses, {contestant.recorded}"
-    return "the defaults" if contestant.params is None else f"parameters {contestant.params}"
-
-
-def table(compared: Comparison) -> str:
-    """The comparison for people: a figure a line, means, then the differences to the first."""
-    rows = comparison_page.summary(compared)
-    widths = [max(map(len, column)) for column in zip(*rows)]
-    lines = ["  ".join(f"{cell:<{width}s}" for cell, width in zip(row, widths)).rstrip() for row in rows]
-    return "\n".join([f"{comparison.counted(compared)}; mean ± 95 % interval over seeds", *lines])
 
 
 def _limits(arguments: argparse.Namespace) -> List[Threshold]:

@@ -8,12 +8,14 @@ from typing import Any, Dict, Optional
 
 import numpy as np
 
-from glass_nav.cli import replay
+from glass_nav.cli import log_arguments, replay
 from glass_nav.cli.progress import Progress
 from glass_nav.evaluation.metrics import replay_result, run_story
 from glass_nav.evaluation.pages import report_page
 from glass_nav.evaluation.plots import report_pictures, run_pictures
 from glass_nav.evaluation.plots.report_pictures import Ground
+from glass_nav.replay.replay_files import Outputs
+from glass_nav.replay.replay_options import ReplayOptions
 from glass_nav.world import map_file
 
 HELP = "tell one run as an HTML file with pictures"
@@ -35,15 +37,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="map_server .yaml, or MRPT .gridmap[.gz]; default for RESULTS: the map that the replay had",
     )
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for the report")
-    replay.add_run_arguments(parser)
-    replay.add_log_arguments(parser)
+    log_arguments.add_run_arguments(parser)
+    log_arguments.add_log_arguments(parser)
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
     """What is wrong with the options as such, before any file is opened."""
     if arguments.map is None and not _is_results(arguments.run):
         return "a log needs --map"
-    return replay.usage_error(_replay_arguments(arguments))
+    try:
+        _options(arguments)
+    except ValueError as err:
+        return str(err)
+    return None
 
 
 def main(arguments: argparse.Namespace) -> None:
@@ -54,7 +60,7 @@ def main(arguments: argparse.Namespace) -> None:
     """
     folder = arguments.run
     if not _is_results(folder):
-        replay.main(_replay_arguments(arguments))
+        replay.run(_options(arguments), Outputs(arguments.out, pictures=False))
         folder = arguments.out
     result, metrics = replay_result.read(folder)
     path_map = Path(metrics["map"]) if arguments.map is None else arguments.map
@@ -83,16 +89,14 @@ def _is_results(path: Path) -> bool:
     return path.is_dir() and not (path / "metadata.yaml").exists()
 
 
-def _replay_arguments(arguments: argparse.Namespace) -> argparse.Namespace:
-    """As if `glass_nav replay` had been given the same options."""
-    parser = argparse.ArgumentParser()
-    replay.add_arguments(parser)
-    given = parser.parse_args([str(arguments.run), "--map", str(arguments.map), "--out", str(arguments.out)])
-    for name, value in vars(arguments).items():
-        if hasattr(given, name):
-            setattr(given, name, value)
-    given.log, given.no_picture = [arguments.run], True
-    return given
+def _options(arguments: argparse.Namespace) -> ReplayOptions:
+    return ReplayOptions(
+        (arguments.run,),
+        Path() if arguments.map is None else arguments.map,  # results know their map
+        arguments.params,
+        arguments.seed,
+        log_arguments.log_use(arguments),
+    )
 
 
 def _glass(folder: Path, shape: "tuple[int, ...]") -> Optional[np.ndarray]:

@@ -10,21 +10,16 @@ from typing import Optional
 
 from glass_nav import params
 from glass_nav.replay import replay_params
-from glass_nav.topology.search.atlas_localizer import SearchParams
+from glass_nav.topology.search.search_params import SearchParams
+from glass_nav.topology.search_session import SessionParams
 
 NODE_ONLY = frozenset(
     [
         "atlas",
         "global_frame_id",
-        "check_map",
-        "judge_by_scans",
-        "search_at_start",
-        "publish_initial_pose",
         "initial_pose_sigma_m",
         "initial_pose_sigma_rad",
-        "listed_candidates",
-        "pairing_tolerance_s",
-        "visits_file",
+        *params.names(SessionParams),
     ]
 )
 

@@ -12,7 +12,8 @@ from typing import List, Optional, Tuple
 import numpy as np
 
 from glass_nav.topology.atlas import atlas_builder, voronoi_graph
-from glass_nav.topology.atlas.voronoi_graph import VoronoiGraph, VoronoiParams
+from glass_nav.topology.atlas.voronoi.graph import VoronoiGraph
+from glass_nav.topology.atlas.voronoi_graph import VoronoiParams
 from glass_nav.world.grid_map import GridMap
 
 _THICKER_M = 0.03  # walls of the local map than those of a drawn one: noise of the ranges

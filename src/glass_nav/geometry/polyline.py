@@ -56,3 +56,8 @@ def distinct(points: np.ndarray, least_step: float = 1e-6) -> np.ndarray:
     keep = np.ones(len(points), bool)
     keep[1:] = np.linalg.norm(np.diff(points, axis=0), axis=1) > least_step
     return points[keep]
+
+
+def length(points: np.ndarray) -> float:
+    """Of the line through the points (W, 2)."""
+    return float(np.hypot(*np.diff(points, axis=0).T).sum())

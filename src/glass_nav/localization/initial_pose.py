@@ -1,9 +1,10 @@
-"""Where the robot starts when nobody says; the names and defaults are AMCL's."""
+"""Where the robot starts: by default, in AMCL's names, and as somebody says."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Tuple
 
 import numpy as np
 
@@ -36,3 +37,30 @@ class StartPose:
     def covariance(self) -> np.ndarray:
         """(3, 3) of x, y, yaw."""
         return np.diag([self.initial_cov_xx, self.initial_cov_yy, self.initial_cov_aa])
+
+
+def checked(map_from_base: np.ndarray, covariance: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A pose that somebody gives, checked.
+
+    Args:
+        map_from_base: (3,) x [m], y [m], yaw [rad].
+        covariance: (3, 3) symmetric, not negative; 0 is allowed.
+
+    Returns:
+        Pose and covariance as floats, and (3, 3) the covariance's principal axes, each as long as its deviation.
+
+    Raises:
+        ValueError: not finite, not symmetric, or negative.
+    """
+    pose, covariance = np.array(map_from_base, float), np.array(covariance, float)
+    if pose.shape != (3,) or not np.all(np.isfinite(pose)):
+        raise ValueError(f"a pose needs finite x, y, yaw, got {map_from_base}")
+    if covariance.shape != (3, 3) or not np.all(np.isfinite(covariance)):
+        raise ValueError(f"a pose needs a finite covariance (3, 3), got {covariance.tolist()}")
+    scale = max(float(np.abs(covariance).max()), 1e-12)
+    if np.abs(covariance - covariance.T).max() > 1e-6 * scale:
+        raise ValueError(f"the covariance of a pose must be symmetric, got {covariance.tolist()}")
+    variance, axes = np.linalg.eigh(covariance)
+    if variance.min() < -1e-6 * scale:
+        raise ValueError(f"the covariance of a pose must not be negative, got {covariance.tolist()}")
+    return pose, covariance, axes * np.sqrt(np.maximum(variance, 0.0))

@@ -8,15 +8,16 @@ import numpy as np
 
 from glass_nav.hypotheses.bearing_weights import BearingMixture
 from glass_nav.hypotheses.global_search import SearchParams
+from glass_nav.localization.beam_classification.beam_classifier import BeamClassifierParams
 from glass_nav.localization.beam_classification.case_votes import CaseVote
 from glass_nav.localization.beam_classification.glass_map import GlassEvidence
 from glass_nav.localization.beam_classification.preliminary_samples import PreliminarySamples
 from glass_nav.localization.integrity.pose_state import QualityLimits
 from glass_nav.localization.particle_filter.importance_weights import BeamMixture
 from glass_nav.localization.particle_filter.motion import OdometryNoise
+from glass_nav.localization.particle_filter.particle_filter import ParticleFilterParams
 from glass_nav.localization.particle_filter.proposal import Proposal
 from glass_nav.localization.particle_filter.resampling import ParticleCount
-from glass_nav.localization.segments.segment_polish import Polish
 
 
 @dataclass(frozen=True)
@@ -72,4 +73,28 @@ class LocalizerParams:
     quality: QualityLimits = field(default_factory=QualityLimits)
     search: SearchParams = field(default_factory=SearchParams)
     bearings: BearingMixture = field(default_factory=BearingMixture)
-    polish: Polish = field(default_factory=Polish)
+
+    @property
+    def classifier(self) -> BeamClassifierParams:
+        """Those of the beam classifier."""
+        return BeamClassifierParams(
+            self.samples,
+            self.vote,
+            self.glass,
+            self.mixture.laser_sigma_hit,
+            self.mixture.laser_sigma_hit_max,
+            self.schedule.raycast_threads,
+        )
+
+    @property
+    def particle_filter(self) -> ParticleFilterParams:
+        """Those of the particle filter."""
+        return ParticleFilterParams(
+            self.count,
+            self.odometry,
+            self.proposal,
+            self.mixture,
+            self.bearings,
+            self.schedule.resample_interval,
+            self.schedule.selective_resampling,
+        )

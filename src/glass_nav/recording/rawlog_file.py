@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple, Union
+from typing import TYPE_CHECKING, Iterator, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from glass_nav.recording.recording import (
 from glass_nav.sensing.mounting import Mounting, level_mounting
 from glass_nav.sensing.scan import ScanError
 from glass_nav.sensing.scan_placement import NoTransform, RawScan, ScanPlacement, Transforms
+
+if TYPE_CHECKING:
+    from glass_nav._mrpt_io import Rawlog
 
 FRAME_PERIOD_NS = 100_000_000  # between frames of a log without times: only their order counts
 
@@ -55,7 +58,7 @@ def open_log(path: Path, options: LogOptions) -> Recording:
     return Recording(path.name, len(scans), _Entries(log, scans, odometry, options.laser_pose), truth, notes)
 
 
-def _scans(path: Path, log: Dict[str, Any], options: LogOptions, holds: str, notes: List[str]) -> np.ndarray:
+def _scans(path: Path, log: Rawlog, options: LogOptions, holds: str, notes: List[str]) -> np.ndarray:
     """Indices of the scans of the sensor asked for; a sensor's label stands in for a topic."""
     if not len(log["stamps_ns"]):
         raise RecordingError(f"{path}: holds no CObservation2DRangeScan; it holds {holds}")
@@ -75,7 +78,7 @@ def _scans(path: Path, log: Dict[str, Any], options: LogOptions, holds: str, not
     return np.nonzero(labels == chosen)[0]
 
 
-def _odometry(path: Path, log: Dict[str, Any]) -> Trajectory:
+def _odometry(path: Path, log: Rawlog) -> Trajectory:
     stamped = log["odometry_stamps_ns"] >= 0
     if not stamped.any():
         raise RecordingError(f"{path}: none of its {len(stamped)} odometry readings has a time")
@@ -128,7 +131,7 @@ class _Entries:
 
     def __init__(
         self,
-        log: Dict[str, Any],
+        log: Rawlog,
         scans: np.ndarray,
         odometry: Optional[Trajectory],
         laser_pose: Optional[Tuple[float, float, float]],

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from dataclasses import dataclass
-from typing import Callable, Dict, Iterable, Iterator, List, Optional, Tuple
+from typing import Callable, Dict, List, Optional, Tuple
 
 import numpy as np
 
@@ -13,63 +12,15 @@ from glass_nav.evaluation.metrics import case_scores, pose_errors
 from glass_nav.evaluation.metrics.case_scores import CaseScores, SurfaceScores
 from glass_nav.evaluation.metrics.replay_result import NO_BEAM, BeamExample, KeptScan, ReplayResult
 from glass_nav.geometry import se2
-from glass_nav.localization.integrity.pose_state import GLOBAL_SEARCH, UNKNOWN
 from glass_nav.localization.localizer import Estimate, Localizer
-from glass_nav.recording.recording import BeamTruth, Entry, Recording, RecordingError, Refusal, Step
+from glass_nav.recording.recording import BeamTruth, Recording, RecordingError, Refusal, Step
+from glass_nav.replay.window import Window
 from glass_nav.sensing.scan import Scan, ScanError
+from glass_nav.vocabulary import LocalizationState
 
 EXAMPLES = 3  # scans whose beams are kept for the picture, spread over the log
 WORST = 10  # scans kept that went worst, each from another part of the log
 PARTS = 60  # of the log, so that they do not all show one moment
-
-
-@dataclass(frozen=True)
-class Window:
-    """Which part of a log to replay."""
-
-    start_s: float = 0.0  # from the first scan on
-    duration_s: Optional[float] = None  # to the end
-    every: int = 1  # 2: each second scan
-    max_scans: Optional[int] = None
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.start_s < float("inf"):
-            raise ValueError(f"--start must be >= 0 s, got {self.start_s}")
-        if self.duration_s is not None and not self.duration_s > 0.0:
-            raise ValueError(f"--duration must be > 0 s, got {self.duration_s}")
-        if self.every < 1:
-            raise ValueError(f"--every must be >= 1, got {self.every}")
-        if self.max_scans is not None and self.max_scans < 1:
-            raise ValueError(f"--max-scans must be >= 1, got {self.max_scans}")
-
-    def expected(self, scan_count: int) -> int:
-        """About how many of so many scans: for a progress bar."""
-        count = -(-scan_count // self.every)
-        return count if self.max_scans is None else min(count, self.max_scans)
-
-    def of(self, entries: Iterable[Entry]) -> Iterator[Entry]:
-        """The entries of that part; refused scans within it are kept, to be counted."""
-        first_ns: Optional[int] = None
-        since_s = 0.0  # of the last scan that could be read: the stamp of a refused one may be its fault
-        seen = taken = 0
-        for entry in entries:
-            if isinstance(entry, Refusal):
-                if since_s >= self.start_s:
-                    yield entry
-                continue
-            first_ns = entry.scan.stamp_ns if first_ns is None else first_ns
-            since_s = (entry.scan.stamp_ns - first_ns) * 1e-9
-            if self.duration_s is not None and since_s > self.start_s + self.duration_s:
-                return
-            if since_s < self.start_s:
-                continue
-            seen += 1
-            if (seen - 1) % self.every:
-                continue
-            taken += 1
-            yield entry
-            if taken == self.max_scans:
-                return
 
 
 def run(
@@ -175,7 +126,7 @@ class _WorstScans:
         errors = pose_errors.of(np.array([estimate.stamp_ns]), estimate.map_from_base[None], self._reference)
         # Nobody relies on a pose that is still being looked for: such scans come last.
         bad = (
-            estimate.state not in (UNKNOWN, GLOBAL_SEARCH),
+            estimate.state not in (LocalizationState.UNKNOWN, LocalizationState.GLOBAL_SEARCH),
             float(errors.position_m[0]) if errors.matched[0] else 1.0 - estimate.reliability,
         )
         part = row * PARTS // self._expected

@@ -7,7 +7,7 @@ where the robot truly was.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Dict, List, Optional
+from typing import List, Optional
 
 import numpy as np
 
@@ -19,11 +19,11 @@ from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.evaluation.plots import passed_nodes_picture
 from glass_nav.evaluation.plots.run_pictures import MapImage
 from glass_nav.geometry import se2
-from glass_nav.localization.integrity.pose_state import GLOBAL_SEARCH, LOST, UNKNOWN
 from glass_nav.localization.localizer import Estimate
 from glass_nav.recording.recording import Step
 from glass_nav.topology.atlas import atlas_builder, atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import RING_MARKER, Atlas
+from glass_nav.vocabulary import LocalizationState
 from glass_nav.world import map_file
 from glass_nav.world.grid_map import GridMap
 
@@ -121,7 +121,9 @@ def poses(result: ReplayResult) -> np.ndarray:
     """(S, 3) map_from_base by the reference, NaN where it does not reach; without one the estimates, NaN while lost."""
     if result.reference is not None and len(result.reference):
         return np.where(result.errors.matched[:, None], result.reference.at(result.stamps_ns), np.nan)
-    lost = np.isin(np.array(result.states), [UNKNOWN, GLOBAL_SEARCH, LOST])
+    lost = np.isin(
+        np.array(result.states), [LocalizationState.UNKNOWN, LocalizationState.GLOBAL_SEARCH, LocalizationState.LOST]
+    )
     return np.where(lost[:, None], np.nan, result.map_from_base)
 
 
@@ -139,31 +141,3 @@ def write(
             found,
             title,
         )
-
-
-def table(figures: Dict[str, Any]) -> List[str]:
-    """The figures of TopologyScore.metrics() for people."""
-    why = figures["missed_why"]
-    lines = [f"topology        {'':12s}{'passed':>8s}{'seen':>8s}{'missed':>8s}{'invented':>10s}{'degree right':>14s}"]
-    for name, row in (("meetpoints", figures["meetpoints"]), ("dead ends", figures["dead_ends"]), ("all", figures)):
-        share = "-" if row["degree_right_share"] is None else f"{100 * row['degree_right_share']:.0f} %"
-        seen = f"{row['seen']}" if row["seen_share"] is None else f"{row['seen']} ({100 * row['seen_share']:.0f} %)"
-        lines.append(
-            f"  {name:14s}{'':12s}{row['passed']:8d}{seen:>11s}{row['missed']:5d}{row['invented']:10d}{share:>14s}"
-        )
-    lines.append(
-        f"  missed          {why['doubtful']} whose obstacles were not seen well enough, {why['unsteady']} "
-        f"that came and went, {why['nothing']} where nothing was seen"
-    )
-    lines.append(f"  seen nodes      off by {_off(figures['position_off_m'])}, r by {_off(figures['r_off_m'])}")
-    lines.append(
-        f"  edges           {figures['edges_driven']} between two seen nodes: length off by "
-        f"{_off(figures['edge_length_off_m'])}, chord by {_off(figures['edge_chord_off_m'])}"
-    )
-    return lines
-
-
-def _off(spread: Dict[str, Optional[float]]) -> str:
-    if spread["median_abs"] is None:
-        return "-"
-    return f"{spread['median_abs']:.2f} m (median, p95 {spread['p95_abs']:.2f} m)"

@@ -1,13 +1,12 @@
-"""From callback threads to the run loop: what came in, and what is asked for.
-
-Callbacks only store; the run loop takes. No ROS in here: messages are opaque.
-"""
+"""From callback threads to the run loop: callbacks only store, the run loop takes."""
 
 from __future__ import annotations
 
 import collections
+import concurrent.futures
 import threading
-from typing import Any, Callable, Deque, Dict, List, Optional, TypeVar
+from concurrent.futures import Future
+from typing import Any, Callable, Deque, Dict, List, TypeVar
 
 T = TypeVar("T")
 
@@ -30,6 +29,12 @@ class Mailbox:
             self._lanes[lane].append(item)
             self._changed.notify()
 
+    def submit(self, lane: str, work: Callable[[], T]) -> "Future[T]":
+        """Put a callable into a lane; the future completes when the run loop has called it. See outcome()."""
+        future: "Future[T]" = Future()
+        self.put(lane, lambda: _run(work, future))
+        return future
+
     def take(self, timeout_s: float) -> Dict[str, List[Any]]:
         """Lane -> what came since the last call, oldest first; waits for a first item up to the timeout."""
         with self._changed:
@@ -48,30 +53,23 @@ class Mailbox:
             return taken
 
 
-class Errand:
-    """Something the run loop shall do for another thread, which waits for the outcome."""
+def outcome(future: "Future[T]", timeout_s: float) -> T:
+    """What the work of Mailbox.submit() returned or raised. TimeoutError if it has not finished; not begun, it never is."""
+    try:
+        return future.result(timeout_s)
+    except concurrent.futures.TimeoutError:
+        future.cancel()  # the caller is told that it failed: doing it later would surprise
+        raise TimeoutError(f"the node did not answer within {timeout_s:g} s") from None
 
-    def __init__(self, work: Callable[[], Any]) -> None:
-        self._work = work
-        self._done = threading.Event()
-        self._error: Optional[Exception] = None
-        self._abandoned = False
 
-    def run(self) -> None:
-        """Do it (run loop); a ValueError goes to the thread that waits, nothing else is caught."""
-        if self._abandoned:  # nobody waits any more and was told so: doing it now would surprise
-            return
-        try:
-            self._work()
-        except ValueError as err:
-            self._error = err
-        finally:
-            self._done.set()
-
-    def wait(self, timeout_s: float) -> None:
-        """Block until done. Raises what the work raised, or TimeoutError."""
-        if not self._done.wait(timeout_s):
-            self._abandoned = True
-            raise TimeoutError(f"the node did not come to it within {timeout_s:g} s")
-        if self._error is not None:
-            raise self._error
+def _run(work: Callable[[], T], future: "Future[T]") -> None:
+    """As an executor does, but only a ValueError is an answer; anything else also ends the run loop."""
+    if not future.set_running_or_notify_cancel():
+        return
+    try:
+        future.set_result(work())
+    except ValueError as err:
+        future.set_exception(err)
+    except BaseException as err:
+        future.set_exception(err)
+        raise

@@ -13,12 +13,7 @@ import numpy as np
 import pytest
 
 from glass_nav.cli import main as cli
-from glass_nav.cli import replay
-from glass_nav.params import ParamError
-from glass_nav.recording.recording import Recording, Refusal, Step
-from glass_nav.replay import replay_params, replay_run
-from glass_nav.replay.replay_run import Window
-from glass_nav.sensing.scan import Scan
+from glass_nav.replay import replay_run
 from glass_nav.world import map_file
 
 REPO = Path(__file__).resolve().parents[3]
@@ -350,8 +345,9 @@ def test_an_interrupted_replay_says_so(run, room_bag, monkeypatch):
 
 
 def test_a_package_that_is_not_built_is_said_in_one_line(capsys, monkeypatch):
-    monkeypatch.delitem(sys.modules, "glass_nav.cli.replay")
-    monkeypatch.delattr("glass_nav.cli.replay")
+    for module in ("glass_nav.cli.replay", "glass_nav.replay.prepared_replay"):
+        monkeypatch.delitem(sys.modules, module)
+        monkeypatch.delattr(module)
     monkeypatch.setitem(sys.modules, "glass_nav.localization.localizer", None)
     assert cli.main(["replay"]) == 3
     assert capsys.readouterr().err == (
@@ -464,84 +460,3 @@ def test_truth_about_other_beams_is_refused(run, room_bag):
     assert err.splitlines()[-1] == (
         "glass_nav replay: room.bag: the truth at 1000.000 s is about 50 beams, the scan has 60"
     )
-
-
-@pytest.mark.parametrize(
-    "text, reason",
-    [
-        ("- 1\n", "must hold names and values, got list"),
-        ("a: [\n", "is no yaml: "),
-        ("max_particles: many\n", "~max_particles must be int, got 'many'"),
-    ],
-)
-def test_parameter_files_that_are_none_are_refused(tmp_path, text, reason):
-    (tmp_path / "p.yaml").write_text(text)
-    with pytest.raises(ParamError) as caught:
-        replay_params.load(tmp_path / "p.yaml")
-    assert str(caught.value).startswith(f"{tmp_path}/p.yaml: {reason}")
-
-
-def test_a_missing_or_empty_parameter_file(tmp_path):
-    with pytest.raises(ParamError, match="p.yaml: cannot be read: No such file or directory$"):
-        replay_params.load(tmp_path / "p.yaml")
-    (tmp_path / "p.yaml").write_bytes(b"\xff")
-    with pytest.raises(ParamError, match="p.yaml: cannot be read: 'utf-8'"):
-        replay_params.load(tmp_path / "p.yaml")
-    (tmp_path / "p.yaml").write_text("")
-    assert replay_params.load(tmp_path / "p.yaml") == (replay_params.ReplayParams(), [])
-
-
-def test_the_parameters_of_the_node_serve_the_replay():
-    settings, unused = replay_params.load(REPO / "config" / "localization.yaml")
-    assert settings.start == replay_params.StartPose()
-    assert "transform_tolerance" in unused
-
-
-def entry(second, reason=None):
-    stamp_ns = 10**12 + int(second * 10**9)
-    if reason is not None:
-        return Refusal(stamp_ns, reason)
-    return Step(Scan(stamp_ns, np.ones(1), np.zeros(1), 0.0, 9.0, np.zeros(3)), np.zeros(3))
-
-
-@pytest.mark.parametrize(
-    "window, seconds",
-    [
-        (Window(), [0, 1, 2, 3, 4]),
-        (Window(start_s=1.5), [2, 3, 4]),
-        (Window(duration_s=2.0), [0, 1, 2]),
-        (Window(start_s=1.0, duration_s=1.0), [1, 2]),
-        (Window(every=2), [0, 2, 4]),
-        (Window(max_scans=2), [0, 1]),
-        (Window(start_s=1.0, every=2, max_scans=1), [1]),
-    ],
-)
-def test_a_window_takes_its_part(window, seconds):
-    taken = [round(step.scan.stamp_ns * 1e-9 - 1000) for step in window.of(map(entry, range(5)))]
-    assert taken == seconds
-    assert window.expected(5) >= len(seconds)
-
-
-def test_refused_scans_within_the_window_stay_in_it():
-    entries = [entry(0), entry(1, "bad"), entry(2), entry(3, "worse"), entry(4)]
-    assert [each.reason for each in Window(start_s=2.0).of(entries) if isinstance(each, Refusal)] == ["worse"]
-    assert len(list(Window().of(entries))) == 5
-
-
-def test_a_scan_that_the_filter_refuses_is_counted():
-    from glass_nav.sensing.scan import ScanError
-
-    class Filter:
-        def update(self, scan, odom_from_base):
-            raise ScanError("no good", 1_000_000_000)
-
-    from glass_nav.recording.recording import RecordingError
-
-    with pytest.raises(RecordingError, match="^log: none of its 2 scans can be used; 2 times: no good$"):
-        replay_run.run(Recording("log", 2, [entry(0), entry(1)]), Filter(), lambda stamp_ns: None, 0)
-    with pytest.raises(RecordingError, match="^log: no scan in the part to be replayed$"):
-        replay_run.run(Recording("log", 0, []), Filter(), lambda stamp_ns: None, 0)
-
-
-def test_an_infinite_error_is_no_number_in_the_table():
-    assert replay._metres(None) == "infinite"

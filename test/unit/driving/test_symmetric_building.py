@@ -18,7 +18,9 @@ from glass_nav.simulation import building_map, lidar
 from glass_nav.simulation.building import Building, Wall
 from glass_nav.simulation.simulation import Simulation
 from glass_nav.topology.atlas import atlas_builder
-from glass_nav.topology.search.atlas_localizer import AMBIGUOUS, AtlasLocalizer, SearchParams
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search.search_params import SearchParams
+from glass_nav.vocabulary import SearchState
 
 CONTROL_S = 0.05
 W, L = 1.0, 5.0  # half the width of the four arms of a cross, and how far they reach
@@ -89,8 +91,8 @@ def test_a_robot_in_a_cross_of_four_equal_arms_is_ambiguous_and_lists_the_four_p
         if estimate.choice is None:
             break
         rank = estimate.choice.rank
-    assert estimate.state == AMBIGUOUS, estimate.reason
-    assert "4 places fit that no turn can tell apart" in estimate.reason
+    assert estimate.state == SearchState.AMBIGUOUS, estimate.reason
+    assert "4 places match, and no turn can tell them apart" in estimate.reason
     standing = localizer.standing
     assert standing is not None and standing.places >= 4 and standing.lead < 0.05  # nor do the scans
     poses = localizer.map_from_base(estimate.dart)

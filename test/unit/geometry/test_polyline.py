@@ -52,3 +52,8 @@ def test_a_part_has_its_ends_and_the_corners_between_them():
 
 def test_points_that_repeat_the_one_before_are_left_out():
     np.testing.assert_array_equal(polyline.distinct(CORNER[[0, 0, 1, 2, 2]]), CORNER)
+
+
+def test_a_line_is_as_long_as_its_pieces() -> None:
+    assert polyline.length(np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 6.0]])) == 7.0
+    assert polyline.length(np.zeros((1, 2))) == 0.0

@@ -1,4 +1,4 @@
-"""Mailbox: nothing is lost but what must be."""
+"""Mailbox: nothing is lost but what must be, and whoever waits gets an answer."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import List
 
 import pytest
 
-from glass_nav.ros.mailbox import Errand, Mailbox
+from glass_nav.ros import mailbox
+from glass_nav.ros.mailbox import Mailbox
 
 
 def test_items_come_out_once_in_their_order_by_lane():
@@ -34,36 +35,45 @@ def test_take_waits_for_an_item_of_another_thread():
     assert box.take(10.0) == {"scans": ["late"]}
 
 
-def test_an_errand_tells_the_one_who_waits_what_came_of_it():
+def run_next(box: Mailbox) -> None:
+    """As a run loop does."""
+    for work in box.take(10.0)["commands"]:
+        work()
+
+
+def test_the_caller_gets_what_the_work_returned_or_refused():
     def fail() -> None:
         raise ValueError("no map")
 
-    errand = Errand(fail)
-    threading.Timer(0.02, errand.run).start()
+    box = Mailbox(commands=10)
+    threading.Timer(0.02, run_next, (box,)).start()
     with pytest.raises(ValueError, match="no map"):
-        errand.wait(10.0)
-    done: List[int] = []
-    errand = Errand(lambda: done.append(1))
-    errand.run()
-    errand.wait(0.0)
-    assert done == [1]
+        mailbox.outcome(box.submit("commands", fail), 10.0)
+    future = box.submit("commands", lambda: "done")
+    run_next(box)
+    assert mailbox.outcome(future, 0.0) == "done"
 
 
-def test_an_errand_nobody_waits_for_any_more_is_not_done():
+def test_work_that_nobody_waits_for_any_more_is_not_done():
     done: List[int] = []
-    errand = Errand(lambda: done.append(1))
+    box = Mailbox(commands=10)
+    future = box.submit("commands", lambda: done.append(1))
     with pytest.raises(TimeoutError, match="within 0.01 s"):
-        errand.wait(0.01)
-    errand.run()
+        mailbox.outcome(future, 0.01)
+    run_next(box)
     assert not done
 
 
-def test_an_error_that_is_not_about_values_stays_with_the_run_loop():
+def test_an_error_that_is_not_about_values_also_ends_the_run_loop():
     def broken() -> None:
         raise KeyError("a bug")
 
+    box = Mailbox(commands=10)
+    future = box.submit("commands", broken)
     with pytest.raises(KeyError):
-        Errand(broken).run()
+        run_next(box)
+    with pytest.raises(KeyError):
+        mailbox.outcome(future, 0.0)
 
 
 def test_one_lane_can_be_emptied_alone():

@@ -27,8 +27,9 @@ RayBatch batch_of(const Array<double>& poses, const Array<double>& angles, doubl
   if (angles.ndim() != 1) throw std::invalid_argument("angles must be (B,)");
   if (!(max_range_m > 0.0)) throw std::invalid_argument("max_range must be > 0 m");
   if (threads < 1) throw std::invalid_argument("threads must be >= 1");
-  return {poses.data(), static_cast<std::size_t>(poses.shape(0)), angles.data(),
-          static_cast<std::size_t>(angles.shape(0)), max_range_m, threads};
+  return {poses.data(),  static_cast<std::size_t>(poses.shape(0)),
+          angles.data(), static_cast<std::size_t>(angles.shape(0)),
+          max_range_m,   threads};
 }
 
 template <class T>
@@ -36,8 +37,8 @@ py::array_t<T> result_for(const RayBatch& rays) {
   return py::array_t<T>({rays.pose_count, rays.angle_count});
 }
 
-std::unique_ptr<GridRaycaster> make_grid(const Array<std::int8_t>& occupancy, double resolution_m,
-                                         int occupied_percent, const std::string& backend, bool unknown_stops) {
+std::unique_ptr<GridRaycaster> make_grid(const Array<std::int8_t>& occupancy, double resolution_m, int occupied_percent,
+                                         const std::string& backend, bool unknown_stops) {
   if (occupancy.ndim() != 2) throw std::invalid_argument("occupancy must be (H, W)");
   constexpr py::ssize_t kMost = std::numeric_limits<int>::max();
   if (occupancy.shape(0) > kMost || occupancy.shape(1) > kMost) throw std::invalid_argument("occupancy is too large");
@@ -90,7 +91,10 @@ py::dict cast_surfaces(const GridRaycaster& grid, const Array<double>& poses, co
   const SurfaceArrays out{{real("first_m"), real("second_m"), real("third_m")},
                           {index("first_cell"), index("second_cell"), index("third_cell")},
                           {real("first_thickness_m"), real("second_thickness_m")},
-                          real("normal_rad"), real("linearity"), real("mirrored_m"), index("mirrored_cell")};
+                          real("normal_rad"),
+                          real("linearity"),
+                          real("mirrored_m"),
+                          index("mirrored_cell")};
   {
     py::gil_scoped_release unlocked;
     grid.cast_surfaces(rays, {max_thickness_m, min_linearity, min_gap_m}, out);
@@ -204,8 +208,7 @@ PYBIND11_MODULE(_mrpt_grid, module) {
            py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"), py::arg("threads"))
       .def("cast_paths", &cast_paths, py::arg("poses"), py::arg("angles"), py::arg("reach_m"),
            py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"), py::arg("threads"))
-      .def("simulate_scan_ray_raw", &simulate_scan_ray_raw, py::arg("poses"), py::arg("angles"),
-           py::arg("max_range_m"))
+      .def("simulate_scan_ray_raw", &simulate_scan_ray_raw, py::arg("poses"), py::arg("angles"), py::arg("max_range_m"))
       .def("normals", &normals);
   py::class_<ScanMatcher>(module, "ScanMatcher")
       .def(py::init(&make_matcher), py::arg("scores"), py::arg("allowed"))

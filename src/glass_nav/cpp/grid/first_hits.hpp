@@ -122,7 +122,7 @@ class FirstHits {
     Axis x, y;
     double t;  // where the ray entered the present cell
     const std::uint8_t* free_square;
-    std::ptrdiff_t cell;  // flat index of the present cell
+    std::ptrdiff_t cell;                    // flat index of the present cell
     std::ptrdiff_t cell_0, step_x, step_y;  // that of the cell which is (0, 0) after turning over, and from it on
     std::size_t index;
     Ray ray;
@@ -175,10 +175,9 @@ class FirstHits {
     const auto start = [&](std::size_t j) {
       return Search{doubtful[j].ray, GridWalk(doubtful[j].ray, cells_.width, cells_.height, t_max)};
     };
-    marcher_.march_all(doubtful.size(), start, NothingIgnored{},
-                     [&](std::size_t j, const GridWalk& walk, std::int32_t met) {
-                       found(doubtful[j].index, walk.t(), met);
-                     });
+    marcher_.march_all(
+        doubtful.size(), start, NothingIgnored{},
+        [&](std::size_t j, const GridWalk& walk, std::int32_t met) { found(doubtful[j].index, walk.t(), met); });
   }
 
   GridCells cells_;

@@ -50,7 +50,8 @@ GridRaycaster::GridRaycaster(const std::int8_t* occupancy, int height, int width
   if (width < 1 || height < 1) throw std::invalid_argument("a grid needs at least one cell");
   if (!(resolution_m > 0.0 && std::isfinite(resolution_m))) throw std::invalid_argument("resolution must be > 0 m");
   const std::int64_t count = static_cast<std::int64_t>(width) * height;
-  if (count > std::numeric_limits<std::int32_t>::max()) throw std::invalid_argument("a grid has at most 2^31 - 1 cells");
+  if (count > std::numeric_limits<std::int32_t>::max())
+    throw std::invalid_argument("a grid has at most 2^31 - 1 cells");
   // At the origin: setSize() would round any other place to whole cells.
   map_.setSize(0.0F, static_cast<float>(width * resolution_m), 0.0F, static_cast<float>(height * resolution_m),
                static_cast<float>(resolution_m));
@@ -80,7 +81,9 @@ const WallNormals& GridRaycaster::normals() const {
   return *normals_;
 }
 
-GridCells GridRaycaster::cells() const { return {width_, height_, map_.getRawMap().data(), chessboard_distance_.get()}; }
+GridCells GridRaycaster::cells() const {
+  return {width_, height_, map_.getRawMap().data(), chessboard_distance_.get()};
+}
 
 template <class Use>
 void GridRaycaster::with_ray_marcher(const Use& use) const {
@@ -113,9 +116,8 @@ void GridRaycaster::cast_first(const RayBatch& batch, double* range_m, std::int3
       const Ray ray = rays.next();
       return Search{ray, GridWalk(ray, grid.width, grid.height, t_max)};
     };
-    marcher.march_all(count, start, NothingIgnored{}, [&](std::size_t i, const GridWalk& walk, std::int32_t met) {
-      store(first + i, walk.t(), met);
-    });
+    marcher.march_all(count, start, NothingIgnored{},
+                      [&](std::size_t i, const GridWalk& walk, std::int32_t met) { store(first + i, walk.t(), met); });
   });
 }
 
@@ -130,17 +132,15 @@ void GridRaycaster::find_surfaces(const RayBatch& batch, const SurfaceLimits& li
     for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
       constexpr std::size_t kTogether = 512;  // their state fits the level 2 cache
       for (std::size_t done = 0; done < count; done += kTogether) {
-        finder.along_all(std::min(kTogether, count - done), t_max, rays,
-                         [&](std::size_t i, const Surfaces& found, const Ray& ray) {
-                           store(first + done + i, finder, found, ray);
-                         });
+        finder.along_all(
+            std::min(kTogether, count - done), t_max, rays,
+            [&](std::size_t i, const Surfaces& found, const Ray& ray) { store(first + done + i, finder, found, ray); });
       }
     });
   });
 }
 
-void GridRaycaster::cast_surfaces(const RayBatch& batch, const SurfaceLimits& limits,
-                                  const SurfaceArrays& out) const {
+void GridRaycaster::cast_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const SurfaceArrays& out) const {
   const auto reach = [t_max = batch.max_range_m / resolution_m_](std::size_t) { return t_max; };
   find_surfaces(batch, limits, reach, [&](std::size_t i, const auto&, const Surfaces& found, const Ray&) {
     for (std::size_t k = 0; k < 3; ++k) {

@@ -26,7 +26,7 @@ Backend backend_from_name(const std::string& name);
 
 /// A batch of rays: every pose looks along every angle. Row-major arrays, owned by the caller.
 struct RayBatch {
-  const double* poses;   // pose_count * 3: x [m], y [m], yaw [rad] in the frame of the grid
+  const double* poses;  // pose_count * 3: x [m], y [m], yaw [rad] in the frame of the grid
   std::size_t pose_count;
   const double* angles;  // angle_count: directions in the frame of the pose [rad]
   std::size_t angle_count;
@@ -43,20 +43,20 @@ struct SurfaceLimits {
 
 /// Where the results of cast_surfaces go: arrays of pose_count * angle_count.
 struct SurfaceArrays {
-  double* range_m[3];      // first, second, third surface; inf where none
-  std::int32_t* cell[3];   // -1 where none
-  double* thickness_m[2];  // of the first and the second; inf where the ray was not followed through
-  double* normal_rad;      // of the first, facing the origin of the ray; NaN where none
-  double* linearity;       // of the first
-  double* mirrored_m;      // path by way of the first surface; inf where none
+  double* range_m[3];           // first, second, third surface; inf where none
+  std::int32_t* cell[3];        // -1 where none
+  double* thickness_m[2];       // of the first and the second; inf where the ray was not followed through
+  double* normal_rad;           // of the first, facing the origin of the ray; NaN where none
+  double* linearity;            // of the first
+  double* mirrored_m;           // path by way of the first surface; inf where none
   std::int32_t* mirrored_cell;  // where that ends; -1 where none
 };
 
 /// Where the results of cast_paths go: arrays of pose_count * angle_count for each way that a beam may take: to the
 /// first surface, mirrored there, and to the second and the third.
 struct PathArrays {
-  double* range_m[4];  // whole length; inf where none
-  double* cos[4];      // of the incidence where it ends; 1 without a normal
+  double* range_m[4];     // whole length; inf where none
+  double* cos[4];         // of the incidence where it ends; 1 without a normal
   std::int32_t* cell[4];  // where it ends; -1 where none
 };
 

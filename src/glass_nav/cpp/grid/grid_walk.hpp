@@ -40,9 +40,7 @@ class GridWalk {
   }
 
   /// False once the ray has left the grid or is longer than t_max.
-  bool inside() const {
-    return t_ <= t_max_ && x_axis_.cell < x_axis_.size && y_axis_.cell < y_axis_.size;
-  }
+  bool inside() const { return t_ <= t_max_ && x_axis_.cell < x_axis_.size && y_axis_.cell < y_axis_.size; }
 
   /// Length of the ray where it entered the present cell.
   double t() const { return t_; }
@@ -103,8 +101,9 @@ class GridWalk {
     /// t at which the ray crosses the lower boundary of a cell ahead.
     double crossing(int ahead) const { return (ahead - start) * per_speed; }
 
-    /// Goes to the cell at t, which is `cells` ahead if that boundary is the one crossed, and nearer otherwise: rounding
-    /// has no say in it. Returns how far the coordinate is from the nearest boundary [cells]; 1 and more if crossed.
+    /// Goes to the cell at t, which is `cells` ahead if that boundary is the one crossed, and nearer otherwise:
+    /// rounding has no say in it. Returns how far the coordinate is from the nearest boundary [cells]; 1 and more if
+    /// crossed.
     double follow(double t, int cells, int crossed) {
       const double coordinate = start + t * speed;
       const int before = static_cast<int>(coordinate);
@@ -116,8 +115,8 @@ class GridWalk {
 
     /// The cell at t, where the ray enters the grid; `size` if it passes by.
     void enter(double t) {
-      cell = static_cast<int>(std::clamp(std::floor(start + t * speed), std::max<double>(cell, 0.0),
-                                         static_cast<double>(size)));
+      cell = static_cast<int>(
+          std::clamp(std::floor(start + t * speed), std::max<double>(cell, 0.0), static_cast<double>(size)));
     }
 
     /// True if the lower boundary of the cell was crossed at this very t.
@@ -156,7 +155,7 @@ class GridWalk {
   double t_max_;
   double t_ = 0.0;
   double off_boundary_ = 1.0;  // distance from the nearest corner of the cell where it was entered
-  std::int32_t cell_;  // flat index of the cell that is (0, 0) after turning over
+  std::int32_t cell_;          // flat index of the cell that is (0, 0) after turning over
   std::int32_t step_x_, step_y_;
   bool crossed_x_ = false;
 };

@@ -25,7 +25,9 @@ struct GridCells {
   bool occupied(std::int32_t cell) const { return log_odds[cell] < 0; }
 
   /// A cell that ends a ray without being a surface (unknown, if those are to stop a ray).
-  bool stops(std::int32_t cell) const { return chessboard_distance->towards(false, false)[cell] == 0 && !occupied(cell); }
+  bool stops(std::int32_t cell) const {
+    return chessboard_distance->towards(false, false)[cell] == 0 && !occupied(cell);
+  }
 
   /// The occupied cell that the ray meets where the walk stands: its own or one beside the corner; -1 none. Where the
   /// ray leaves the grid at a corner there is still one beside it.
@@ -76,8 +78,8 @@ class ExactRayMarcher {
     while (busy > 0) {
       for (std::size_t i = 0; i < busy; ++i) {
         Lane& lane = lanes[i];
-        const std::int32_t met = step(lane.walk, lane.free_square,
-                                      [&](std::int32_t cell) { return ignored(lane.ray, cell); });
+        const std::int32_t met =
+            step(lane.walk, lane.free_square, [&](std::int32_t cell) { return ignored(lane.ray, cell); });
         if (met == kOnTheWay) continue;
         found(lane.ray, lane.walk, met);
         if (next < count) {

@@ -72,14 +72,14 @@ std::vector<Match> ScanMatcher::search(const double* points, std::size_t count, 
     const double cos = std::cos(headings_rad[heading]), sin = std::sin(headings_rad[heading]);
     for (std::size_t i = 0; i < count; ++i) {
       const double x = points[2 * i], y = points[2 * i + 1];
-      turned[heading].push_back({static_cast<int>(std::lround(cos * x - sin * y)),
-                                 static_cast<int>(std::lround(sin * x + cos * y))});
+      turned[heading].push_back(
+          {static_cast<int>(std::lround(cos * x - sin * y)), static_cast<int>(std::lround(sin * x + cos * y))});
     }
     for (int row = 0; row < height_; row += kBlock) {
       for (int column = 0; column < width_; column += kBlock) {
         if (allowed_[kLevels].at(column, row) == 0) continue;
-        squares.push_back({sum(scores_[kLevels], turned[heading], row, column), static_cast<std::int32_t>(heading),
-                           row, column});
+        squares.push_back(
+            {sum(scores_[kLevels], turned[heading], row, column), static_cast<std::int32_t>(heading), row, column});
       }
     }
   }

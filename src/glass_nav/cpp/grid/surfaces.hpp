@@ -28,8 +28,8 @@ struct Surfaces {
   std::array<double, 3> range{kInfinity, kInfinity, kInfinity};
   std::array<std::int32_t, 3> cell{-1, -1, -1};
   std::array<double, 2> thickness{kInfinity, kInfinity};
-  WallNormals::Normal normal{std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::quiet_NaN(),
-                             0.0F, std::numeric_limits<float>::quiet_NaN()};  // of the first, towards the origin
+  WallNormals::Normal normal{std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::quiet_NaN(), 0.0F,
+                             std::numeric_limits<float>::quiet_NaN()};  // of the first, towards the origin
   double mirrored = kInfinity;
   std::int32_t mirrored_cell = -1;
 };
@@ -44,7 +44,8 @@ struct Incidences {
 template <class RayMarcher>
 class SurfaceFinder {
  public:
-  SurfaceFinder(const GridCells& cells, const RayMarcher& marcher, const WallNormals& normals, const SurfaceRules& rules)
+  SurfaceFinder(const GridCells& cells, const RayMarcher& marcher, const WallNormals& normals,
+                const SurfaceRules& rules)
       : cells_(cells), marcher_(marcher), normals_(normals), rules_(rules) {}
 
   /// Follows `count` rays of the stream `rays`, each up to t_max(beam); found(i, Surfaces, Ray) for each. All rays go

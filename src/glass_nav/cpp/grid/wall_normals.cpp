@@ -78,8 +78,8 @@ class Patch {
   }
 
   /// The same wall over a longer stretch. Twice the length makes the staircase of cells a third as steep; the weight
-  /// falls off towards the ends, so that no step there tilts the line. What sticks out, as the posts of a glass wall do,
-  /// is left out of a second fit.
+  /// falls off towards the ends, so that no step there tilts the line. What sticks out, as the posts of a glass wall
+  /// do, is left out of a second fit.
   Line refined(int x, int y, const Line& shape) {
     collect(x, y, WallNormals::kStretchCells, [&](int dx, int dy) { return shape.distance(dx, dy) <= kBesideLine; });
     const Line all = line_of(found_.size() + 1.0, shape);

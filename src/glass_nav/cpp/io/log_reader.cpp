@@ -150,9 +150,9 @@ Rawlog readRawlog(const std::string& path) {
       object = archive.ReadObject();
     } catch (const std::exception& error) {
       if (stream.getPosition() == start) break;  // not a byte after the last object: the end
-      log.broken = stream.ranOut() ? "ends within object " + std::to_string(number)
-                                   : "has object " + std::to_string(number) + " damaged (" +
-                                         sentence(error.what()) + ")";
+      log.broken = stream.ranOut()
+                       ? "ends within object " + std::to_string(number)
+                       : "has object " + std::to_string(number) + " damaged (" + sentence(error.what()) + ")";
       break;
     }
     if (!object) continue;
@@ -212,8 +212,7 @@ GridFile readGridMap(const std::string& path) {
       const double free = static_cast<double>(grid->getCell(x, y));
       // A cell nothing was ever said about has log odds 0, which is exactly one half.
       const bool unknown = std::abs(free - 0.5) < 1e-6;
-      out.occupancy.push_back(unknown ? std::int8_t{-1}
-                                      : static_cast<std::int8_t>(std::lround(100.0 * (1.0 - free))));
+      out.occupancy.push_back(unknown ? std::int8_t{-1} : static_cast<std::int8_t>(std::lround(100.0 * (1.0 - free))));
     }
   }
   return out;

@@ -35,7 +35,7 @@ void count_case_votes(const Offers& offers, const Chances& chances, double* shar
       for (std::size_t path = 0; path < kPaths; ++path) {
         const std::size_t at = path * plane + i;
         if (!std::isfinite(offers.range_m[at])) continue;
-        const double cos = std::max(offers.cos[at], chances.least_cos);
+        const double cos = std::max(offers.cos[at], chances.min_cos);
         double end_m = offers.range_m[at] + chances.depth_share * offers.thickness_m[at] / cos;
         if (path == kMirrored) end_m += 2.0 * first_depth * offers.cos[kFirst * plane + i];  // so much deeper a mirror
         const double across = (z - end_m) * cos;

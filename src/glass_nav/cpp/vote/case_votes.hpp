@@ -1,4 +1,5 @@
-/// The soft vote on what each beam met, summed over the samples. The formulation is in localization/beam_classification/case_votes.py.
+/// The soft vote on what each beam met, summed over the samples. The formulation is in
+/// localization/beam_classification/case_votes.py.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +25,7 @@ struct Chances {
   double depth_share;   // of the thickness of a wall: where in it beams end
   double sigma_m;       // around that, across the wall
   double gate_m;        // farther across from a reference a beam does not belong to it
-  double least_cos;     // a surface seen flatter counts as one seen like that
+  double min_cos;       // a surface seen flatter counts as one seen like that
   double temper;        // of a sample's evidence
 };
 

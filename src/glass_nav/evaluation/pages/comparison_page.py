@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from html import escape
 from pathlib import Path
-from typing import Any, List, Mapping, Optional, Sequence
+from typing import Any, Mapping, Sequence
 
 from glass_nav.evaluation.metrics import comparison
 from glass_nav.evaluation.metrics.comparison import Comparison
 from glass_nav.evaluation.metrics.confidence import Interval
-from glass_nav.evaluation.pages import report_page
+from glass_nav.evaluation.pages import comparison_table, report_page
 from glass_nav.evaluation.plots import comparison_pictures
 from glass_nav.evaluation.plots.report_pictures import Picture
 
@@ -18,7 +18,7 @@ def write(path: Path, compared: Comparison, drawn: Sequence[Picture], about: Map
     """The page; the first of the pictures is that of the first screen."""
     title = f"{' | '.join(compared.contestants)} over {', '.join(compared.logs)}"
     figures, *rest = drawn
-    head, *rows = summary(compared)
+    head, *rows = comparison_table.summary(compared)
     body = [
         '<section class="verdict" style="--grade: var(--link)" aria-labelledby="verdict">'
         f'<p class="log">{escape(comparison.counted(compared))}: {escape(", ".join(compared.logs))}</p>',
@@ -33,7 +33,7 @@ def write(path: Path, compared: Comparison, drawn: Sequence[Picture], about: Map
     ]
     if len(compared.logs) > 1:
         for log in compared.logs:
-            head, *rows = summary(compared, log)
+            head, *rows = comparison_table.summary(compared, log)
             body += [
                 f"<h2>{escape(log)}</h2>",
                 '<div class="card">',
@@ -88,21 +88,6 @@ def headline(compared: Comparison) -> str:
             words[-1] += f" ({comparison.text(figure, difference, signed=True)} {figure.unit})"
     said = "; ".join(words) or f"{first} {value} {figure.unit}"
     return f"{figure.title[0].upper()}{figure.title[1:]}: {said}"
-
-
-def summary(compared: Comparison, log: Optional[str] = None) -> List[List[str]]:
-    """Head and rows of the table: a figure a row, means, then differences to the first."""
-    first, *others = compared.contestants
-    rows = [["figure", *compared.contestants, *(f"{name} − {first}" for name in others)]]
-    for figure in compared.figures:
-        rows.append(
-            [
-                f"{figure.title} [{figure.unit}]",
-                *(comparison.text(figure, compared.interval(name, figure, log)) for name in compared.contestants),
-                *(comparison.difference_text(compared, name, figure, log) for name in others),
-            ]
-        )
-    return rows
 
 
 def _runs(compared: Comparison) -> str:

@@ -71,8 +71,8 @@ def _draw_meetings(axes: Any, score: TopologyScore, verdict: str) -> None:
         return
     places = np.array(
         [
-            score.known.position_m[each.visit.node] if each.visit is not None else score.seen[each.seen].position_m
-            for each in meetings  # type: ignore[index]
+            score.known.position_m[each.visit.node] if each.visit is not None else score.seen[each.seen].position_m  # type: ignore[index]
+            for each in meetings
         ]
     )
     axes.plot(

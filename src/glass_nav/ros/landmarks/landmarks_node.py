@@ -37,18 +37,18 @@ from glass_nav.localization.bearings import triangulation
 from glass_nav.localization.bearings.triangulation import Fix, TriangulationLimits
 from glass_nav.msg import LandmarkBearings as LandmarkBearingsMsg
 from glass_nav.msg import LocalizationStatus
-from glass_nav.ros import conversions, shutdown
+from glass_nav.ros import conversions, mailbox, shutdown
 from glass_nav.ros.landmarks import bearing_messages, landmark_display
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
-from glass_nav.ros.mailbox import Errand, Mailbox
+from glass_nav.ros.mailbox import Mailbox
 from glass_nav.sensing import bearings
 from glass_nav.sensing.bearings import LandmarkBearing, LandmarkBearings, OdometryDrift
 from glass_nav.world import landmark_file
 from glass_nav.world.landmark_map import LandmarkMap
 
 METHODS = ("least_squares", "document")
-ERRAND_TIMEOUT_S = 10.0
+SERVICE_TIMEOUT_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -256,10 +256,8 @@ class LandmarksNode:
     # -- initialpose
 
     def _serve_send(self, _request: TriggerRequest) -> TriggerResponse:
-        errand = Errand(self._send_on_request)
-        self._inbox.put("commands", errand.run)
         try:
-            errand.wait(ERRAND_TIMEOUT_S)
+            mailbox.outcome(self._inbox.submit("commands", self._send_on_request), SERVICE_TIMEOUT_S)
         except (ValueError, TimeoutError) as err:
             return TriggerResponse(success=False, message=str(err))
         return TriggerResponse(success=True, message="sent to initialpose")

@@ -38,12 +38,14 @@ from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import SetMap, SetMapRequest, SetMapResponse
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
+from glass_nav.localization import health
+from glass_nav.localization.health import LocalizationHealth, Situation
 from glass_nav.localization.localizer import Estimate, Localizer
-from glass_nav.ros import conversions, shutdown
+from glass_nav.ros import conversions, mailbox, shutdown
+from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.landmarks.bearing_messages import LONGEST_TURN_S
 from glass_nav.ros.localization import initial_poses, params, reconfigure
 from glass_nav.ros.localization.bearing_input import BearingInput
-from glass_nav.ros.localization.diagnostics import Diagnostics, Situation
 from glass_nav.ros.localization.initial_poses import InitialPoses
 from glass_nav.ros.localization.map_source import MapSource
 from glass_nav.ros.localization.pose_memory import PoseMemory
@@ -51,7 +53,7 @@ from glass_nav.ros.localization.publishers import Publishers
 from glass_nav.ros.localization.reconfigure import ReconfigureServer
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
-from glass_nav.ros.mailbox import Errand, Mailbox
+from glass_nav.ros.mailbox import Mailbox
 from glass_nav.ros.scan_input import ScanInput
 from glass_nav.sensing.scan import Scan, ScanError
 from glass_nav.sensing.scan_placement import RawScan
@@ -61,7 +63,7 @@ from glass_nav.world.grid_map import GridMap
 NO_SCAN_WARNING_S = 15.0  # as AMCL
 SILENCE_S = 3.0  # without a used scan for that long, ~status says why
 SETTLING_S = 5.0  # a player of a launch file needs some seconds: no warning before
-ERRAND_TIMEOUT_S = 30.0
+SERVICE_TIMEOUT_S = 30.0
 
 
 class LocalizationNode:
@@ -92,7 +94,8 @@ class LocalizationNode:
         self._starts = InitialPoses(p, self._tf)
         self._memory = PoseMemory(p.pose_file, self._log)
         self._outputs = Publishers(p.node)
-        self._diagnostics = Diagnostics(p.node, self._scans.counts)
+        self._health = LocalizationHealth(p.node.warn_deviations, self._scans.counts)
+        self._diagnostics = Diagnostics(*health.ENTRIES)
 
         rospy.Service("global_localization", Empty, self._serve_global_localization)
         rospy.Service("request_nomotion_update", Empty, self._serve_nomotion_update)
@@ -100,7 +103,7 @@ class LocalizationNode:
         self._reconfigure = ReconfigureServer(
             params.changeable(p),
             reconfigure.explanations(_parameter_file()),
-            lambda values: self._run_errand(lambda: self._take_parameters(values)),
+            lambda values: self._in_run_loop(lambda: self._take_parameters(values)),
         )
         # Subscribers last: they may fire at once.
         self._listener = tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
@@ -145,14 +148,12 @@ class LocalizationNode:
     def _command(self, handle: Callable[[Any], None]) -> Callable[[Any], None]:
         return lambda msg: self._inbox.put("commands", lambda: handle(msg))
 
-    def _run_errand(self, work: Callable[[], None]) -> None:
-        errand = Errand(work)
-        self._inbox.put("commands", errand.run)
-        errand.wait(ERRAND_TIMEOUT_S)
+    def _in_run_loop(self, work: Callable[[], None]) -> None:
+        mailbox.outcome(self._inbox.submit("commands", work), SERVICE_TIMEOUT_S)
 
     def _serve_global_localization(self, _request: EmptyRequest) -> EmptyResponse:
         try:
-            self._run_errand(self._search)
+            self._in_run_loop(self._search)
         except (ValueError, TimeoutError) as err:
             rospy.logwarn(f"global_localization refused: {err}")
             raise rospy.ServiceException(str(err)) from err
@@ -160,14 +161,14 @@ class LocalizationNode:
 
     def _serve_nomotion_update(self, _request: EmptyRequest) -> EmptyResponse:
         try:
-            self._run_errand(lambda: self._core().request_update())
+            self._in_run_loop(lambda: self._core().request_update())
         except (ValueError, TimeoutError) as err:
             raise rospy.ServiceException(str(err)) from err
         return EmptyResponse()
 
     def _serve_set_map(self, request: SetMapRequest) -> SetMapResponse:
         try:
-            self._run_errand(lambda: self._set_map_and_pose(request))
+            self._in_run_loop(lambda: self._set_map_and_pose(request))
         except (ValueError, TimeoutError) as err:
             rospy.logwarn(f"set_map refused: {err}")
             return SetMapResponse(success=False)
@@ -262,7 +263,7 @@ class LocalizationNode:
         self._p = p
         self._scans.reconfigure(p.node, p.deskew)
         self._outputs.reconfigure(p.node)
-        self._diagnostics.reconfigure(p.node)
+        self._health.warn_deviations = p.node.warn_deviations
 
     # -- scans
 
@@ -287,7 +288,7 @@ class LocalizationNode:
         except ValueError as err:  # ScanError, and what the filter cannot work out: a robot drives on by odometry
             self._pass_over(raw.stamp_ns, str(err))
             return
-        self._diagnostics.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
+        self._health.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
         if not conversions.is_finite(estimate):
             self._scans.counts.refused += 1
             self._log.error("the filter's pose is not finite: nothing is published")
@@ -339,17 +340,16 @@ class LocalizationNode:
         trouble = self._missing()
         if trouble is not None:
             self._outputs.send_trouble(self._estimate, trouble)
-        self._diagnostics.publish(
-            Situation(
-                self._estimate,
-                self._scan,
-                trouble,
-                self._map,
-                self._map_origin if self._map else self._maps.trouble or "no map yet",
-                self._scans.period_s,
-                self._scans.lidars,
-            )
+        situation = Situation(
+            self._estimate,
+            self._scan,
+            trouble,
+            self._map,
+            self._map_origin if self._map else self._maps.trouble or "no map yet",
+            self._scans.period_s,
+            self._scans.lidars,
         )
+        self._diagnostics.publish(self._health.report(situation))
 
     def _missing(self) -> Optional[str]:
         """Why no scan is being used; None while all is well."""

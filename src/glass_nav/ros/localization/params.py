@@ -80,6 +80,11 @@ class LocalizationNodeParams:
                 raise ValueError(f"~{name} must be >= 0, got {getattr(self, name)}")
 
     @property
+    def warn_deviations(self) -> np.ndarray:
+        """(3,) ~std_warn_level of x [m], y [m], yaw [rad]."""
+        return np.array([self.std_warn_level_x, self.std_warn_level_y, self.std_warn_level_yaw])
+
+    @property
     def rng(self) -> np.random.Generator:
         """A generator that repeats itself from start to start, unless ~random_seed is negative."""
         return np.random.default_rng(None if self.random_seed < 0 else self.random_seed)

@@ -10,11 +10,11 @@ import rospy
 
 from glass_nav.geometry import se2
 from glass_nav.localization import saved_pose
-from glass_nav.localization.integrity.pose_state import LOCALIZED, UNCERTAIN
 from glass_nav.localization.localizer import Estimate
 from glass_nav.localization.saved_pose import PoseFile, SavedPose
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.rate_limiter import RateLimiter, period_s
+from glass_nav.vocabulary import LocalizationState
 
 QUIET_S = 30.0  # the file of a robot that stands is written no more often
 MOVED_M, MOVED_RAD = 0.05, 0.05
@@ -32,7 +32,7 @@ class PoseMemory:
 
     def take(self, estimate: Estimate, map_digest: str, rate_hz: float, now_s: float) -> None:
         """The estimate of a scan; saved if it is time, at once if the robot has just got lost."""
-        if estimate.state in (LOCALIZED, UNCERTAIN):
+        if estimate.state in (LocalizationState.LOCALIZED, LocalizationState.UNCERTAIN):
             odom_from_base = se2.compose(se2.inverse(estimate.map_from_odom), estimate.map_from_base)
             self._last = SavedPose(
                 estimate.stamp_ns,

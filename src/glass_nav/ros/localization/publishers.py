@@ -12,7 +12,6 @@ from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import Image, LaserScan, PointCloud2
 from visualization_msgs.msg import MarkerArray
 
-from glass_nav.localization.integrity.pose_state import LOCALIZED
 from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.msg import BeamCases, LocalizationStatus
 from glass_nav.ros import conversions
@@ -20,6 +19,7 @@ from glass_nav.ros.localization import beam_displays, legend, wall_display
 from glass_nav.ros.localization.params import LocalizationNodeParams
 from glass_nav.ros.rate_limiter import RateLimiter, period_s
 from glass_nav.sensing.scan_placement import PlacedScan
+from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
 
 NOT_KNOWN = float("nan")
@@ -71,7 +71,7 @@ class Publishers:
             now_s: ROS time.
             pose_is_news: publish the pose even if this scan did not move the particles.
         """
-        self._was_localized = self._was_localized or estimate.state == LOCALIZED
+        self._was_localized = self._was_localized or estimate.state == LocalizationState.LOCALIZED
         self.send_transform(estimate.stamp_ns, estimate.map_from_odom)
         self._surfaces.publish(conversions.surface_scan_msg(placed, estimate.surface_scan))
         self._status.publish(

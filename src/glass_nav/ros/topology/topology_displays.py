@@ -7,7 +7,7 @@ by the state of the search; `ruled_out`, crosses where candidates of the last ro
 
 from __future__ import annotations
 
-from typing import List, Optional
+from typing import List
 
 import numpy as np
 from geometry_msgs.msg import Pose, Quaternion, Vector3
@@ -18,23 +18,12 @@ from glass_nav.geometry import se2
 from glass_nav.ros import conversions
 from glass_nav.ros.packed_markers import PackedMarkerArray, colour, points_marker
 from glass_nav.topology.atlas.atlas import Atlas
-from glass_nav.topology.search.atlas_localizer import (
-    AMBIGUOUS,
-    CONFIRMED,
-    SEARCHING,
-    TENTATIVE,
-    AtlasLocalizer,
-    Estimate,
-)
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search.search_forest import NO_PARENT
+from glass_nav.topology.search_session import SearchStatus
+from glass_nav.vocabulary import SEARCH_RGB
 
-STATE_COLOURS = {
-    SEARCHING: (230, 159, 0),
-    TENTATIVE: (86, 180, 233),
-    CONFIRMED: (0, 158, 115),
-    AMBIGUOUS: (204, 121, 167),
-}
-NAMESPACES = ("atlas", "nodes", *(state.lower() for state in STATE_COLOURS), "ruled_out", "forest", "text")
+NAMESPACES = ("atlas", "nodes", *(state.lower() for state in SEARCH_RGB), "ruled_out", "forest", "text")
 ATLAS_RGB, NODE_RGB, RULED_OUT_RGB, FOREST_RGB = (130, 130, 130), (60, 60, 60), (213, 94, 0), (0, 114, 178)
 MAX_PATHS = 50  # of candidates; more would only hide the map
 
@@ -54,30 +43,23 @@ def atlas_markers(atlas: Atlas, map_frame: str) -> List[Marker]:
 
 
 def search_markers(
-    localizer: AtlasLocalizer,
-    estimate: Optional[Estimate],
-    poses: np.ndarray,
-    map_frame: str,
-    text: str,
-    atlas_shown: List[Marker],
+    localizer: AtlasLocalizer, status: SearchStatus, map_frame: str, atlas_shown: List[Marker]
 ) -> MarkerArray:
-    """An atlas and what a search in it stands at; namespaces of other states are cleared.
+    """An atlas and what is known about the robot's place in it; namespaces of other states are cleared.
 
     Args:
         localizer: of the search.
-        estimate: its last, None before it has begun.
-        poses: (K, 3) of the candidates that shall be shown.
+        status: what is known, with the poses to show.
         map_frame: frame of the map.
-        text: state and reason.
         atlas_shown: of atlas_markers().
     """
-    atlas, header = localizer.atlas, conversions.header(0, map_frame)
-    arrows = {state: np.zeros((0, 2)) for state in STATE_COLOURS}
+    atlas, estimate, header = localizer.atlas, status.estimate, conversions.header(0, map_frame)
+    arrows = {state: np.zeros((0, 2)) for state in SEARCH_RGB}
     ruled_out, forest = np.zeros((0, 2)), np.zeros((0, 2))
     if estimate is not None:
-        if estimate.state in arrows:
-            arrows[estimate.state] = _placed(_ARROW_M, poses)
-        gone = _ruled_out(localizer)[: len(poses) + MAX_PATHS]
+        if status.state in arrows:
+            arrows[status.state] = _placed(_ARROW_M, status.poses)
+        gone = _ruled_out(localizer)[: len(status.poses) + MAX_PATHS]
         ruled_out = _placed(_CROSS_M, np.column_stack([atlas.nodes.position_m[gone], np.zeros(len(gone))]))
         forest = _pairs(
             [
@@ -87,16 +69,14 @@ def search_markers(
             ]
         )
     markers = [
-        points_marker(
-            header, state.lower(), 0, Marker.LINE_LIST, points, 3 * _HEIGHT_M, 0.1, _rgb(STATE_COLOURS[state])
-        )
+        points_marker(header, state.lower(), 0, Marker.LINE_LIST, points, 3 * _HEIGHT_M, 0.1, _rgb(SEARCH_RGB[state]))
         for state, points in arrows.items()
     ]
     markers.append(
         points_marker(header, "ruled_out", 0, Marker.LINE_LIST, ruled_out, 2 * _HEIGHT_M, 0.06, _rgb(RULED_OUT_RGB))
     )
     markers.append(points_marker(header, "forest", 0, Marker.LINE_LIST, forest, 2 * _HEIGHT_M, 0.12, _rgb(FOREST_RGB)))
-    return PackedMarkerArray([*atlas_shown, *markers, _text(header, atlas, text)])
+    return PackedMarkerArray([*atlas_shown, *markers, _text(header, atlas, f"{status.state}\n{status.reason}")])
 
 
 def _ruled_out(localizer: AtlasLocalizer) -> np.ndarray:

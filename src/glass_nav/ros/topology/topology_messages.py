@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Optional
 
 import numpy as np
@@ -15,7 +14,8 @@ from glass_nav.msg import TurnChoice as TurnChoiceMsg
 from glass_nav.ros import conversions
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.observations import UNKNOWN, Meetpoint, ObservationError, Traversal
-from glass_nav.topology.search.atlas_localizer import Estimate, TurnChoice
+from glass_nav.topology.search.search_estimate import TurnChoice
+from glass_nav.topology.search_session import SearchStatus, Turn
 
 AS_TOLD = -1  # rank of a traversal: as the last turn_choice said
 
@@ -61,42 +61,41 @@ def traversal_from_msg(msg: EdgeTraversalMsg, told: Optional[TurnChoice]) -> Tra
     )
 
 
-def turn_choice_msg(choice: TurnChoice, stamp_ns: int, frame: str) -> TurnChoiceMsg:
-    """The answer to a meetpoint of that stamp."""
+def turn_choice_msg(turn: Turn, frame: str) -> TurnChoiceMsg:
+    """The answer to a meetpoint."""
+    choice = turn.choice
     return TurnChoiceMsg(
-        header=conversions.header(stamp_ns, frame), rank=choice.rank, degree=choice.degree, name=choice.name
+        header=conversions.header(turn.stamp_ns, frame), rank=choice.rank, degree=choice.degree, name=choice.name
     )
 
 
-def status_msg(state: str, reason: str, stamp_ns: int, frame: str, estimate: Optional[Estimate]) -> TopologyStatus:
-    """By the name of a state; with an estimate also depth, candidates and turn."""
+def status_msg(status: SearchStatus, frame: str) -> TopologyStatus:
+    """With an estimate also depth, candidates and turn."""
     msg = TopologyStatus(
-        header=conversions.header(stamp_ns, frame),
-        state=getattr(TopologyStatus, state),
-        state_name=state,
-        reason=reason,
+        header=conversions.header(status.stamp_ns, frame),
+        state=status.state.code,
+        state_name=status.state.value,
+        reason=status.reason,
     )
+    estimate = status.estimate
     if estimate is not None:
         msg.depth, msg.candidates = estimate.depth, len(estimate.dart)
         msg.turn = estimate.choice.name if estimate.choice else ""
     return msg
 
 
-def candidates_msg(
-    atlas: Atlas, estimate: Estimate, poses: np.ndarray, stamp_ns: int, frame: str
-) -> TopologyCandidates:
-    """The first candidates, as many as there are poses (K, 3) for; none where the atlas does not have the place that
-    scans confirmed.
-    """
-    dart = estimate.dart[: len(poses)]
-    return TopologyCandidates(
-        header=conversions.header(stamp_ns, frame),
-        total=len(estimate.dart),
-        nodes=atlas.darts.node[dart].tolist(),
-        edges=(dart >> 1).tolist(),
-        detection_errors=bytes(estimate.errors[: len(poses)].astype(np.uint8)),
-        poses=[conversions.pose_from_planar(pose) for pose in poses[: len(dart)]],
-    )
+def candidates_msg(status: SearchStatus, atlas: Optional[Atlas], frame: str) -> TopologyCandidates:
+    """The candidates that the status has poses of; none where the atlas lacks the place that scans confirmed."""
+    msg = TopologyCandidates(header=conversions.header(status.stamp_ns, frame))
+    estimate = status.estimate
+    if atlas is None or estimate is None:
+        return msg
+    dart = estimate.dart[: len(status.poses)]
+    msg.total = len(estimate.dart)
+    msg.nodes, msg.edges = atlas.darts.node[dart].tolist(), (dart >> 1).tolist()
+    msg.detection_errors = bytes(estimate.errors[: len(dart)].astype(np.uint8))
+    msg.poses = [conversions.pose_from_planar(pose) for pose in status.poses[: len(dart)]]
+    return msg
 
 
 def pose_msg(
@@ -109,9 +108,3 @@ def pose_msg(
     covariance[[0, 1, 5], [0, 1, 5]] = sigma_m**2, sigma_m**2, sigma_rad**2
     msg.pose.covariance = covariance.ravel().tolist()
     return msg
-
-
-def stamps_differ_s(one: MeetpointMsg, other: EdgeTraversalMsg) -> float:
-    """Seconds between a meetpoint and the traversal that shall end there; 0 if either has no stamp."""
-    stamps = conversions.ns_from_stamp(one.header.stamp), conversions.ns_from_stamp(other.header.stamp)
-    return 0.0 if 0 in stamps else math.fabs(stamps[0] - stamps[1]) * 1e-9

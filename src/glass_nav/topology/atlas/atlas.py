@@ -17,6 +17,8 @@ from typing import Sequence, Tuple
 
 import numpy as np
 
+from glass_nav.topology.atlas import components
+
 MEETPOINT, DEAD_END, RING_MARKER = 0, 1, 2
 KINDS = ("meetpoint", "dead_end", "ring_marker")  # a ring without a meetpoint has one node, somewhere on it
 
@@ -209,12 +211,7 @@ class Atlas:
 
     def components(self) -> Tuple[int, np.ndarray]:
         """How many parts do not touch, and (N,) in which of them each node lies."""
-        from scipy.sparse import coo_matrix, csgraph  # slow to import
-
-        first, second = self.darts.node[0::2], self.darts.node[1::2]
-        links = coo_matrix((np.ones(len(first), np.int8), (first, second)), shape=(len(self.nodes),) * 2)
-        count, label = csgraph.connected_components(links, directed=False)
-        return int(count), label
+        return components.connected(len(self.nodes), self.darts.node[0::2], self.darts.node[1::2])
 
 
 def twin(dart: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from typing import Callable, ContextManager, Iterator, List, Tuple
 
 import numpy as np
 
-from glass_nav.geometry import segments
+from glass_nav.geometry import polyline, segments
 from glass_nav.topology.atlas import voronoi_graph
 from glass_nav.topology.atlas.atlas import (
     BEARING_AT_M,
@@ -31,7 +31,8 @@ from glass_nav.topology.atlas.atlas import (
     rings_clockwise,
 )
 from glass_nav.topology.atlas.edge_views import EdgeViews, ViewParams
-from glass_nav.topology.atlas.voronoi_graph import VoronoiGraph, VoronoiParams
+from glass_nav.topology.atlas.voronoi.graph import VoronoiGraph
+from glass_nav.topology.atlas.voronoi_graph import VoronoiParams
 from glass_nav.world.grid_map import GridMap
 
 R_SIGMA_CELLS = 1.0  # measured on rough walls: up to 0.9 less than on smooth ones
@@ -100,7 +101,7 @@ def _atlas(graph: VoronoiGraph, seen: Ragged, grid_map: GridMap, name: str, map_
         + graph.doubt_m**2
         + np.where(kind == DEAD_END, DEAD_END_SIGMA_SHARE * graph.r_m, 0.0) ** 2
     )
-    length_m = np.array([np.hypot(*np.diff(line, axis=0).T).sum() for line in graph.lines_m])
+    length_m = np.array([polyline.length(line) for line in graph.lines_m])
     chord_m = np.array([np.hypot(*(line[-1] - line[0])) for line in graph.lines_m])
     edges = Edges(
         length_m,

@@ -13,8 +13,10 @@ import numpy as np
 
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.search import wake_up_trials
-from glass_nav.topology.search.atlas_localizer import AMBIGUOUS, CONFIRMED, AtlasLocalizer, SearchParams
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.topology.search.wake_up_trials import Surroundings, TrialParams
+from glass_nav.vocabulary import SearchState
 
 
 @dataclass(frozen=True)
@@ -48,10 +50,10 @@ def of(
     for dart in starts.tolist():
         trial = wake_up_trials.run(localizer, world, exact, rng, dart=dart)
         edges.append(trial.edges)
-        confirmed.append(trial.outcome == CONFIRMED)
-        if trial.outcome == AMBIGUOUS:
+        confirmed.append(trial.outcome == SearchState.CONFIRMED)
+        if trial.outcome == SearchState.AMBIGUOUS:
             alike.add(frozenset(int(localizer.path(int(end))[0]) for end in trial.estimate.dart))
-        elif trial.outcome != CONFIRMED:
+        elif trial.outcome != SearchState.CONFIRMED:
             unresolved.append(dart)
         step()
     return Distinguishability(

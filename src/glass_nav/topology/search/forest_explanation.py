@@ -13,13 +13,14 @@ import numpy as np
 from glass_nav.topology.atlas.atlas import Atlas, twin
 from glass_nav.topology.observations import Meetpoint, Traversal, turn_name
 from glass_nav.topology.search import vote
-from glass_nav.topology.search.atlas_localizer import AtlasLocalizer, Estimate
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search.search_estimate import SearchEstimate
 from glass_nav.topology.search.search_forest import NO_PARENT
 
 MAX_LINES = 40  # of a row; large atlases have rows of thousands
 
 
-def row(localizer: AtlasLocalizer, estimate: Estimate) -> Iterator[str]:
+def row(localizer: AtlasLocalizer, estimate: SearchEstimate) -> Iterator[str]:
     """Lines on the current depth of a search: what was seen, its search nodes, what follows."""
     forest, atlas = localizer.forest, localizer.atlas
     depth, here = forest.depth, forest.meetpoints[-1]

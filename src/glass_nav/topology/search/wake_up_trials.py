@@ -17,8 +17,11 @@ import numpy as np
 from glass_nav.geometry import angles
 from glass_nav.topology.atlas.atlas import Atlas, twin
 from glass_nav.topology.observations import Meetpoint, Traversal
-from glass_nav.topology.search.atlas_localizer import AMBIGUOUS, CONFIRMED, LOST, AtlasLocalizer, Estimate, SearchParams
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search.matching import Tolerances
+from glass_nav.topology.search.search_estimate import SearchEstimate
+from glass_nav.topology.search.search_params import SearchParams
+from glass_nav.vocabulary import SearchState
 
 WRONG, UNDECIDED = "WRONG", "UNDECIDED"
 _SPURIOUS_DEAD_ENDS = 0.2  # of the meetpoints that are none: something stood in the way
@@ -202,7 +205,7 @@ class Trial:
     detection_errors: int  # that the robot's detector made
     truth_lost_at: Optional[int]  # depth at which the true dart was no candidate any more; None: never, or no truth
     step_ms: List[float]  # CPU time of each step
-    estimate: Estimate  # the last
+    estimate: SearchEstimate  # the last
 
 
 def run(
@@ -223,14 +226,14 @@ def run(
             truth_lost_at = estimate.depth
     outcome = estimate.state if estimate.done else UNDECIDED
     there = in_atlas and not robot.on_edge and robot.dart in estimate.dart
-    if outcome in (CONFIRMED, AMBIGUOUS) and not there:
+    if outcome in (SearchState.CONFIRMED, SearchState.AMBIGUOUS) and not there:
         outcome = WRONG
     return Trial(outcome, estimate.depth, robot.detection_errors, truth_lost_at, step_ms, estimate)
 
 
 def _search(
     localizer: AtlasLocalizer, robot: AtlasRobot, max_edges: int, dart: Optional[int]
-) -> Iterator[Tuple[Estimate, float]]:
+) -> Iterator[Tuple[SearchEstimate, float]]:
     meetpoint = robot.wake_up(dart)
     started = time.process_time()
     estimate = localizer.start(meetpoint)
@@ -267,7 +270,7 @@ def metrics(done: List[Trial]) -> Dict[str, float]:
     edges = np.array([trial.edges for trial in done])
     shares = {
         f"{name.lower()}_share": sum(trial.outcome == name for trial in done) / count
-        for name in (CONFIRMED, WRONG, AMBIGUOUS, LOST, UNDECIDED)
+        for name in (SearchState.CONFIRMED, WRONG, SearchState.AMBIGUOUS, SearchState.LOST, UNDECIDED)
     }
     return {
         **shares,

@@ -514,18 +514,18 @@ def test_samples_that_see_the_same_corners_may_change_places(seed):
 def test_the_soft_vote_is_the_posterior_over_the_cases(seed):
     """Against the formula, array by array."""
     rng = np.random.default_rng(seed)
-    samples, beams, uncertain, depth_share, sigma_m, gate_m, least_cos, temper = 7, 40, 0.1, 0.4, 0.05, 0.15, 0.2, 0.03
+    samples, beams, uncertain, depth_share, sigma_m, gate_m, min_cos, temper = 7, 40, 0.1, 0.4, 0.05, 0.15, 0.2, 0.03
     measured_m = np.where(rng.random(beams) < 0.2, np.inf, rng.uniform(0.5, 3.0, beams))
     near_m = np.where(np.isfinite(measured_m), measured_m, 1.0) + rng.normal(0.0, 0.1, (4, samples, beams))
     range_m = np.where(rng.random(near_m.shape) < 0.3, np.inf, near_m)
     cos, thickness_m = rng.uniform(0.05, 1.0, near_m.shape), rng.integers(0, 5, near_m.shape) / 32
     prior = rng.dirichlet(np.ones(5), beams).T
     share = _beam_vote.case_votes(
-        measured_m, range_m, cos, thickness_m, prior, uncertain, depth_share, sigma_m, gate_m, least_cos, temper
+        measured_m, range_m, cos, thickness_m, prior, uncertain, depth_share, sigma_m, gate_m, min_cos, temper
     )
 
     answered = np.isfinite(measured_m)
-    steep = np.maximum(cos, least_cos)
+    steep = np.maximum(cos, min_cos)
     end_m = range_m + depth_share * thickness_m / steep
     end_m[1] += 2.0 * depth_share * thickness_m[0] * cos[0]
     across_m = (np.where(answered, measured_m, 0.0) - end_m) * steep
@@ -557,7 +557,7 @@ def test_case_votes_of_other_shapes_are_refused(wrong, text):
     )
     with pytest.raises(ValueError) as err:
         _beam_vote.case_votes(
-            **{**arrays, **wrong}, nothing=0.1, depth_share=0.5, sigma_m=0.05, gate_m=0.15, least_cos=0.2, temper=0.1
+            **{**arrays, **wrong}, nothing=0.1, depth_share=0.5, sigma_m=0.05, gate_m=0.15, min_cos=0.2, temper=0.1
         )
     assert str(err.value) == text
 

@@ -84,6 +84,7 @@ def test_all_of_amcls_parameters_are_known_at_once():
     "given, text",
     [
         ({"min_particle": 3}, "/n: unknown parameter ~min_particle; did you mean ~min_particles?"),
+        ({"polish_with_segments": True}, "/n: unknown parameter ~polish_with_segments"),  # removed
         ({"odom_frame": "odom"}, "did you mean ~odom_frame_id?"),
         ({"tf_broadcast": 1}, "/n: ~tf_broadcast must be bool, got 1"),
         ({"save_pose_rate": "0.5"}, "/n: ~save_pose_rate must be float, got '0.5'"),

@@ -10,13 +10,18 @@ from glass_nav.msg import EdgeTraversal
 from glass_nav.ros.topology import topology_displays, topology_messages
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
-from glass_nav.topology.search.atlas_localizer import AtlasLocalizer, SearchParams, TurnChoice
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search.search_estimate import TurnChoice
+from glass_nav.topology.search.search_params import SearchParams
+from glass_nav.topology.search_session import SearchStatus
+from glass_nav.vocabulary import SearchState
 
 
 def shown(localizer, poses):
-    markers = topology_displays.search_markers(
-        localizer, localizer.estimate, poses, "map", "text", topology_displays.atlas_markers(localizer.atlas, "map")
-    )
+    estimate = localizer.estimate
+    status = SearchStatus(estimate.state if estimate else SearchState.WAITING, "why", 0, estimate, poses)
+    atlas_markers = topology_displays.atlas_markers(localizer.atlas, "map")
+    markers = topology_displays.search_markers(localizer, status, "map", atlas_markers)
     return {marker.ns: marker for marker in markers.markers}
 
 

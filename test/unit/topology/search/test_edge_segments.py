@@ -14,9 +14,10 @@ from glass_nav.topology.atlas import atlas_file
 from glass_nav.topology.atlas.atlas import Ragged
 from glass_nav.topology.observations import Meetpoint, Traversal
 from glass_nav.topology.search import edge_segments
-from glass_nav.topology.search.atlas_localizer import AtlasLocalizer, SearchParams
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search.edge_segments import Reach, SegmentTest, contradiction
 from glass_nav.topology.search.matching import Matcher, Tolerances
+from glass_nav.topology.search.search_params import SearchParams
 
 ATLASES = Path(__file__).resolve().parents[4] / "atlas"
 REACH = Reach(shift_m=0.5, turn_rad=0.4, sigmas=4.3, drift_share=0.02)

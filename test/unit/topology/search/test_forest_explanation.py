@@ -9,7 +9,8 @@ import made_atlases
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.observations import Meetpoint, Traversal
 from glass_nav.topology.search import forest_explanation
-from glass_nav.topology.search.atlas_localizer import AtlasLocalizer, SearchParams
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search.search_params import SearchParams
 
 DOCUMENT = SearchParams(vote_mode="seed", confirm_edges=0)
 
@@ -47,7 +48,7 @@ def test_the_rows_of_the_worked_example_are_those_of_the_document() -> None:
     # "The node and edge matching eliminate candidates 3 and 2. The edge turn direction eliminates candidate 1."
     assert "node   0 - edge   1 -> node   1  x  turn LEFT" in second
     assert [line for line in second if line.endswith("active")] == ["node   1 - edge   1 -> node   0  active"]
-    assert second[-1] == "CONFIRMED: the only place that fits, confirmed by 0 edges"
+    assert second[-1] == "CONFIRMED: the only place that matches, confirmed by 0 edges"
 
 
 def test_candidates_that_take_errors_of_the_detector_are_told_apart() -> None:
@@ -73,4 +74,4 @@ def test_a_row_without_candidates_is_drawn_too() -> None:
     localizer = AtlasLocalizer(atlas_file.load(shipped_atlases.find("document_example")), DOCUMENT)
     localizer.start(Meetpoint(3, 1.5))
     localizer.update(Traversal(0, 20.0, 20.0), Meetpoint(3, 1.5))
-    assert lines(localizer)[-1] == "LOST: no place of the atlas fits what was seen"
+    assert lines(localizer)[-1] == "LOST: no node of the atlas matches what was seen"

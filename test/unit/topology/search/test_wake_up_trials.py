@@ -10,8 +10,9 @@ import pytest
 
 from glass_nav.geometry import angles
 from glass_nav.topology.search import distinguishability, wake_up_trials
-from glass_nav.topology.search.atlas_localizer import CONFIRMED, LOST, SearchParams
+from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.topology.search.wake_up_trials import AtlasRobot, Surroundings, TrialParams
+from glass_nav.vocabulary import SearchState
 
 EXACT = TrialParams(noise_limit=0.0)
 
@@ -89,7 +90,7 @@ def test_the_truth_is_never_eliminated_while_errors_are_within_tolerance(nodes: 
     bounded = TrialParams(noise_limit=SearchParams().tolerances.z * 0.98)
     trials = list(wake_up_trials.trials(atlas, SearchParams(), bounded, 300, seed))
     assert all(trial.truth_lost_at is None for trial in trials)
-    assert {trial.outcome for trial in trials} == {CONFIRMED}
+    assert {trial.outcome for trial in trials} == {SearchState.CONFIRMED}
 
 
 def test_errors_as_large_as_the_tolerance_all_at_once_do_not_eliminate_the_truth() -> None:
@@ -181,4 +182,4 @@ def test_lost_is_an_outcome() -> None:
     outcomes = {
         trial.outcome for trial in wake_up_trials.trials(atlas, SearchParams(), TrialParams(), 20, 0, elsewhere=True)
     }
-    assert LOST in outcomes
+    assert SearchState.LOST in outcomes

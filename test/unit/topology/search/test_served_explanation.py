@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 
 from glass_nav.hypotheses.scan_explanation import ScanExplanation
-from glass_nav.ros.topology.served_explanation import ServedExplanation
 from glass_nav.sensing.scan import Scan
+from glass_nav.topology.search.served_explanation import ServedExplanation
 from glass_nav.world.grid_map import GridMap
 
 SCAN = Scan(0, np.full(40, 1.0), np.linspace(-np.pi, np.pi, 40, endpoint=False), 0.1, 10.0, np.zeros(3))

@@ -4,36 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticStatus
 
+from glass_nav.health import Level
+from glass_nav.localization import health
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
+from glass_nav.localization.health import LocalizationHealth, Situation
 from glass_nav.localization.localizer import BeamCases, Estimate
-from glass_nav.ros.localization import diagnostics
-from glass_nav.ros.localization.diagnostics import Diagnostics, Situation
-from glass_nav.ros.localization.params import LocalizationNodeParams
 from glass_nav.sensing.scan import Scan
 from glass_nav.sensing.scan_queue import ScanCounts
 from glass_nav.world.grid_map import GridMap
 
-OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+OK, WARN, ERROR = Level.OK, Level.WARN, Level.ERROR
 GRID = GridMap(np.array([[0, 100, -1], [0, 0, 100]], np.int8), 0.05, np.array([1.0, -2.0, 0.5]))
 
 
-class Topic:
-    """Stands for the publisher, which needs a ROS master; everything else is the real thing."""
-
-    def __init__(self, *_: object, **__: object) -> None:
-        self.last = None
-
-    def publish(self, msg) -> None:
-        self.last = msg
-
-
 @pytest.fixture
-def reporter(monkeypatch):
-    monkeypatch.setattr(diagnostics.rospy, "Publisher", Topic)
-    monkeypatch.setattr(diagnostics.rospy.Time, "now", staticmethod(lambda: diagnostics.rospy.Time(5)))
-    return Diagnostics(LocalizationNodeParams(), ScanCounts())
+def reporter():
+    return LocalizationHealth(np.array([0.2, 0.2, 0.1]), ScanCounts())
 
 
 def estimate(state="LOCALIZED", std=0.05, used_share=0.9, beams=100):
@@ -71,9 +58,8 @@ def said(reporter, part, **changes):
         scan_period_s=0.1,
         lidars=["laser"],
     )
-    reporter.publish(Situation(**{**values, **changes}))
-    entry = next(each for each in reporter._publisher.last.status if each.name.endswith(f": {part}"))
-    return entry.level, entry.message, {each.key: each.value for each in entry.values}
+    entry = reporter.report(Situation(**{**values, **changes}))[part]
+    return entry.level, entry.message, entry.values
 
 
 @pytest.mark.parametrize(
@@ -99,20 +85,20 @@ def test_scans_say_where_they_went_since_the_last_report(reporter):
     counts.dropped_no_transform += 2
     level, text, values = said(reporter, "scans")
     assert (level, text) == (WARN, "3 scans used since the last report, 1 refused, 2 dropped without a transform")
-    assert (values["used"], values["lidars"]) == ("13", "laser")
+    assert (values["used"], values["lidars"]) == (13, "laser")
     assert said(reporter, "scans", trouble="no scan on /scan")[:2] == (ERROR, "no scan on /scan")
 
 
-def test_beams_say_how_many_are_understood_and_which_case_they_are(reporter):
+def test_beams_say_how_many_are_explained_and_which_case_they_are(reporter):
     level, text, values = said(reporter, "beams")
-    assert (level, text) == (OK, "100 of 100 beams answered, 90% of them are understood")
-    assert values == {
-        "0 uncertain": "0.0%",
-        "1 diffuse": "75.0%",
-        "2 mirrored": "0.0%",
-        "3 behind one pane": "25.0%",
-        "4 behind two panes": "0.0%",
-    }
+    assert (level, text) == (OK, "100 of 100 beams answered, 90% of them are explained")
+    assert list(values.items()) == [
+        ("1 first surface", "75.0%"),
+        ("2 mirrored", "0.0%"),
+        ("3 behind one pane", "25.0%"),
+        ("4 behind two panes", "0.0%"),
+        ("0 uncertain", "0.0%"),
+    ]
     few = "only 12 of 100 beams answered: odometry leads"
     assert said(reporter, "beams", scan=scan(answered=12))[:2] == (WARN, few)
     assert said(reporter, "beams", scan=None)[:2] == (OK, "no scan used yet")
@@ -140,10 +126,15 @@ def test_the_map_says_what_it_is(reporter):
     assert values == {
         "digest": GRID.digest,
         "origin": "x 1.000 m, y -2.000 m, yaw 0.5000 rad",
-        "occupied": "2",
-        "free": "3",
+        "occupied": 2,
+        "free": 3,
     }
     assert said(reporter, "map", grid_map=None, map_origin="no map: there is no service /static_map")[:2] == (
         ERROR,
         "no map: there is no service /static_map",
     )
+
+
+def test_a_report_has_all_entries_before_there_is_anything_to_report(reporter):
+    nothing = Situation(None, None, None, None, "no map yet", None, [])
+    assert tuple(reporter.report(nothing)) == health.ENTRIES

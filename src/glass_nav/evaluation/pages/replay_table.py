@@ -1,0 +1,101 @@
+"""The figures of one replay, as lines for a terminal."""
+
+from __future__ import annotations
+
+from typing import Any, Dict, List, Optional
+
+from glass_nav.evaluation.metrics.case_scores import CASE_NAMES, NEAR_M
+from glass_nav.evaluation.metrics.replay_result import ReplayResult
+
+
+def run_lines(result: ReplayResult) -> List[str]:
+    """The figures of a run for people."""
+    figures = result.metrics()
+    lines = [
+        f"{figures['scans']} scans, {figures['updates']} updates, {figures['scans_refused']} refused; "
+        f"{figures['cpu_ms_per_scan']:.1f} ms CPU per scan, {figures['times_real_time']:.1f} times real time"
+    ]
+    if figures["position_mean_m"] is not None or result.errors.matched.any():
+        lines.append(
+            "position error  "
+            + "  ".join(
+                f"{name} {_metres(figures[f'position_{name}_m'])}" for name in ("mean", "median", "rmse", "p95", "max")
+            )
+        )
+        lines.append(
+            f"yaw error       mean {figures['yaw_mean_deg']:.2f} deg  "
+            f"median {figures['yaw_median_deg']:.2f} deg  p95 {figures['yaw_p95_deg']:.2f} deg"
+        )
+        lines.append(
+            f"lost            {100 * figures['lost_share']:.1f} % of the scans more than 0.5 m off, "
+            f"{100 * figures['lost_1m_share']:.1f} % more than 1 m"
+        )
+    lines.append(
+        "beam cases      "
+        + "  ".join(f"{name} {100 * figures['case_share'][str(case)]:.1f} %" for case, name in enumerate(CASE_NAMES))
+    )
+    return lines + _case_lines(figures["cases"]) + _surface_lines(figures["scan_surfaces"])
+
+
+def _case_lines(scores: Optional[Dict[str, Any]]) -> List[str]:
+    if scores is None:
+        return []
+    lines = [
+        f"cases told      {_figure(scores['accuracy'])} of {scores['beams']} beams right, "
+        f"{_figure(scores['accuracy_answered'])} of those that answered; macro F1 {_figure(scores['macro_f1'])}; "
+        f"{_figure(scores['used_share'])} used",
+        f"  {'':22s}{'true':>9s}{'told':>9s}{'precision':>11s}{'recall':>8s}{'F1':>8s}",
+    ]
+    for case, name in enumerate(CASE_NAMES):
+        share, told = (100 * (scores[key][case] or 0.0) for key in ("true_share", "told_share"))
+        precision, recall, f1 = (_figure(scores[key][case]) for key in ("precision", "recall", "f1"))
+        lines.append(f"  {case} {name:20s}{share:7.1f} %{told:7.1f} %{precision:>11s}{recall:>8s}{f1:>8s}")
+    return lines
+
+
+def _surface_lines(scores: Optional[Dict[str, Any]]) -> List[str]:
+    if scores is None:
+        return []
+    return [
+        f"scan_surfaces   {_figure(scores['cut_at_pane_share'])} of {scores['at_pane']} beams that passed or were "
+        f"mirrored at a pane cut within {NEAR_M:g} m of it, {_figure(scores['cut_wrongly_share'], 4)} of the "
+        f"others cut; pose trusted in {_figure(scores['trusted_share'])} of the scans"
+    ]
+
+
+def _figure(value: Optional[float], digits: int = 3) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _metres(value: Optional[float]) -> str:
+    return "infinite" if value is None else f"{value:.3f} m"
+
+
+def topology_lines(figures: Optional[Dict[str, Any]]) -> List[str]:
+    """The figures of TopologyScore.metrics() for people; none where no atlas was given."""
+    if figures is None:
+        return []
+    why = figures["missed_why"]
+    lines = [f"topology        {'':12s}{'passed':>8s}{'seen':>8s}{'missed':>8s}{'invented':>10s}{'degree right':>14s}"]
+    for name, row in (("meetpoints", figures["meetpoints"]), ("dead ends", figures["dead_ends"]), ("all", figures)):
+        share = "-" if row["degree_right_share"] is None else f"{100 * row['degree_right_share']:.0f} %"
+        seen = f"{row['seen']}" if row["seen_share"] is None else f"{row['seen']} ({100 * row['seen_share']:.0f} %)"
+        lines.append(
+            f"  {name:14s}{'':12s}{row['passed']:8d}{seen:>11s}{row['missed']:5d}{row['invented']:10d}{share:>14s}"
+        )
+    lines.append(
+        f"  missed          {why['doubtful']} whose obstacles were not seen well enough, {why['unsteady']} "
+        f"that came and went, {why['nothing']} where nothing was seen"
+    )
+    lines.append(f"  seen nodes      off by {_off(figures['position_off_m'])}, r by {_off(figures['r_off_m'])}")
+    lines.append(
+        f"  edges           {figures['edges_driven']} between two seen nodes: length off by "
+        f"{_off(figures['edge_length_off_m'])}, chord by {_off(figures['edge_chord_off_m'])}"
+    )
+    return lines
+
+
+def _off(spread: Dict[str, Optional[float]]) -> str:
+    if spread["median_abs"] is None:
+        return "-"
+    return f"{spread['median_abs']:.2f} m (median, p95 {spread['p95_abs']:.2f} m)"

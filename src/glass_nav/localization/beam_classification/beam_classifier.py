@@ -1,0 +1,140 @@
+"""SCAN -> EXPECTED RANGES -> CASES -> GLASS MAP: what did each beam of a scan meet?
+
+The steps of the seed document glass_localization.txt in their order, with what is learnt while driving: where in the
+walls of this map beams end, and which of its walls are glass. B beams.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Tuple
+
+import numpy as np
+
+from glass_nav.localization.beam_classification import (
+    case_votes,
+    expected_ranges,
+    glass_map,
+    preliminary_samples,
+    surface_scan,
+)
+from glass_nav.localization.beam_classification.case_votes import BeamCases, CaseVote
+from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, ExpectedRanges
+from glass_nav.localization.beam_classification.glass_map import GlassEvidence, GlassMap
+from glass_nav.localization.beam_classification.preliminary_samples import PreliminarySamples
+from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
+from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
+from glass_nav.sensing.raycast import RayCaster
+from glass_nav.sensing.scan import Scan
+from glass_nav.sensing.wall_thickness import wall_thickness
+from glass_nav.world.grid_map import GridMap
+
+_DEPTH_SHARE = 0.5  # of a wall's drawn thickness at which beams end, until it is learnt
+_FEWER_SAMPLES = 2  # times, where no particle is weighed by the cases
+
+
+@dataclass(frozen=True)
+class BeamClassifierParams:
+    """How beams are classified, a struct per step."""
+
+    samples: PreliminarySamples
+    vote: CaseVote
+    glass: GlassEvidence
+    min_sigma_m: float  # limits of the learnt spread of beams around walls
+    max_sigma_m: float
+    raycast_threads: int = 1
+
+
+class BeamClassifier:
+    """Classifies the beams of scans on one map, and learns that map's glass."""
+
+    def __init__(self, params: BeamClassifierParams, grid_map: GridMap) -> None:
+        self._params = params
+        self.caster = RayCaster(grid_map, threads=params.raycast_threads)
+        self.thickness_m = wall_thickness(grid_map)  # (H * W,)
+        self.residuals = RangeResiduals(_DEPTH_SHARE, params.min_sigma_m)
+        self.glass_map = GlassMap(grid_map, params.glass)
+
+    def reconfigure(self, params: BeamClassifierParams) -> None:
+        """Other parameters from the next scan on; what was learnt stays."""
+        if params.raycast_threads != self._params.raycast_threads:
+            self.caster = RayCaster(self.caster.grid_map, threads=params.raycast_threads)
+        self.glass_map.weigh_by(params.glass)
+        self._params = params
+
+    def classify(
+        self, scan: Scan, map_from_base: np.ndarray, covariance: np.ndarray, for_weights: bool = True
+    ) -> Tuple[BeamCases, ExpectedRanges]:
+        """Cases of all beams, with the ranges that they were chosen from.
+
+        Args:
+            scan: one revolution of a lidar.
+            map_from_base: (3,) pose that the preliminary samples surround.
+            covariance: (3, 3) of that pose.
+            for_weights: whether particles are weighed by the cases; if not, fewer samples vote.
+        """
+        samples = preliminary_samples.around(map_from_base, covariance, self._samples(for_weights))
+        behind_m = max(case_votes.reach_m(self.residuals, self._params.vote), glass_map.reach_m(self.residuals))
+        expected = self._expected(scan, samples, behind_m)
+        glass = self.glass_map.chances(expected.cell[[0, 2], 0])
+        cases = case_votes.classify(scan.ranges_m, expected, self.residuals, self._params.vote, glass, scan.range_max_m)
+        return cases, expected
+
+    def expected_at(self, scan: Scan, map_from_base: np.ndarray) -> ExpectedRanges:
+        """Expected ranges of every beam at one pose (3,)."""
+        return self._expected(scan, map_from_base[None], 0.0)
+
+    def seen_from(self, cases: BeamCases, scan: Scan, expected: ExpectedRanges) -> BeamCases:
+        """The cases with the ranges and residuals of the pose that `expected` is of."""
+        return case_votes.as_seen_from(cases, scan.ranges_m, expected, self.residuals, self._params.vote)
+
+    def learn(self, scan: Scan, expected: ExpectedRanges) -> None:
+        """Where beams end in walls, and which walls let them pass; `expected` is of a pose that is believed."""
+        with np.errstate(invalid="ignore"):
+            across = (scan.ranges_m - expected.line_m[0]) * expected.cos_incidence[0, 0] + expected.face_m
+        met = np.isfinite(across)
+        self.residuals = self.residuals.learn(
+            across[met], expected.thickness_m[0, 0][met], self._params.min_sigma_m, self._params.max_sigma_m
+        )
+        self.glass_map.learn(*glass_map.crossings(scan.ranges_m, expected, self.residuals))
+
+    def surfaces(self, scan: Scan, cases: BeamCases, expected: ExpectedRanges, trusted: bool) -> SurfaceScan:
+        """The scan cut at glass; `expected` is of the reported pose, which is trusted or not."""
+        across = np.maximum(expected.cos_incidence[0, 0], MIN_COS)
+        gate_m = case_votes.gate_m(self.residuals, self._params.vote) / across
+        return surface_scan.of(
+            scan.ranges_m,
+            cases.case,
+            expected,
+            self.glass_map.chances(expected.cell[0, 0]),
+            gate_m,
+            scan.range_max_m,
+            trusted,
+        )
+
+    @property
+    def max_glass_thickness_m(self) -> float:
+        """A thicker run of occupied cells ends a beam."""
+        return self._params.vote.glass_max_thickness_m
+
+    @property
+    def min_linearity(self) -> float:
+        """Of the cells around a surface; below it the surface has no normal."""
+        return self._params.vote.normal_min_linearity
+
+    def _samples(self, for_weights: bool) -> PreliminarySamples:
+        samples = self._params.samples
+        if for_weights or self._params.vote.vote_mode == "paper":
+            return samples
+        return replace(samples, sample_count=-(-samples.sample_count // _FEWER_SAMPLES))
+
+    def _expected(self, scan: Scan, samples: np.ndarray, behind_m: float) -> ExpectedRanges:
+        return expected_ranges.of(
+            self.caster,
+            self.thickness_m,
+            samples,
+            scan,
+            self.max_glass_thickness_m,
+            self.min_linearity,
+            behind_m,
+        )

@@ -1,0 +1,249 @@
+"""MOTION -> REGISTRATION -> PROPOSAL -> WEIGHTS -> RESAMPLING -> POSE: the particles and what happens to them.
+
+Thrun, Burgard, Fox, Probabilistic Robotics (2005), ch. 8, with a proposal that looks at the scan. P particles, B beams.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Optional
+
+import numpy as np
+
+from glass_nav.geometry import angles, se2
+from glass_nav.hypotheses import bearing_weights, scan_alignment
+from glass_nav.hypotheses.bearing_weights import BearingMixture
+from glass_nav.hypotheses.scan_alignment import Alignment
+from glass_nav.localization.beam_classification.beam_classifier import BeamClassifier
+from glass_nav.localization.beam_classification.case_votes import BeamCases
+from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
+from glass_nav.localization.particle_filter import importance_weights, motion, pose_estimate, proposal, resampling
+from glass_nav.localization.particle_filter.importance_weights import BeamMixture
+from glass_nav.localization.particle_filter.motion import OdometryNoise
+from glass_nav.localization.particle_filter.pose_estimate import PoseEstimate
+from glass_nav.localization.particle_filter.proposal import Proposal
+from glass_nav.localization.particle_filter.resampling import ParticleCount
+from glass_nav.localization.particle_filter.scan_registration import ScanRegistration
+from glass_nav.sensing.bearings import LandmarkBearings
+from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.scan import Scan, spread_evenly
+from glass_nav.world.grid_map import GridMap
+from glass_nav.world.landmark_map import LandmarkMap
+
+ONE_PLACE = np.array([1.0, 1.0, 0.7])  # deviations [m, m, rad] that preliminary samples can cover
+_MIN_ENDS = 20  # beams of known case that a registration is refined by
+_FULL_FIT = 20.0  # log likelihood ratio of a scan that fits everywhere to one that fits nowhere
+
+
+@dataclass(frozen=True)
+class ParticleFilterParams:
+    """How particles move, are drawn, weighed and counted, a struct per step."""
+
+    count: ParticleCount
+    odometry: OdometryNoise
+    proposal: Proposal
+    mixture: BeamMixture
+    bearings: BearingMixture
+    resample_interval: int = 1  # updates between resamplings
+    selective_resampling: bool = False  # only when fewer than half of the particles count
+
+
+@dataclass(frozen=True)
+class Registration:
+    """Where the scan is to be classified, and where particles are drawn."""
+
+    map_from_base: np.ndarray  # (3,) pose around which the beams are classified
+    covariance: np.ndarray  # (3, 3) of it
+    best: PoseEstimate  # cluster that odometry predicted
+    alignment: Optional[Alignment]  # None: nothing to draw particles from
+    beams: int  # that were aligned
+    fits: bool  # as scans usually do: what is seen from there may be learnt
+
+
+class ParticleFilter:
+    """Particles in one map; predict(), register() and weigh() in this order for every scan, then resample()."""
+
+    def __init__(self, params: ParticleFilterParams, field: DistanceField, rng: np.random.Generator) -> None:
+        """No particles yet: call one of the start functions.
+
+        Args:
+            params: of every step.
+            field: of the map.
+            rng: source of all randomness.
+        """
+        self._params, self._field, self._rng = params, field, rng
+        self.particles = np.zeros((0, 3))  # (P, 3) poses in map
+        self._weights = np.zeros(0)  # (P,) sum 1
+        self.best: PoseEstimate  # cluster of the particles; once started
+        self._registration = ScanRegistration(field)
+        self._updates = 0
+
+    def set_field(self, field: DistanceField) -> None:
+        """That of another map; the particles stay where they are."""
+        self._field = field
+        self._registration = ScanRegistration(field)
+
+    def reconfigure(self, params: ParticleFilterParams) -> None:
+        """Other parameters from the next scan on; the particles stay."""
+        self._params = params
+
+    # -- starts
+
+    def start_around(self, map_from_base: np.ndarray, deviations: np.ndarray) -> None:
+        """Normal around a pose (3,).
+
+        Args:
+            map_from_base: (3,) the mean.
+            deviations: (3,) standard ones [m, m, rad], or (3, 3) with one principal axis in each column.
+        """
+        noise = self._rng.standard_normal((self._params.count.max_particles, 3))
+        offsets = noise @ deviations.T if deviations.ndim == 2 else noise * deviations
+        particles = map_from_base + offsets
+        particles[:, 2] = angles.wrap(particles[:, 2])
+        self._start_with(particles)
+
+    def start_in(self, grid_map: GridMap, area: np.ndarray) -> None:
+        """Anywhere in the cells of area (H, W), with any heading."""
+        rows, columns = np.nonzero(area)
+        count = self._params.count.max_particles
+        chosen = self._rng.integers(len(rows), size=count)
+        inside = self._rng.uniform(-0.5, 0.5, (2, count))
+        points = grid_map.centres(rows[chosen] + inside[0], columns[chosen] + inside[1])
+        yaw = self._rng.uniform(-np.pi, np.pi, count)
+        self._start_with(np.column_stack([points, yaw]))
+
+    def _start_with(self, particles: np.ndarray) -> None:
+        self.particles = particles
+        self._weights = np.full(len(particles), 1.0 / len(particles))
+        self.best = pose_estimate.of(particles, self._weights)
+        self._registration = ScanRegistration(self._field)
+
+    def stand_for(
+        self, poses: np.ndarray, weights: np.ndarray, here: np.ndarray, covariance: np.ndarray, most: int
+    ) -> None:
+        """Be drawn from candidates that somebody else follows, the best first.
+
+        Args:
+            poses, weights: (K, 3) candidates in map, and (K,) weights that sum to 1.
+            here: (K,) bool: candidates in the place of the first.
+            covariance: (3, 3) of all of them.
+            most: particles to draw.
+        """
+        drawn = resampling.low_variance(weights, min(most, self._params.count.max_particles), self._rng)
+        self.particles = poses[drawn]
+        self._weights = np.full(len(drawn), 1.0 / len(drawn))
+        self.best = PoseEstimate(poses[0], covariance, float(weights[here].sum()), here[drawn])
+
+    # -- one scan
+
+    def predict(self, step: np.ndarray) -> None:
+        """Move all particles by a step (3,) of odometry, in the robot's frame before it."""
+        self.particles = motion.sample(self.particles, step, self._params.odometry, self._rng)
+
+    def weigh_by_bearings(self, bearings: LandmarkBearings, landmarks: LandmarkMap) -> None:
+        """Bearings taken where the particles are now."""
+        log_w = bearing_weights.log_weights(self.particles, bearings, landmarks, self._params.bearings)
+        self._weights = resampling.tempered(np.log(self._weights) + log_w)
+
+    def register(self, scan: Scan, odom_from_base: np.ndarray) -> Registration:
+        """Align the scan from the best cluster; a cloud that is no single place is weighed by how the scan fits."""
+        best = pose_estimate.of(self.particles, self._weights)
+        beams = spread_evenly(scan.answered, self._params.proposal.proposal_max_beams)
+        points = scan.points_in_base()[beams]
+        if not len(beams):
+            return Registration(best.map_from_base, best.covariance, best, None, 0, False)
+        if not self._is_one_place(best):
+            fit = scan_alignment.fit(self._field, points, self.particles)
+            self._weights = resampling.normalised(np.log(self._weights) + _FULL_FIT * fit)
+            best = pose_estimate.of(self.particles, self._weights)
+            return Registration(best.map_from_base, best.covariance, best, None, 0, False)
+        found = self._registration.find(best.map_from_base, best.covariance, odom_from_base, points)
+        return Registration(found.poses[0], np.zeros((3, 3)), best, found, len(beams), self._registration.fits)
+
+    def weigh(self, scan: Scan, cases: BeamCases, registration: Registration, classifier: BeamClassifier) -> None:
+        """Draw particles where the scan fits, and weigh all of them by the beams whose case is known."""
+        if registration.alignment is None:
+            return
+        residuals, mixture = classifier.residuals, self._params.mixture
+        aligned = self._refined(
+            registration, scan.points_in_base()[importance_weights.known_ends(cases.case)], residuals
+        )
+        independent = importance_weights.independent_beams(residuals, mixture)
+        beam_information = min(1.0, independent / registration.beams) / residuals.sigma_m**2
+        self.particles, log_ratio = proposal.draw(
+            self.particles,
+            self._weights,
+            registration.best,
+            aligned,
+            beam_information,
+            self._params.proposal,
+            self._rng,
+        )
+        self._weights = resampling.tempered(log_ratio + self._log_weights(scan, cases, classifier))
+
+    def estimate(self) -> None:
+        """The best cluster of the weighed particles is the pose."""
+        self.best = pose_estimate.of(self.particles, self._weights)
+
+    def resample(self) -> None:
+        """Draw as many particles as the spread of the cloud needs, where they are due."""
+        self._updates += 1
+        if self._updates % self._params.resample_interval:
+            return
+        if self._params.selective_resampling and 2.0 * resampling.effective_count(self._weights) > len(self._weights):
+            return
+        limits = self._params.count
+        drawn = resampling.low_variance(self._weights, limits.max_particles, self._rng)
+        count = resampling.enough_particles(self.particles[np.unique(drawn)], limits)
+        self.particles = self.particles[resampling.low_variance(self._weights, count, self._rng)]
+        self._weights = np.full(count, 1.0 / count)
+
+    def _is_one_place(self, best: PoseEstimate) -> bool:
+        """A cloud over a whole room is one cluster too, but no pose to align a scan from."""
+        return best.share >= self._params.proposal.proposal_min_cluster_share and bool(
+            np.all(np.sqrt(np.diag(best.covariance)) <= ONE_PLACE)
+        )
+
+    def _refined(self, registration: Registration, ends_m: np.ndarray, residuals: RangeResiduals) -> Alignment:
+        """The alignments once more, and from the predicted pose, by all beams that ended at a known surface.
+
+        What stands unmapped behind glass may have drawn the first alignment away. The information stays that of the
+        beams that were aligned first.
+        """
+        aligned, beams = registration.alignment, registration.beams
+        assert aligned is not None
+        if len(ends_m) < _MIN_ENDS:
+            return aligned
+        scale_m = residuals.sigma_m
+        again = scan_alignment.align(
+            self._field,
+            ends_m,
+            np.vstack([aligned.poses, registration.best.map_from_base]),
+            iterations=4,
+            first_scale_m=2.0 * scale_m,
+            last_scale_m=scale_m,
+        )
+        found = scan_alignment.distinct(again)
+        return Alignment(found.poses, found.information * beams / max(beams, len(ends_m)), found.fit)
+
+    def _log_weights(self, scan: Scan, cases: BeamCases, classifier: BeamClassifier) -> np.ndarray:
+        """(P,) log likelihoods of the scan."""
+        mixture = self._params.mixture
+        if mixture.weight_mode == "field":
+            chosen = spread_evenly(importance_weights.known_ends(cases.case), mixture.laser_max_beams)
+            ends_m = scan.points_in_base()[chosen]
+            return importance_weights.by_field(self._field, self.particles, ends_m, classifier.residuals, mixture)
+        chosen = spread_evenly(cases.case, mixture.laser_max_beams)
+        return importance_weights.by_ranges(
+            classifier.caster,
+            classifier.thickness_m,
+            se2.compose(self.particles, scan.base_from_laser),
+            scan.angles_rad[chosen],
+            scan.ranges_m[chosen],
+            cases.case[chosen],
+            classifier.residuals,
+            mixture,
+            scan.range_max_m,
+            classifier.max_glass_thickness_m,
+            classifier.min_linearity,
+        )

@@ -1,0 +1,125 @@
+"""A replay and the files that it leaves: results, glass map, pictures, a bag, and what it passed of an atlas."""
+
+from __future__ import annotations
+
+import platform
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Callable, Dict, List, Optional
+
+import numpy as np
+
+from glass_nav import params
+from glass_nav.evaluation.metrics import replay_result
+from glass_nav.evaluation.metrics.passed_nodes import TopologyScore
+from glass_nav.evaluation.metrics.replay_result import ReplayResult
+from glass_nav.evaluation.plots import run_pictures
+from glass_nav.evaluation.plots.run_pictures import MapImage
+from glass_nav.localization.localizer import Estimate
+from glass_nav.recording.recording import Step
+from glass_nav.replay import replay_bag, replay_topology
+from glass_nav.replay.prepared_replay import Listener, PreparedReplay
+from glass_nav.world import map_file
+from glass_nav.world.grid_map import GridMap
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What a replay leaves."""
+
+    folder: Path
+    bag: Optional[Path] = None  # for rviz and PlotJuggler
+    topology: Optional[str] = None  # name of an atlas, see replay_topology.atlas_of()
+    pictures: bool = True
+
+
+class FiledReplay:
+    """One replay with its files: run(), then write()."""
+
+    def __init__(self, ready: PreparedReplay, outputs: Outputs) -> None:
+        """Makes the folders.
+
+        Raises:
+            AtlasError, ValueError, OSError: no such atlas, or one of another map; no folder can be made there.
+        """
+        self._ready, self._outputs = ready, outputs
+        self._watch = None
+        if outputs.topology is not None:
+            atlas = replay_topology.atlas_of(outputs.topology, ready.options.map, ready.grid_map)
+            self._watch = replay_topology.Watch(atlas, ready.grid_map)
+        outputs.folder.mkdir(parents=True, exist_ok=True)
+        if outputs.bag is not None:
+            outputs.bag.parent.mkdir(parents=True, exist_ok=True)
+
+    def run(self, step_done: Callable[[], None]) -> ReplayResult:
+        """All scans, and the bag.
+
+        Raises:
+            RecordingError: not one scan of the log can be used, or the bag cannot be written.
+        """
+        ready, path = self._ready, self._outputs.bag
+        with ExitStack() as stack:
+            listeners: List[Listener] = [] if self._watch is None else [self._watch.listen]
+            if path is not None:
+                bag = replay_bag.listener(path, ready.recording, ready.localizer, ready.grid_map)
+                listeners.append(stack.enter_context(bag))
+            return ready.run(step_done, _all_of(listeners))
+
+    def write(self, result: ReplayResult) -> Optional[TopologyScore]:
+        """All other files; what the robot passed of the atlas, where there is one."""
+        ready, folder = self._ready, self._outputs.folder
+        grid_map, options = ready.grid_map, ready.options
+        image = run_pictures.MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid)
+        topology = self._write_topology(result, image)
+        about: Dict[str, Any] = {
+            "log": " ".join(map(str, options.log)),
+            "map": str(options.map),
+            "start": ready.origin,
+            "notes": ready.notes,
+            "params": params.as_mapping(ready.settings.localizer),
+            "versions": versions(),
+            **({} if topology is None else {"topology": topology.metrics()}),
+        }
+        replay_result.write(result, folder, about)
+        glass = GridMap(ready.localizer.glass_map.occupancy(), grid_map.resolution_m, grid_map.map_from_grid)
+        map_file.save(glass, folder / "glass_map.yaml", image_suffix=".png")
+        if self._outputs.pictures:
+            run_pictures.draw_trajectory(folder / "trajectory.png", image, result, ready.recording.name)
+            if result.case_scores is not None:
+                run_pictures.draw_cases(folder / "cases.png", image, result, ready.recording.name)
+        return topology
+
+    def _write_topology(self, result: ReplayResult, image: MapImage) -> Optional[TopologyScore]:
+        if self._watch is None:
+            return None
+        topology = self._watch.finish(result)
+        replay_topology.write(
+            self._outputs.folder,
+            topology,
+            self._watch.atlas,
+            image if self._outputs.pictures else None,
+            replay_topology.poses(result)[:, :2],
+            self._ready.recording.name,
+        )
+        return topology
+
+
+def versions() -> Dict[str, str]:
+    """Of what the numbers depend on."""
+    import scipy
+
+    return {
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "machine": platform.machine(),
+    }
+
+
+def _all_of(listeners: List[Listener]) -> Listener:
+    def listen(step: Step, estimate: Estimate) -> None:
+        for each in listeners:
+            each(step, estimate)
+
+    return listen

@@ -1,0 +1,42 @@
+"""What is known after a meetpoint, and the turn to take there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Optional
+
+import numpy as np
+
+from glass_nav.topology.observations import turn_name
+from glass_nav.vocabulary import SEARCH_IS_OVER, SearchState
+
+
+@dataclass(frozen=True)
+class TurnChoice:
+    """By which edge to leave the meetpoint."""
+
+    rank: int
+    degree: int
+
+    @property
+    def name(self) -> str:
+        return turn_name(self.rank, self.degree)
+
+
+@dataclass(frozen=True)
+class SearchEstimate:
+    """What is known after a meetpoint."""
+
+    state: SearchState
+    reason: str  # why, in one sentence
+    depth: int  # edges driven so far
+    dart: np.ndarray  # (C,) candidates: where the edge that the robot came along leads back
+    errors: np.ndarray  # (C,) errors of the detector that each takes
+    choice: Optional[TurnChoice]  # None: nothing more to find out
+    map_from_base: Optional[np.ndarray] = None  # (3,) CONFIRMED by the scans: the pose; dart is empty where the graph
+    # does not have it
+
+    @property
+    def done(self) -> bool:
+        """Whether the search is over."""
+        return self.state in SEARCH_IS_OVER

@@ -1,0 +1,381 @@
+"""What the robot reports and what people ask for -> what to publish: one search after another in an atlas.
+
+This is everything that topology_node decides, without ROS and without a clock: each method is an event, and returns
+the decisions that follow from it, in the order in which they are to be carried out. A search begins with a meetpoint
+and ends CONFIRMED, AMBIGUOUS or LOST, or when its goal gives up; before and after, the state is WAITING (the next
+meetpoint begins a search) or IDLE, and NO_ATLAS while there is no atlas of the map.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from typing import Callable, List, Optional, Tuple, Union
+
+import numpy as np
+
+from glass_nav.topology.atlas import atlas_file
+from glass_nav.topology.atlas.atlas import Atlas, AtlasError
+from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
+from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search.search_estimate import SearchEstimate, TurnChoice
+from glass_nav.topology.search.search_params import SearchParams
+from glass_nav.topology.search.served_explanation import ServedExplanation
+from glass_nav.vocabulary import SearchState
+from glass_nav.world.grid_map import GridMap
+
+ReadAtlas = Callable[[], Tuple[str, Atlas]]  # where it was found, and the atlas
+
+
+@dataclass(frozen=True)
+class SessionParams:
+    """How searches are begun, fed and reported."""
+
+    check_map: bool = True  # refuse the atlas if another map is served than it was made from
+    judge_by_scans: bool = True  # judge candidates by the scan at a meetpoint, where there are scans and a map
+    search_at_start: bool = True  # with the first meetpoint; else when asked
+    publish_initial_pose: bool = True
+    listed_candidates: int = 1000  # at most, with their poses
+    pairing_tolerance_s: float = 2.0  # [s] between the stamps of an edge traversal and its meetpoint
+    visits_file: str = ""  # the atlas with its statistics is saved there; empty: nowhere
+
+    def __post_init__(self) -> None:
+        if self.listed_candidates < 1:
+            raise ValueError(f"~listed_candidates must be >= 1, got {self.listed_candidates}")
+        if not (math.isfinite(self.pairing_tolerance_s) and self.pairing_tolerance_s > 0.0):
+            raise ValueError(f"~pairing_tolerance_s must be finite and > 0, got {self.pairing_tolerance_s}")
+        if self.visits_file and not self.visits_file.endswith((".json", ".npz")):
+            raise ValueError(f"~visits_file must be a .json or a .npz, got {self.visits_file!r}")
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A search that somebody asked for and waits for."""
+
+    here: bool = False  # begin at the meetpoint that was reported last; else at the next one
+    max_edges: int = 0  # give up after so many edges; 0: no limit
+
+
+class GoalOutcome(Enum):
+    """How a goal ended."""
+
+    SUCCEEDED = "SUCCEEDED"  # CONFIRMED
+    ABORTED = "ABORTED"  # AMBIGUOUS, LOST, or too many edges
+    PREEMPTED = "PREEMPTED"
+
+
+# -- decisions
+
+
+@dataclass(frozen=True)
+class SearchStatus:
+    """What is known; to be published."""
+
+    state: SearchState
+    reason: str  # one sentence
+    stamp_ns: int = 0  # of the meetpoint that it follows from; 0: of none
+    estimate: Optional[SearchEstimate] = None  # of the search; None before its first meetpoint
+    poses: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # (K, 3) map_from_base of the first candidates
+
+    @property
+    def map_from_base(self) -> Optional[np.ndarray]:
+        """(3,) the pose, if it is CONFIRMED."""
+        return self.poses[0] if self.state == SearchState.CONFIRMED else None
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Feedback for the goal."""
+
+    status: SearchStatus
+
+
+@dataclass(frozen=True)
+class Turn:
+    """The answer to a meetpoint."""
+
+    choice: TurnChoice
+    stamp_ns: int  # of the meetpoint
+
+
+@dataclass(frozen=True)
+class InitialPose:
+    """The pose to be handed over to the localization."""
+
+    map_from_base: np.ndarray  # (3,)
+    stamp_ns: int  # of the meetpoint where the robot had this pose
+
+
+@dataclass(frozen=True)
+class GoalEnd:
+    """The goal is over."""
+
+    outcome: GoalOutcome
+    reason: str
+    status: SearchStatus
+
+
+@dataclass(frozen=True)
+class LogLine:
+    """To be logged."""
+
+    text: str
+    level: int = logging.INFO
+    often: bool = False  # may come with every report: at most one in some seconds is worth reading
+
+
+Decision = Union[SearchStatus, Progress, Turn, InitialPose, GoalEnd, LogLine]
+
+
+# -- the session
+
+
+class SearchSession:
+    """One search at a time, for as long as the node runs; start() first."""
+
+    def __init__(self, read_atlas: ReadAtlas, p: SessionParams, search: SearchParams) -> None:
+        """Args:
+        read_atlas: reads the atlas to use now, at the start and whenever it is to be read again.
+        p: of the session.
+        search: how each search is done.
+        """
+        self._read_atlas = read_atlas
+        self._p, self._search_params = p, search
+        self._explanation = ServedExplanation()
+        self._map: Optional[Tuple[str, str]] = None  # fingerprint of the map that is served, and its name for people
+        self._localizer: Optional[AtlasLocalizer] = None
+        self._status = SearchStatus(SearchState.NO_ATLAS, "no atlas was read yet")
+        self._goal: Optional[Goal] = None
+        self._last_meetpoint: Optional[Meetpoint] = None
+        self._unpaired_meetpoint: Optional[Meetpoint] = None
+        self._unpaired_traversal: Optional[Tuple[Traversal, int]] = None  # with its stamp [ns]
+
+    @property
+    def status(self) -> SearchStatus:
+        """The last one."""
+        return self._status
+
+    @property
+    def localizer(self) -> Optional[AtlasLocalizer]:
+        """Of the atlas; None without one."""
+        return self._localizer
+
+    @property
+    def choice(self) -> Optional[TurnChoice]:
+        """The turn that the robot was last told to take; None if there is none to take."""
+        return None if self._status.estimate is None else self._status.estimate.choice
+
+    @property
+    def uses_scans(self) -> bool:
+        """Whether candidates are judged by the scan of a meetpoint, if it has one."""
+        return self._p.judge_by_scans and self._explanation.has_map
+
+    # -- events
+
+    def start(self) -> List[Decision]:
+        """Read the atlas.
+
+        Raises:
+            ValueError, OSError: it cannot be used.
+        """
+        loaded = self._load()
+        if self._p.search_at_start:
+            return [loaded, self._await_meetpoint("the node has started")]
+        return [loaded, self._show(SearchState.IDLE, "no search was asked for")]
+
+    def meetpoint(self, meetpoint: Meetpoint) -> List[Decision]:
+        """The robot reports a meetpoint.
+
+        Args:
+            meetpoint: with the scan that was taken there, if candidates are to be judged by it.
+        """
+        self._last_meetpoint = meetpoint
+        if self._localizer is not None and self._status.state == SearchState.WAITING:
+            return self._judge(self._localizer, self._localizer.start(self._judgeable(meetpoint)), meetpoint.stamp_ns)
+        self._unpaired_meetpoint = meetpoint
+        return self._pair("meetpoint")
+
+    def edge_traversal(self, traversal: Traversal, stamp_ns: int) -> List[Decision]:
+        """The robot reports an edge that it drove, before or after the meetpoint at its end.
+
+        Args:
+            traversal: the edge.
+            stamp_ns: of the report; 0: none.
+        """
+        self._unpaired_traversal = traversal, stamp_ns
+        return self._pair("edge_traversal")
+
+    def map_served(self, grid_map: GridMap, name: str) -> List[Decision]:
+        """A map is served: it explains scans from now on, and the atlas must be made from it.
+
+        Args:
+            grid_map: it.
+            name: for people, as "that of topic /map".
+        """
+        if self._p.judge_by_scans:
+            self._explanation.take(grid_map)
+        if not self._p.check_map:
+            return []
+        self._map = grid_map.fingerprint, name
+        try:
+            if self._localizer is not None:
+                self._localizer.atlas.refuse_other_map(*self._map)
+                return []
+            return [self._load(), self._await_meetpoint("there is another map")]
+        except (ValueError, OSError) as err:
+            self._localizer = None
+            status = self._show(SearchState.NO_ATLAS, f"the atlas {err}")
+            return [LogLine(f"atlas refused: {err}", logging.ERROR), status, *self._end_goal(status.reason)]
+
+    def goal(self, goal: Goal) -> List[Decision]:
+        """Somebody asks for a search; another goal that is on was preempted by that."""
+        self._goal = goal
+        if self._localizer is None:
+            return self._end_goal(self._status.reason)
+        if not goal.here:
+            return [self._await_meetpoint("asked for by the action")]
+        if self._last_meetpoint is None:
+            return self._end_goal("no meetpoint was reported yet, where a search could begin")
+        return [self._await_meetpoint("asked for by the action"), *self.meetpoint(self._last_meetpoint)]
+
+    def preempt(self) -> List[Decision]:
+        """Whoever asked for the search does not want it any more."""
+        if self._goal is None:
+            return []
+        status = self._show(SearchState.IDLE, "the search was preempted")
+        return [status, *self._end_goal(status.reason, GoalOutcome.PREEMPTED)]
+
+    def restart(self) -> List[Decision]:
+        """Forget the search.
+
+        Raises:
+            ValueError: there is no atlas to search in.
+        """
+        if self._localizer is None:
+            raise ValueError(self._status.reason)
+        return [self._await_meetpoint("restarted by service")]
+
+    def reload_atlas(self) -> List[Decision]:
+        """Read the atlas again and forget the search.
+
+        Raises:
+            ValueError, OSError: it cannot be used; the old one stays.
+        """
+        return [self._load(), self._await_meetpoint("the atlas was reloaded")]
+
+    def time_jumped_back(self, jump: str) -> List[Decision]:
+        """The clock was set back, as when a recording starts again.
+
+        Args:
+            jump: in words, by how much.
+        """
+        return [] if self._localizer is None else [self._await_meetpoint(jump)]
+
+    # -- how an event is decided
+
+    def _load(self) -> LogLine:
+        """Raises what reading raises, and AtlasError if the atlas is of another map than the one that is served."""
+        found_at, atlas = self._read_atlas()
+        if self._map is not None:
+            try:
+                atlas.refuse_other_map(*self._map)
+            except AtlasError as err:
+                raise AtlasError(f"{found_at}: {err}") from err
+        scans = (self._explanation.shares, self._explanation) if self._p.judge_by_scans else (None, None)
+        self._localizer = AtlasLocalizer(atlas, self._search_params, *scans)
+        return LogLine(f"{found_at}: {len(atlas.nodes)} nodes, {len(atlas.edges)} edges")
+
+    def _await_meetpoint(self, why: str) -> SearchStatus:
+        return self._show(SearchState.WAITING, f"the next meetpoint begins a search: {why}")
+
+    def _show(self, state: SearchState, reason: str, stamp_ns: int = 0) -> SearchStatus:
+        """A state outside of searches: what was known is forgotten."""
+        self._unpaired_meetpoint, self._unpaired_traversal = None, None
+        self._status = SearchStatus(state, reason, stamp_ns)
+        return self._status
+
+    def _judgeable(self, meetpoint: Meetpoint) -> Meetpoint:
+        """Without its scan where no map is served to judge it by."""
+        return meetpoint if self.uses_scans else replace(meetpoint, scan=None)
+
+    def _pair(self, kind: str) -> List[Decision]:
+        """Take one edge through the search, once both of its reports are there."""
+        estimate, meetpoint, driven = self._status.estimate, self._unpaired_meetpoint, self._unpaired_traversal
+        if self._localizer is None or estimate is None or estimate.done:
+            self._unpaired_meetpoint, self._unpaired_traversal = None, None
+            return [LogLine(f"{kind} not used: the search is {self._status.state}", often=True)]
+        if meetpoint is None or driven is None:
+            return []
+        traversal, stamp_ns = driven
+        apart_s = 0.0 if 0 in (meetpoint.stamp_ns, stamp_ns) else abs(meetpoint.stamp_ns - stamp_ns) * 1e-9
+        if apart_s > self._p.pairing_tolerance_s:
+            return [self._drop_older(meetpoint.stamp_ns < stamp_ns, apart_s)]
+        self._unpaired_traversal = None
+        try:
+            estimate = self._localizer.update(traversal, self._judgeable(meetpoint))
+        except ObservationError as err:  # the meetpoint waits for another traversal
+            return [LogLine(f"edge_traversal refused: {err}", logging.WARNING, often=True)]
+        self._unpaired_meetpoint = None
+        return self._judge(self._localizer, estimate, meetpoint.stamp_ns)
+
+    def _drop_older(self, meetpoint_is_older: bool, apart_s: float) -> LogLine:
+        if meetpoint_is_older:
+            self._unpaired_meetpoint = None
+        else:
+            self._unpaired_traversal = None
+        return LogLine(
+            f"a {'meetpoint' if meetpoint_is_older else 'traversal'} is dropped: the edge_traversal and the meetpoint "
+            f"at its end are stamped {apart_s:.3f} s apart, allowed ~pairing_tolerance_s "
+            f"{self._p.pairing_tolerance_s:g} s",
+            logging.WARNING,
+            often=True,
+        )
+
+    def _judge(self, localizer: AtlasLocalizer, estimate: SearchEstimate, stamp_ns: int) -> List[Decision]:
+        """What follows from what a meetpoint told."""
+        goal = self._goal
+        gives_up = goal is not None and not estimate.done and 0 < goal.max_edges <= estimate.depth
+        if gives_up:
+            estimate = replace(estimate, choice=None)  # nobody is to drive on
+        poses = localizer.poses(estimate, self._p.listed_candidates)
+        status = self._status = SearchStatus(estimate.state, estimate.reason, stamp_ns, estimate, poses)
+        decisions: List[Decision] = [
+            status,
+            LogLine(f"{estimate.depth} edges: {estimate.state}, {estimate.reason}"),
+        ]
+        if goal is not None and not estimate.done:
+            decisions.append(Progress(status))
+        if gives_up:
+            decisions += self._end_goal(f"not found after {estimate.depth} edges: {estimate.reason}")
+            decisions.append(self._show(SearchState.IDLE, f"gave up after {estimate.depth} edges", stamp_ns))
+        elif estimate.choice is not None:
+            decisions.append(Turn(estimate.choice, stamp_ns))
+        if status.map_from_base is not None:
+            decisions += self._count_visits(localizer)
+            if self._p.publish_initial_pose:
+                decisions.append(InitialPose(status.map_from_base, stamp_ns))
+            decisions += self._end_goal(estimate.reason, GoalOutcome.SUCCEEDED)
+        elif estimate.done:
+            decisions += self._end_goal(estimate.reason)
+        return decisions
+
+    def _count_visits(self, localizer: AtlasLocalizer) -> List[Decision]:
+        """What was measured on the path that is confirmed, into the statistics of the atlas and its file."""
+        localizer.count_visits(localizer.atlas.visits)
+        if not self._p.visits_file:
+            return []
+        try:
+            atlas_file.save(localizer.atlas, self._p.visits_file)
+        except OSError as err:
+            text = f"the atlas with its statistics is not saved: {self._p.visits_file}: {err.strerror}"
+            return [LogLine(text, logging.ERROR)]
+        return []
+
+    def _end_goal(self, reason: str, outcome: GoalOutcome = GoalOutcome.ABORTED) -> List[Decision]:
+        """The goal that is on, if one is, ends with what is known now."""
+        if self._goal is None:
+            return []
+        self._goal = None
+        return [GoalEnd(outcome, reason, self._status)]

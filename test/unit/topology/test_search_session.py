@@ -1,0 +1,432 @@
+"""A session of searches: what follows from each event, in which order."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Any, List, Optional, Tuple
+
+import numpy as np
+import pytest
+
+from glass_nav.sensing.scan import Scan
+from glass_nav.topology import search_session
+from glass_nav.topology.atlas import atlas_file, shipped_atlases
+from glass_nav.topology.atlas.atlas import Atlas, AtlasError
+from glass_nav.topology.observations import Meetpoint, Traversal
+from glass_nav.topology.search.search_params import SearchParams
+from glass_nav.topology.search_session import (
+    Decision,
+    Goal,
+    GoalEnd,
+    GoalOutcome,
+    InitialPose,
+    LogLine,
+    Progress,
+    SearchSession,
+    SearchStatus,
+    SessionParams,
+    Turn,
+)
+from glass_nav.vocabulary import SearchState
+from glass_nav.world import map_file
+from glass_nav.world.grid_map import GridMap
+
+MAPS = Path(__file__).parents[3] / "maps"
+DOCUMENT = SearchParams(vote_mode="seed", confirm_edges=0)  # its worked example ends after two edges
+S = 1_000_000_000
+T_0 = 100 * S
+BEARINGS_RAD = np.array([np.pi, 1.0, -1.0])
+
+
+def example() -> Tuple[str, Atlas]:
+    path = shipped_atlases.find("document_example")
+    return str(path), atlas_file.load(path)
+
+
+def glass_office() -> Tuple[str, Atlas]:
+    path = shipped_atlases.find("glass_office")
+    return str(path), atlas_file.load(path)
+
+
+def served(name: str) -> GridMap:
+    return map_file.load(MAPS / name / "map.yaml")
+
+
+def made(read_atlas: search_session.ReadAtlas = example, **fields: Any) -> SearchSession:
+    return SearchSession(read_atlas, SessionParams(**fields), DOCUMENT)
+
+
+def started(read_atlas: search_session.ReadAtlas = example, **fields: Any) -> SearchSession:
+    session = made(read_atlas, **fields)
+    session.start()
+    return session
+
+
+def meetpoint(stamp_ns: int = T_0, scan: Optional[Scan] = None) -> Meetpoint:
+    return Meetpoint(3, 1.5, stamp_ns=stamp_ns, scan=scan)
+
+
+def drive(session: SearchSession, traversal: Traversal, stamp_ns: int) -> List[Decision]:
+    """An edge and the meetpoint at its end."""
+    assert session.edge_traversal(traversal, stamp_ns) == []
+    return session.meetpoint(meetpoint(stamp_ns))
+
+
+def drive_until_confirmed(session: SearchSession) -> List[Decision]:
+    """The worked example of the document; what follows from its last meetpoint."""
+    session.meetpoint(meetpoint())
+    drive(session, Traversal(0, 8.0, 8.0), T_0 + S)
+    return drive(session, Traversal(2, 11.2, 8.0), T_0 + 2 * S)
+
+
+def kinds(decisions: List[Decision]) -> List[type]:
+    return [type(decision) for decision in decisions]
+
+
+def only(decisions: List[Decision], kind: type) -> Any:
+    (found,) = [decision for decision in decisions if isinstance(decision, kind)]
+    return found
+
+
+def states(decisions: List[Decision]) -> List[SearchState]:
+    return [decision.state for decision in decisions if isinstance(decision, SearchStatus)]
+
+
+def texts(decisions: List[Decision]) -> List[str]:
+    return [decision.text for decision in decisions if isinstance(decision, LogLine)]
+
+
+# -- the start
+
+
+def test_the_first_meetpoint_begins_a_search() -> None:
+    session = made()
+    assert session.status.state == SearchState.NO_ATLAS
+    line, status = session.start()
+    assert isinstance(line, LogLine) and line.text.endswith("atlas.json: 4 nodes, 4 edges")
+    assert (status, session.status.state) == (session.status, SearchState.WAITING)
+    assert session.status.reason == "the next meetpoint begins a search: the node has started"
+    decisions = session.meetpoint(meetpoint())
+    assert kinds(decisions) == [SearchStatus, LogLine, Turn]
+    status = session.status
+    assert (status.state, status.stamp_ns, len(status.poses), status.map_from_base) == (
+        SearchState.SEARCHING,
+        T_0,
+        6,
+        None,
+    )
+    assert only(decisions, Turn) == Turn(session.choice, T_0)
+    assert texts(decisions) == [f"0 edges: SEARCHING, {status.reason}"]
+
+
+def test_a_session_can_wait_until_it_is_asked() -> None:
+    session = made(search_at_start=False)
+    assert states(session.start()) == [SearchState.IDLE]
+    assert session.status.reason == "no search was asked for"
+    (line,) = session.meetpoint(meetpoint())
+    assert line == LogLine("meetpoint not used: the search is IDLE", often=True)
+    assert session.choice is None
+
+
+def test_an_atlas_that_cannot_be_read_is_said_at_the_start() -> None:
+    def broken() -> Tuple[str, Atlas]:
+        raise AtlasError("broken.json: no atlas")
+
+    with pytest.raises(AtlasError, match="broken.json: no atlas"):
+        made(broken).start()
+
+
+@pytest.mark.parametrize(
+    "fields, line",
+    [
+        ({"listed_candidates": 0}, "~listed_candidates must be >= 1, got 0"),
+        ({"pairing_tolerance_s": 0.0}, "~pairing_tolerance_s must be finite and > 0, got 0.0"),
+        ({"pairing_tolerance_s": float("inf")}, "~pairing_tolerance_s must be finite and > 0, got inf"),
+        ({"visits_file": "visits.yaml"}, "~visits_file must be a .json or a .npz, got 'visits.yaml'"),
+    ],
+)
+def test_parameters_that_mean_nothing_are_refused(fields: Any, line: str) -> None:
+    with pytest.raises(ValueError) as refused:
+        SessionParams(**fields)
+    assert str(refused.value) == line
+
+
+# -- pairs of reports
+
+
+def test_reports_of_an_edge_come_in_either_order() -> None:
+    session = started()
+    session.meetpoint(meetpoint())
+    assert session.meetpoint(meetpoint(T_0 + S)) == []
+    decisions = session.edge_traversal(Traversal(0, 8.0, 8.0), T_0 + S)
+    assert (session.status.estimate.depth, session.status.stamp_ns) == (1, T_0 + S)
+    assert only(decisions, Turn).stamp_ns == T_0 + S
+    drive(session, Traversal(2, 11.2, 8.0), T_0 + 2 * S)
+    assert session.status.estimate.depth == 2
+
+
+@pytest.mark.parametrize(
+    "meetpoint_s, traversal_s, dropped",
+    [pytest.param(60, 0, "traversal", id="old traversal"), pytest.param(0, 60, "meetpoint", id="old meetpoint")],
+)
+def test_of_two_reports_too_far_apart_the_older_is_dropped(meetpoint_s: int, traversal_s: int, dropped: str) -> None:
+    session = started()
+    session.meetpoint(meetpoint())
+    assert session.meetpoint(meetpoint(T_0 + meetpoint_s * S)) == []
+    (line,) = session.edge_traversal(Traversal(0, 8.0, 8.0), T_0 + traversal_s * S)
+    assert line == LogLine(
+        f"a {dropped} is dropped: the edge_traversal and the meetpoint at its end are stamped 60.000 s apart, allowed "
+        "~pairing_tolerance_s 2 s",
+        logging.WARNING,
+        often=True,
+    )
+    if dropped == "traversal":
+        session.edge_traversal(Traversal(0, 8.0, 8.0), T_0 + meetpoint_s * S)
+    else:
+        session.meetpoint(meetpoint(T_0 + traversal_s * S))
+    assert session.status.estimate.depth == 1  # the other one waited
+
+
+@pytest.mark.parametrize("meetpoint_ns, traversal_ns", [(0, T_0), (T_0, 0), (0, 0), (T_0, T_0 + 2 * S)])
+def test_reports_without_a_stamp_or_within_the_tolerance_belong_together(meetpoint_ns: int, traversal_ns: int) -> None:
+    session = started()
+    session.meetpoint(meetpoint())
+    session.meetpoint(meetpoint(meetpoint_ns))
+    session.edge_traversal(Traversal(0, 8.0, 8.0), traversal_ns)
+    assert session.status.estimate.depth == 1
+
+
+def test_a_turn_that_no_dart_has_is_refused_and_its_meetpoint_waits_for_another() -> None:
+    session = started()
+    session.meetpoint(meetpoint())
+    session.meetpoint(meetpoint(T_0 + S))
+    (line,) = session.edge_traversal(Traversal(3, 8.0, 8.0), T_0 + S)
+    assert line.text == "edge_traversal refused: turn of rank 3: the meetpoint it left has degree 3, allowed 0 to 2"
+    assert (line.level, line.often, session.status.estimate.depth) == (logging.WARNING, True, 0)
+    session.edge_traversal(Traversal(0, 8.0, 8.0), T_0 + S)
+    assert session.status.estimate.depth == 1
+
+
+def test_an_edge_before_the_first_meetpoint_is_not_used() -> None:
+    session = started()
+    assert texts(session.edge_traversal(Traversal(0, 8.0, 8.0), T_0)) == [
+        "edge_traversal not used: the search is WAITING"
+    ]
+    session.meetpoint(meetpoint())
+    assert session.meetpoint(meetpoint(T_0 + S)) == []  # nor kept for later
+
+
+# -- how a search ends
+
+
+def test_a_confirmed_place_is_handed_over_and_counted() -> None:
+    session = started()
+    decisions = drive_until_confirmed(session)
+    assert kinds(decisions) == [SearchStatus, LogLine, InitialPose]
+    status, pose = session.status, only(decisions, InitialPose)
+    assert (status.state, session.choice) == (SearchState.CONFIRMED, None)
+    np.testing.assert_array_equal(pose.map_from_base, status.map_from_base)
+    assert pose.stamp_ns == status.stamp_ns == T_0 + 2 * S
+    assert session.localizer.atlas.visits.node_count.tolist() == [2, 1, 0, 0]
+    assert texts(session.meetpoint(meetpoint())) == ["meetpoint not used: the search is CONFIRMED"]
+
+
+def test_an_initial_pose_can_be_kept_back() -> None:
+    assert kinds(drive_until_confirmed(started(publish_initial_pose=False))) == [SearchStatus, LogLine]
+
+
+def test_the_statistics_of_the_atlas_are_saved(tmp_path: Path) -> None:
+    path = tmp_path / "visits.json"
+    drive_until_confirmed(started(visits_file=str(path)))
+    assert atlas_file.load(path).visits.node_count.tolist() == [2, 1, 0, 0]
+
+
+def test_a_file_that_cannot_be_written_is_said_and_nothing_else_changes(tmp_path: Path) -> None:
+    path = tmp_path / "nowhere" / "visits.json"
+    decisions = drive_until_confirmed(started(visits_file=str(path)))
+    assert kinds(decisions) == [SearchStatus, LogLine, LogLine, InitialPose]
+    line = decisions[2]
+    assert isinstance(line, LogLine) and line.level == logging.ERROR
+    assert line.text == f"the atlas with its statistics is not saved: {path}: No such file or directory"
+
+
+def test_no_more_candidates_are_listed_than_allowed() -> None:
+    session = started(listed_candidates=2)
+    session.meetpoint(meetpoint())
+    assert (len(session.status.estimate.dart), len(session.status.poses)) == (6, 2)
+
+
+# -- goals
+
+
+def test_a_goal_hears_of_progress_and_succeeds_when_the_place_is_confirmed() -> None:
+    session = started(search_at_start=False)
+    assert states(session.goal(Goal())) == [SearchState.WAITING]
+    assert session.status.reason == "the next meetpoint begins a search: asked for by the action"
+    decisions = session.meetpoint(meetpoint())
+    assert kinds(decisions) == [SearchStatus, LogLine, Progress, Turn]
+    assert only(decisions, Progress).status is session.status
+    drive(session, Traversal(0, 8.0, 8.0), T_0 + S)
+    decisions = drive(session, Traversal(2, 11.2, 8.0), T_0 + 2 * S)
+    assert kinds(decisions) == [SearchStatus, LogLine, InitialPose, GoalEnd]
+    assert only(decisions, GoalEnd) == GoalEnd(GoalOutcome.SUCCEEDED, session.status.reason, session.status)
+    assert session.preempt() == []  # it is over
+
+
+def test_a_goal_is_aborted_when_the_robot_is_lost() -> None:
+    session = started()
+    session.goal(Goal())
+    decisions = session.meetpoint(Meetpoint(4, 3.0, stamp_ns=T_0))
+    assert kinds(decisions) == [SearchStatus, LogLine, GoalEnd]
+    end = only(decisions, GoalEnd)
+    assert (end.outcome, end.reason, end.status.state) == (
+        GoalOutcome.ABORTED,
+        "no node of the atlas matches what was seen",
+        SearchState.LOST,
+    )
+    assert end.status.map_from_base is None
+
+
+def test_a_goal_gives_up_after_so_many_edges_and_nobody_is_to_drive_on() -> None:
+    session = started()
+    session.goal(Goal(max_edges=1))
+    assert Turn in kinds(session.meetpoint(meetpoint()))
+    decisions = drive(session, Traversal(0, 8.0, 8.0), T_0 + S)
+    assert kinds(decisions) == [SearchStatus, LogLine, Progress, GoalEnd, SearchStatus]
+    assert states(decisions) == [SearchState.SEARCHING, SearchState.IDLE]
+    end = only(decisions, GoalEnd)
+    assert (end.outcome, end.reason) == (GoalOutcome.ABORTED, f"not found after 1 edges: {end.status.reason}")
+    assert end.status.estimate.choice is None
+    assert (session.status.reason, session.status.stamp_ns) == ("gave up after 1 edges", T_0 + S)
+
+
+def test_the_last_edge_that_a_goal_allows_may_confirm_the_place() -> None:
+    session = started()
+    session.goal(Goal(max_edges=2))
+    assert only(drive_until_confirmed(session), GoalEnd).outcome == GoalOutcome.SUCCEEDED
+
+
+def test_a_goal_may_begin_at_the_last_meetpoint() -> None:
+    session = started(search_at_start=False)
+    (end,) = session.goal(Goal(here=True))
+    assert (end.outcome, end.reason) == (
+        GoalOutcome.ABORTED,
+        "no meetpoint was reported yet, where a search could begin",
+    )
+    session.meetpoint(meetpoint())  # not used, but known
+    decisions = session.goal(Goal(here=True))
+    assert kinds(decisions) == [SearchStatus, SearchStatus, LogLine, Progress, Turn]
+    assert states(decisions) == [SearchState.WAITING, SearchState.SEARCHING]
+
+
+def test_a_preempted_search_is_over() -> None:
+    session = started()
+    assert session.preempt() == []  # nobody waits
+    session.goal(Goal())
+    session.meetpoint(meetpoint())
+    status, end = session.preempt()
+    assert status == session.status and session.status.state == SearchState.IDLE
+    assert end == GoalEnd(GoalOutcome.PREEMPTED, "the search was preempted", session.status)
+    assert texts(session.meetpoint(meetpoint())) == ["meetpoint not used: the search is IDLE"]
+
+
+# -- a new beginning
+
+
+def test_a_search_that_is_forgotten_begins_anew_with_the_next_meetpoint() -> None:
+    session = started()
+    for begin, why in (
+        (session.restart, "restarted by service"),
+        (session.reload_atlas, "the atlas was reloaded"),
+        (lambda: session.time_jumped_back("time jumped back by 3.250 s"), "time jumped back by 3.250 s"),
+    ):
+        session.meetpoint(meetpoint())
+        session.meetpoint(meetpoint(T_0 + S))  # waits for its edge, in vain
+        assert states(begin()) == [SearchState.WAITING]
+        assert session.status.reason == f"the next meetpoint begins a search: {why}"
+        assert session.edge_traversal(Traversal(0, 8.0, 8.0), T_0 + S) != []
+
+
+def test_an_atlas_that_cannot_be_used_leaves_the_old_one() -> None:
+    found = [example]
+    session = started(lambda: found[0]())
+    before = session.localizer
+
+    def broken() -> Tuple[str, Atlas]:
+        raise AtlasError("broken.json: no atlas")
+
+    found[0] = broken
+    session.meetpoint(meetpoint())
+    with pytest.raises(AtlasError, match="broken.json: no atlas"):
+        session.reload_atlas()
+    assert session.localizer is before and session.status.state == SearchState.SEARCHING
+
+
+# -- maps
+
+
+def test_an_atlas_of_another_map_is_refused_until_its_map_comes() -> None:
+    session = started(glass_office, judge_by_scans=False)
+    session.goal(Goal())
+    decisions = session.map_served(served("glass_atrium"), "that of topic /map")
+    assert kinds(decisions) == [LogLine, SearchStatus, GoalEnd]
+    (line,) = texts(decisions)
+    assert line.startswith("atlas refused: was made from another map than that of topic /map: ")
+    assert session.status.state == SearchState.NO_ATLAS and session.localizer is None
+    assert session.status.reason.startswith("the atlas was made from another map than that of topic /map: ")
+    assert only(decisions, GoalEnd).reason == session.status.reason
+
+    assert session.time_jumped_back("time jumped back by 9.000 s") == []
+    assert texts(session.meetpoint(meetpoint())) == ["meetpoint not used: the search is NO_ATLAS"]
+    with pytest.raises(ValueError, match="the atlas was made from another map"):
+        session.restart()
+    with pytest.raises(AtlasError, match=r"glass_office/atlas\.\w+: was made from another map than that of topic"):
+        session.reload_atlas()
+    assert only(session.goal(Goal()), GoalEnd).outcome == GoalOutcome.ABORTED
+    assert states(session.map_served(served("glass_atrium"), "that of topic /map")) == [SearchState.NO_ATLAS]
+
+    decisions = session.map_served(served("glass_office"), "that of topic /map")
+    assert kinds(decisions) == [LogLine, SearchStatus]
+    assert session.status.reason == "the next meetpoint begins a search: there is another map"
+    assert session.map_served(served("glass_office"), "that of topic /map") == []
+    assert states(session.reload_atlas()) == [SearchState.WAITING]
+
+
+def test_a_map_need_not_be_that_of_the_atlas_where_nobody_checks() -> None:
+    session = started(glass_office, check_map=False, judge_by_scans=False)
+    assert session.map_served(served("glass_atrium"), "that of topic /map") == []
+    assert session.status.state == SearchState.WAITING and not session.uses_scans
+
+
+class _Room:
+    """A map whose scans fit nowhere."""
+
+    has_map = False
+
+    def take(self, grid_map: GridMap) -> None:
+        self.has_map = True
+
+    def shares(self, scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
+        return np.full(len(map_from_base), 0.1)
+
+    def fitted(self, scan: Scan, map_from_base: np.ndarray, most_m: float, most_rad: float) -> Any:
+        return map_from_base, self.shares(scan, map_from_base)
+
+    def places(self, scan: Scan, most: int) -> np.ndarray:
+        return np.zeros((0, 3))
+
+
+def test_scans_judge_candidates_once_there_is_a_map(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(search_session, "ServedExplanation", _Room)
+    session = SearchSession(example, SessionParams(check_map=False), SearchParams(searches=1))
+    session.start()
+    scan = Scan(T_0, np.ones(3), np.zeros(3), 0.1, 10.0, np.zeros(3))
+    assert not session.uses_scans
+    session.meetpoint(meetpoint(scan=scan))
+    assert len(session.status.estimate.dart) == 6  # nothing to judge by: all that fit the meetpoint
+    session.map_served(served("glass_atrium"), "that of topic /map")
+    assert session.uses_scans
+    session.restart()
+    session.meetpoint(meetpoint(scan=scan))
+    assert len(session.status.estimate.dart) == 0
