@@ -31,7 +31,6 @@ from std_srvs.srv import Trigger
 from glass_nav import params
 from glass_nav.evaluation.metrics import pose_errors
 from glass_nav.evaluation.plots import wake_up_picture
-from glass_nav.evaluation.plots.run_pictures import MapImage
 from glass_nav.evaluation.plots.wake_up_picture import Depth, WakeUpStory
 from glass_nav.geometry import angles
 from glass_nav.geometry.trajectory import Trajectory
@@ -415,7 +414,7 @@ class WakeupDemo:
         path.parent.mkdir(parents=True, exist_ok=True)
         wake_up_picture.draw(
             path,
-            MapImage(grid.occupancy, grid.resolution_m, grid.map_from_grid),
+            grid,
             story,
             f"{self._atlas.name}: {outcome} behind {max(len(self._depths) - 1, 0)} edges",
         )
