@@ -165,7 +165,7 @@ def test_the_schema_takes_what_the_loader_takes_and_refuses_what_it_can() -> Non
 
 @pytest.mark.parametrize(
     "text, line",
-    [("{", "is not JSON: Expecting"), ("[]", "must be an object with format, version"), ("\x00", "is no JSON")],
+    [("{", "is not JSON: Expecting"), ("[]", "must be an object with format, version"), ("\x00", "is not JSON")],
 )
 def test_what_is_no_json_is_refused(text: str, line: str, tmp_path: Path) -> None:
     path = tmp_path / "atlas.json"
