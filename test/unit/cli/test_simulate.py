@@ -64,7 +64,7 @@ def test_a_lidar_that_turns_makes_a_bag_that_says_so(run, tmp_path):
     code, _, err = run("--turn-time", 0.05, "--seed", 2)
     assert code == 0, err
     recording = open_log(tmp_path / "run.bag")
-    assert "the lidar turns for 50 ms: scans are straightened by odometry" in recording.notes
+    assert "a sweep of the lidar takes 50 ms: scans are deskewed by odometry" in recording.notes
     entries = list(recording)
     assert len(entries) > 20 and all(entry.scan.origins_m is not None for entry in entries[1:])
     stamps_ns = [entry.scan.stamp_ns for entry in entries]
@@ -77,8 +77,8 @@ def test_a_bag_and_its_map_replay_as_they_are(run, tmp_path):
     assert code == 0, err
     assert {path.name for path in tmp_path.iterdir()} == {"hall", "run.bag", "run.map.yaml", "run.map.png"}
     said = re.fullmatch(
-        r"(\d+) scans, 2\.\d m, (\d+\.\d) s \(\d+ times real time\); beams: uncertain \d+\.\d %, "
-        r"diffuse \d+\.\d %, specular \d+\.\d %, first penetration \d+\.\d %, second penetration "
+        r"(\d+) scans, 2\.\d m, (\d+\.\d) s \(\d+ times real time\); beams: first surface \d+\.\d %, "
+        r"mirrored \d+\.\d %, behind one pane \d+\.\d %, behind two panes \d+\.\d %, uncertain "
         r"\d+\.\d %; written to run.bag and run.map.yaml\n",
         out,
     )
