@@ -1,4 +1,4 @@
-"""Scan, references -> cases, by vote: what did each beam meet?
+"""Scan, expected -> cases, by vote: what did each beam meet?
 
 Seed document glass_localization.txt, sec. III.A, eq. (1) and steps 3 and 4: each preliminary sample
 votes for the reference nearest to the measured range, and the case with the highest vote wins. What the
@@ -32,7 +32,7 @@ _UNSEEN_SIDE = 0.002  # chance of a wall to be met from a side that no mapper sa
 _MIN_SEEN_THROUGH = 0.05  # a cell may hold a post and the edge of the pane beside it
 _TEMPER = 0.2  # of a sample's evidence: beams err together, and the best sample shall not vote alone
 _REACH, _ROUNDS = 2, 3  # of the pull between neighbouring beams
-_BY_SAMPLE = ("range_m", "cos_incidence", "thickness_m")  # fields of references that tell of all samples
+_BY_SAMPLE = ("range_m", "cos_incidence", "thickness_m")  # fields of expected that tell of all samples
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class CaseVote:
 
 def classify(
     measured_m: np.ndarray,
-    references: ExpectedRanges,
+    expected: ExpectedRanges,
     residuals: RangeResiduals,
     vote: CaseVote,
     glass: np.ndarray,
@@ -93,7 +93,7 @@ def classify(
 
     Args:
         measured_m: (B,) ranges by REP 117; beams without an answer are uncertain.
-        references: of the preliminary samples; sample 0 is the pose that expected_m is told for, and for a beam that
+        expected: of the preliminary samples; sample 0 is the pose that expected_m is told for, and for a beam that
             passes an edge there, the sample that explains it best.
         residuals: where in a wall beams end, and how widely.
         vote: mode, gate and priors.
@@ -103,18 +103,18 @@ def classify(
     """
     answered = np.isfinite(measured_m)
     if vote.vote_mode == "paper":
-        share = _paper_votes(measured_m, references, residuals, vote)  # (5, B), column sums 1
+        share = _paper_votes(measured_m, expected, residuals, vote)  # (5, B), column sums 1
     else:
-        prior = _priors(_inside_walls(_of_sample_0(references), residuals), glass, max_range_m, vote)
-        share = _pulled(_soft_votes(measured_m, references, residuals, vote, prior), answered, vote.neighbour_pull)
+        prior = _priors(_inside_walls(_of_sample_0(expected), residuals), glass, max_range_m, vote)
+        share = _pulled(_soft_votes(measured_m, expected, residuals, vote, prior), answered, vote.neighbour_pull)
     share[:, ~answered] = np.array([1.0, 0.0, 0.0, 0.0, 0.0])[:, None]
     won, beam = _winner(share), np.arange(len(measured_m))
     case = np.where(answered & (share[won, beam] >= vote.case_min_share), won, BeamCase.UNCERTAIN)
-    offered_m, across_m = (values[0] for values in _offered(case, measured_m, _of_sample_0(references), residuals))
+    offered_m, across_m = (values[0] for values in _offered(case, measured_m, _of_sample_0(expected), residuals))
     elsewhere = np.flatnonzero((case > 0) & ~(across_m <= gate_m(residuals, vote)))
     if len(elsewhere):
         offered_there_m, across_there_m = _offered(
-            case[elsewhere], measured_m[elsewhere], _of_beams(references, elsewhere), residuals
+            case[elsewhere], measured_m[elsewhere], _of_beams(expected, elsewhere), residuals
         )
         nearest = np.argmin(across_there_m, axis=0), np.arange(len(elsewhere))
         offered_m[elsewhere], across_m[elsewhere] = offered_there_m[nearest], across_there_m[nearest]
@@ -122,35 +122,35 @@ def classify(
 
 
 def as_seen_from(
-    cases: BeamCases, measured_m: np.ndarray, references: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote
+    cases: BeamCases, measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote
 ) -> BeamCases:
-    """The same cases from a pose nearby, with the ranges expected at sample 0 of its references.
+    """The same cases from a pose nearby, with the ranges expected at sample 0 of its expected.
 
     A beam that passes an edge from there keeps its range; one that ends farther from its surface is uncertain.
     """
-    offered_m, across_m = _offered(cases.case, measured_m, _of_sample_0(references), residuals)
+    offered_m, across_m = _offered(cases.case, measured_m, _of_sample_0(expected), residuals)
     other = np.abs(np.nan_to_num(offered_m[0] - cases.expected_m)) > _OTHER_SURFACE_M  # also where there is none
     fits = across_m[0] <= _TOLD_GATES * gate_m(residuals, vote)
     return _told(cases.case, cases.weight, measured_m, np.where(fits, offered_m[0], cases.expected_m), fits | other)
 
 
-def _of_sample_0(references: ExpectedRanges) -> ExpectedRanges:
-    return replace(references, **{name: getattr(references, name)[:, :1] for name in _BY_SAMPLE})
+def _of_sample_0(expected: ExpectedRanges) -> ExpectedRanges:
+    return replace(expected, **{name: getattr(expected, name)[:, :1] for name in _BY_SAMPLE})
 
 
-def _of_beams(references: ExpectedRanges, beams: np.ndarray) -> ExpectedRanges:
-    return replace(references, **{name: getattr(references, name)[:, :, beams] for name in _BY_SAMPLE})
+def _of_beams(expected: ExpectedRanges, beams: np.ndarray) -> ExpectedRanges:
+    return replace(expected, **{name: getattr(expected, name)[:, :, beams] for name in _BY_SAMPLE})
 
 
 def _offered(
-    case: np.ndarray, measured_m: np.ndarray, references: ExpectedRanges, residuals: RangeResiduals
+    case: np.ndarray, measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals
 ) -> Tuple[np.ndarray, np.ndarray]:
     """(N, B) ranges that the samples offer for the case of each beam, and how far across the surface it ended."""
-    references = _inside_walls(references, residuals)
+    expected = _inside_walls(expected, residuals)
     row, beam = np.maximum(case.astype(int) - 1, 0), np.arange(len(case))
-    offered_m = references.range_m[row, :, beam].T
+    offered_m = expected.range_m[row, :, beam].T
     with np.errstate(invalid="ignore"):
-        across_m = np.abs(measured_m - offered_m) * references.cos_incidence[row, :, beam].T
+        across_m = np.abs(measured_m - offered_m) * expected.cos_incidence[row, :, beam].T
     return offered_m, np.where(np.isnan(across_m), np.inf, across_m)
 
 
@@ -168,13 +168,13 @@ def _told(
     )
 
 
-def _inside_walls(references: ExpectedRanges, residuals: RangeResiduals) -> ExpectedRanges:
-    """References where beams end, not at the near boundary of the wall's cells."""
-    depth = residuals.depth_share * references.thickness_m
-    shift = depth / np.maximum(references.cos_incidence, MIN_COS)
+def _inside_walls(expected: ExpectedRanges, residuals: RangeResiduals) -> ExpectedRanges:
+    """Expected ranges where beams end, not at the near boundary of the wall's cells."""
+    depth = residuals.depth_share * expected.thickness_m
+    shift = depth / np.maximum(expected.cos_incidence, MIN_COS)
     mirror = BeamCase.DIFFUSE - 1
-    shift[BeamCase.SPECULAR - 1] += 2.0 * depth[mirror] * references.cos_incidence[mirror]  # it lies so much deeper
-    return replace(references, range_m=references.range_m + shift)
+    shift[BeamCase.SPECULAR - 1] += 2.0 * depth[mirror] * expected.cos_incidence[mirror]  # it lies so much deeper
+    return replace(expected, range_m=expected.range_m + shift)
 
 
 def _winner(share: np.ndarray) -> np.ndarray:
@@ -184,12 +184,12 @@ def _winner(share: np.ndarray) -> np.ndarray:
 
 
 def _paper_votes(
-    measured_m: np.ndarray, references: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote
+    measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote
 ) -> np.ndarray:
     """(5, B) share of the samples whose nearest reference is that case; equal votes."""
-    references = _inside_walls(references, residuals)
+    expected = _inside_walls(expected, residuals)
     with np.errstate(invalid="ignore"):
-        off = np.abs(measured_m - references.range_m)  # (4, N, B)
+        off = np.abs(measured_m - expected.range_m)  # (4, N, B)
     off[np.isnan(off)] = np.inf
     order = np.array(_TIE_ORDER) - 1
     nearest = order[np.argmin(off[order], axis=0)]  # first of equals
@@ -199,7 +199,7 @@ def _paper_votes(
 
 
 def _soft_votes(
-    measured_m: np.ndarray, references: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote, prior: np.ndarray
+    measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote, prior: np.ndarray
 ) -> np.ndarray:
     """(5, B) posterior over the cases; samples count by how well each explains the scan.
 
@@ -212,9 +212,9 @@ def _soft_votes(
     temper = _TEMPER / np.sqrt(max(np.count_nonzero(np.isfinite(measured_m)), 1))
     return _beam_vote.case_votes(
         measured_m,
-        references.range_m,
-        references.cos_incidence,
-        references.thickness_m,
+        expected.range_m,
+        expected.cos_incidence,
+        expected.thickness_m,
         prior,
         vote.prior_uncertain,
         residuals.depth_share,
@@ -235,40 +235,40 @@ def gate_m(residuals: RangeResiduals, vote: CaseVote) -> float:
     return max(vote.case_gate_m, _GATE_SIGMAS * residuals.sigma_m)
 
 
-def _priors(references: ExpectedRanges, glass: np.ndarray, max_range_m: float, vote: CaseVote) -> np.ndarray:
+def _priors(expected: ExpectedRanges, glass: np.ndarray, max_range_m: float, vote: CaseVote) -> np.ndarray:
     """(5, B) chance of cases 1 to 4, and last to end at the second surface where the first is gone (case 0).
 
     From how glassy the walls proved and how a pane answers at that incidence.
     """
-    incidence = references.pane_incidence[0]
+    incidence = expected.pane_incidence[0]
     (first, second), (there, _) = glass
     first = np.clip(first, _MIN_SEEN_THROUGH, 1.0)
-    passes = first * there * (1.0 - glass_return_model.least(incidence))
-    mirrored = passes * _chance_of_a_mirror(references, max_range_m, vote.mirror_gain)
+    passes = first * there * (1.0 - glass_return_model.min_share(incidence))
+    mirrored = passes * _chance_of_a_mirror(expected, max_range_m, vote.mirror_gain)
     behind = (passes - mirrored) * (1.0 - vote.prior_uncertain_behind)
-    passes_again = second * (1.0 - glass_return_model.least(np.full(len(first), np.nan)))
+    passes_again = second * (1.0 - glass_return_model.min_share(np.full(len(first), np.nan)))
     gone = first * (1.0 - there)
     prior = np.stack([1.0 - passes - gone, mirrored, behind * (1.0 - passes_again), behind * passes_again, gone])
-    prior[1:4] *= np.where(references.seen_side[1:], 1.0, _UNSEEN_SIDE)
+    prior[1:4] *= np.where(expected.seen_side[1:], 1.0, _UNSEEN_SIDE)
     return (1.0 - vote.prior_uncertain) * prior
 
 
-def _chance_of_a_mirror(references: ExpectedRanges, max_range_m: float, gain: float) -> np.ndarray:
+def _chance_of_a_mirror(expected: ExpectedRanges, max_range_m: float, gain: float) -> np.ndarray:
     """(B,) chance that a mirrored echo is the strongest one, at sample 0; 0 where nothing can mirror.
 
     Echo powers as in the lidar equation for diffuse targets: T^2 / d3^2 behind the pane, R^2 / d2^2 by way of the
     mirror (Fresnel, unpolarised, two surfaces); one must be above what the lidar still sees of a dark wall at its
     largest range. Reflectances of walls differ by factors: the chance rises over one decade.
     """
-    incidence = np.nan_to_num(references.pane_incidence[0])
+    incidence = np.nan_to_num(expected.pane_incidence[0])
     inside = np.arcsin(np.sin(incidence) / _PANE_INDEX)
     parallel, across = np.cos(incidence), np.cos(inside)
     r_s = ((parallel - _PANE_INDEX * across) / (parallel + _PANE_INDEX * across)) ** 2
     r_p = ((across - _PANE_INDEX * parallel) / (across + _PANE_INDEX * parallel)) ** 2
     surface = 0.5 * (r_s + r_p)
     reflected = np.minimum(gain * 2.0 * surface / (1.0 + surface), 0.9)
-    behind_m = references.range_m[BeamCase.FIRST_PENETRATION - 1, 0]
-    mirrored_m = references.range_m[BeamCase.SPECULAR - 1, 0]
+    behind_m = expected.range_m[BeamCase.FIRST_PENETRATION - 1, 0]
+    mirrored_m = expected.range_m[BeamCase.SPECULAR - 1, 0]
     with np.errstate(invalid="ignore", divide="ignore"):
         wins = (reflected * behind_m / ((1.0 - reflected) * mirrored_m)) ** 2
         seen = (reflected * max_range_m / mirrored_m) ** 2 * _WALL_OVER_DARK

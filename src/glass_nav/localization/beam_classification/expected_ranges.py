@@ -51,7 +51,7 @@ def of(
     min_linearity: float,
     behind_m: float = np.inf,
 ) -> ExpectedRanges:
-    """References of every beam of the scan from every sample.
+    """Expected ranges of every beam of the scan from every sample.
 
     Args:
         caster: of the map.
@@ -115,7 +115,7 @@ def _miss_corners(
     caster: RayCaster, min_linearity: float, range_m: np.ndarray, cos: np.ndarray, cell: np.ndarray
 ) -> None:
     """Let beams pass first and second surfaces without a normal: of each sample every other beam, for each beam every
-    other sample but the first, which is the predicted pose itself. Works on references (4, N, B) in place.
+    other sample but the first, which is the predicted pose itself. Works on expected (4, N, B) in place.
     """
     samples, beams = cell.shape[1:]
     missed = (np.arange(samples)[:, None] + np.arange(beams)) % 2 == 1
@@ -128,7 +128,7 @@ def _miss_corners(
 
 
 def _miss(order: Tuple[int, ...], at: np.ndarray, range_m: np.ndarray, cos: np.ndarray, cell: np.ndarray) -> None:
-    """Take a surface out of the references (4, N, B) at flat places (N, B); what is behind it moves up."""
+    """Take a surface out of the expected (4, N, B) at flat places (N, B); what is behind it moves up."""
     for values, nothing in ((range_m, np.inf), (cos, 1.0), (cell, -1)):
         flat = values.reshape(len(values), -1)
         for to, source in zip(order, order[1:]):

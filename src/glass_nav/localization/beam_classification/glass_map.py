@@ -22,12 +22,12 @@ from glass_nav.world.grid_map import UNKNOWN, GridMap
 _MIN_COS = 0.3  # a wall seen flatter than that is passed or met by chance
 _BEHIND_M = 0.3  # a beam that goes on for so long has passed
 _ENDED_SIGMAS = 2.5
-_GONE_ANSWERS = 0.06  # by chance; as many as a pane far from head on, which therefore proves nothing
+_GONE_RETURNS = 0.06  # by chance; as many as a pane far from head on, which therefore proves nothing
 _THERE = 0.95  # chance of what is seen through to be glass, before it answered or failed to
 
 
 def crossings(
-    measured_m: np.ndarray, references: ExpectedRanges, residuals: RangeResiduals
+    measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals
 ) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What a scan says about walls: cell, incidence and passed of GlassMap.learn().
 
@@ -36,17 +36,17 @@ def crossings(
 
     Args:
         measured_m: (B,) ranges by REP 117.
-        references: of preliminary samples around a pose that is believed.
+        expected: of preliminary samples around a pose that is believed.
         residuals: where in a wall beams end, and how widely.
     """
-    first_m, cos, cell = references.range_m[0], references.cos_incidence[0], references.cell[0, 0]
+    first_m, cos, cell = expected.range_m[0], expected.cos_incidence[0], expected.cell[0, 0]
     nearest, farthest = first_m.min(axis=0), first_m.max(axis=0)  # (B,)
-    depth = residuals.depth_share * references.thickness_m[0, 0]
+    depth = residuals.depth_share * expected.thickness_m[0, 0]
     with np.errstate(invalid="ignore"):
         across = np.abs((measured_m - first_m[0]) * cos[0] - depth)
-        passed = measured_m > farthest + (references.thickness_m[0, 0] + depth) / cos[0] + _BEHIND_M
+        passed = measured_m > farthest + (expected.thickness_m[0, 0] + depth) / cos[0] + _BEHIND_M
         ended = (across <= _ENDED_SIGMAS * residuals.sigma_m) & (farthest - nearest < _BEHIND_M / cos[0])
-    incidence = references.pane_incidence[0]
+    incidence = expected.pane_incidence[0]
     clear = (cell >= 0) & (cos[0] >= _MIN_COS) & np.isfinite(measured_m) & np.isfinite(farthest) & (passed | ended)
     return cell[clear], incidence[clear], passed[clear]
 
@@ -140,10 +140,10 @@ class GlassMap:
     def _says(self, incidence_rad: np.ndarray, passed: np.ndarray) -> "Tuple[np.ndarray, np.ndarray]":
         """(B,) log odds of glass against wall, and against gone. What lidar it is is not known: each may be."""
         leak = self._evidence.glass_wall_leak
-        least, most = glass_return_model.least(incidence_rad), glass_return_model.most(incidence_rad)
+        least, most = glass_return_model.min_share(incidence_rad), glass_return_model.max_share(incidence_rad)
         return (
             np.where(passed, np.log((1.0 - least) / leak), np.log(most / (1.0 - leak))),
-            np.where(passed, np.log((1.0 - least) / (1.0 - _GONE_ANSWERS)), np.log(most / _GONE_ANSWERS)),
+            np.where(passed, np.log((1.0 - least) / (1.0 - _GONE_RETURNS)), np.log(most / _GONE_RETURNS)),
         )
 
     def _bordered(self, cell: np.ndarray) -> np.ndarray:

@@ -32,7 +32,7 @@ class SurfaceScan:
 def of(
     ranges_m: np.ndarray,
     case: np.ndarray,
-    references: ExpectedRanges,
+    expected: ExpectedRanges,
     glass: np.ndarray,
     gate_m: np.ndarray,
     max_range_m: float,
@@ -47,7 +47,7 @@ def of(
     Args:
         ranges_m: (B,) as measured, REP 117.
         case: (B,) what each beam met.
-        references: of the pose, its sample 0.
+        expected: of the pose, its sample 0.
         glass: (2, B) chances of the first surface to be seen through, and if so to be there.
         gate_m: (B,) along the beam; what is measured within it of the first surface is that surface.
         max_range_m: at which the lidar still sees a dark wall, face on.
@@ -56,12 +56,12 @@ def of(
     if not trusted:
         return SurfaceScan(ranges_m, np.zeros(len(ranges_m), bool), False)
     seen_through, there = glass
-    first_m = references.line_m[0]
-    beside, within = _walls_beside(references)
+    first_m = expected.line_m[0]
+    beside, within = _walls_beside(expected)
     with np.errstate(invalid="ignore"):
         behind = np.isfinite(first_m) & (ranges_m > first_m + gate_m)  # also without an answer
     explained = np.isin(case, (BeamCase.SPECULAR, BeamCase.FIRST_PENETRATION, BeamCase.SECOND_PENETRATION))
-    lost = np.isposinf(ranges_m) & _would_answer(references, max_range_m)
+    lost = np.isposinf(ranges_m) & _would_answer(expected, max_range_m)
     silent = _UNANSWERED_BY_GLASS * seen_through
     gone_through = silent > _SURE * (silent + _UNANSWERED_BY_WALLS * (1.0 - seen_through))
     known = seen_through * there > _SURE
@@ -72,24 +72,24 @@ def of(
     return SurfaceScan(np.where(cut, first_m, ranges_m), cut, True)
 
 
-def _walls_beside(references: ExpectedRanges) -> "Tuple[np.ndarray, np.ndarray]":
+def _walls_beside(expected: ExpectedRanges) -> "Tuple[np.ndarray, np.ndarray]":
     """(B,) bool each: a beam beside it, and both of them, meet the same straight wall first.
 
     Where both do, no edge is near that a beam could have missed the wall at.
     """
-    first_m = references.line_m[0]
+    first_m = expected.line_m[0]
     with np.errstate(invalid="ignore"):
-        apart_m = np.abs(np.diff(first_m * references.cos_incidence[0, 0]))  # as distances from the lidar
-        turned_rad = np.abs(np.diff(references.axis_rad[0]))
+        apart_m = np.abs(np.diff(first_m * expected.cos_incidence[0, 0]))  # as distances from the lidar
+        turned_rad = np.abs(np.diff(expected.axis_rad[0]))
         same = (apart_m < _SAME_WALL_M) & (np.minimum(turned_rad, np.pi - turned_rad) < _SAME_WALL_RAD)
     before, after = np.append(False, same), np.append(same, False)
     return before | after, before & after
 
 
-def _would_answer(references: ExpectedRanges, max_range_m: float) -> np.ndarray:
+def _would_answer(expected: ExpectedRanges, max_range_m: float) -> np.ndarray:
     """(B,) bool: a wall instead of the first surface would be bright enough: power falls with cosine and distance."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        return _DARK_TO_DIM * references.cos_incidence[0, 0] > (references.line_m[0] / max_range_m) ** 2
+        return _DARK_TO_DIM * expected.cos_incidence[0, 0] > (expected.line_m[0] / max_range_m) ** 2
 
 
 def _has_beside(beams: np.ndarray) -> np.ndarray:

@@ -52,7 +52,7 @@ class Judgement:
 
     state: LocalizationState
     reason: str  # in one sentence
-    reliability: float  # chance that the pose is right, 0..1
+    confidence: float  # chance that the pose is right, 0..1
     places: int = 1  # that are possible while the pose is looked for; 0: no scan has told anything yet
 
 
@@ -65,17 +65,17 @@ class PoseQuality:
         self._limits = limits
         self._candidates: Optional[Candidates] = None
         self._verdict: Optional[Verdict] = None
-        self._used_share = float("nan")
+        self._inlier_ratio = float("nan")
 
     def limit_by(self, limits: QualityLimits) -> None:
         """Other limits from now on; what was seen stays."""
         self._limits = limits
 
-    def observe(self, used_share: float) -> None:
+    def observe(self, inlier_ratio: float) -> None:
         """Take in one update; NaN when no beam answered, which says nothing."""
-        if np.isfinite(used_share):
-            past = used_share if np.isnan(self._used_share) else self._used_share
-            self._used_share = self._MEMORY * past + (1.0 - self._MEMORY) * used_share
+        if np.isfinite(inlier_ratio):
+            past = inlier_ratio if np.isnan(self._inlier_ratio) else self._inlier_ratio
+            self._inlier_ratio = self._MEMORY * past + (1.0 - self._MEMORY) * inlier_ratio
 
     def seek(self, candidates: Candidates) -> None:
         """The pose is being looked for; these places are possible."""
@@ -107,27 +107,27 @@ class PoseQuality:
             f"{best.share:.0%} of the weight in one place, sigma {position_sigma_m:.2f} m, "
             f"{np.degrees(heading_sigma_rad):.1f} deg"
         )
-        if np.isnan(self._used_share):
+        if np.isnan(self._inlier_ratio):
             return Judgement(LocalizationState.UNCERTAIN, f"no scan has been used yet; {spread}", 0.0)
-        explained = f"the map explains {self._used_share:.0%} of the answering beams"
-        reliability = _reliability(self._used_share, self._verdict, best)
+        explained = f"the map explains {self._inlier_ratio:.0%} of the answering beams"
+        confidence = _confidence(self._inlier_ratio, self._verdict, best)
         elsewhere = _elsewhere(self._verdict)
         if elsewhere is not None and self._verdict is not None and self._verdict.behind > _LOST_BEHIND:
-            return Judgement(LocalizationState.LOST, f"{elsewhere}; {explained}", reliability)
-        if self._used_share < limits.lost_used_share:
-            return Judgement(LocalizationState.LOST, explained, reliability)
+            return Judgement(LocalizationState.LOST, f"{elsewhere}; {explained}", confidence)
+        if self._inlier_ratio < limits.lost_used_share:
+            return Judgement(LocalizationState.LOST, explained, confidence)
         if elsewhere is not None:
-            return Judgement(LocalizationState.UNCERTAIN, f"{elsewhere}; {explained}; {spread}", reliability)
-        if wide or self._used_share < limits.uncertain_used_share:
-            return Judgement(LocalizationState.UNCERTAIN, f"{explained}; {spread}", reliability)
+            return Judgement(LocalizationState.UNCERTAIN, f"{elsewhere}; {explained}; {spread}", confidence)
+        if wide or self._inlier_ratio < limits.uncertain_used_share:
+            return Judgement(LocalizationState.UNCERTAIN, f"{explained}; {spread}", confidence)
         doubted = self._verdict is not None and self._verdict.doubted
-        if doubted and reliability < limits.localized_min_reliability:
+        if doubted and confidence < limits.localized_min_reliability:
             return Judgement(
                 LocalizationState.UNCERTAIN,
-                f"all signs together make it right by {reliability:.0%} only; {explained}; {spread}",
-                reliability,
+                f"all signs together make it right by {confidence:.0%} only; {explained}; {spread}",
+                confidence,
             )
-        return Judgement(LocalizationState.LOCALIZED, f"{explained}; {spread}", reliability)
+        return Judgement(LocalizationState.LOCALIZED, f"{explained}; {spread}", confidence)
 
 
 def _possible(candidates: Candidates) -> int:
@@ -160,7 +160,7 @@ def _elsewhere(verdict: Optional[Verdict]) -> Optional[str]:
     return None
 
 
-def _reliability(used_share: float, verdict: Optional[Verdict], best: PoseEstimate) -> float:
+def _confidence(inlier_ratio: float, verdict: Optional[Verdict], best: PoseEstimate) -> float:
     """Chance that the pose is right.
 
     Logistic regression over 5500 poses of five real logs and five simulated buildings (drives as those of
@@ -168,7 +168,7 @@ def _reliability(used_share: float, verdict: Optional[Verdict], best: PoseEstima
     the constant from 4400 poses of all tracks (seed 200).
     """
     sigma_m = float(np.clip(np.sqrt(np.trace(best.covariance[:2, :2])), 0.005, 2.0))
-    logit = -2.1 - 6.8 * (1.0 - used_share) - 1.9 * np.log(sigma_m)
+    logit = -2.1 - 6.8 * (1.0 - inlier_ratio) - 1.9 * np.log(sigma_m)
     if verdict is not None and np.isfinite(verdict.fit):
         logit -= 22.8 * max(0.0, verdict.usual - verdict.fit)
         if verdict.candidates is not None:

@@ -141,7 +141,7 @@ def test_a_search_says_how_many_places_are_possible():
     told = quality.judge(best(share=0.6))
     assert told.state == "GLOBAL_SEARCH"
     assert told.reason == "2 places are possible, the best at x 2.0 m, y 1.0 m, 90 deg, where scans fit by 90%"
-    assert told.reliability == 0.6
+    assert told.confidence == 0.6
     quality.seek(candidates(1))
     assert quality.judge(best()).reason.startswith("one place is possible, the best at x 2.0 m")
     quality.seek(Candidates(np.zeros((0, 3)), np.zeros(0), np.nan, 0.0, False))
@@ -152,23 +152,23 @@ def test_a_search_says_how_many_places_are_possible():
     "worse", [dict(fit=0.6), dict(doubted=True, behind=3.0, candidates=candidates())], ids=["fit", "behind"]
 )
 def test_each_sign_of_a_wrong_pose_makes_it_less_reliable(worse):
-    assert judgement([0.95], **worse).reliability < judgement([0.95], fit=0.95).reliability - 0.1
+    assert judgement([0.95], **worse).confidence < judgement([0.95], fit=0.95).confidence - 0.1
 
 
 def test_reliability_is_a_chance_and_falls_with_what_the_map_explains_and_with_other_clusters():
     values = [
-        judgement([used], best(share=share), fit=0.95).reliability
+        judgement([used], best(share=share), fit=0.95).confidence
         for used, share in [(1.0, 1.0), (0.7, 1.0), (0.3, 1.0), (0.3, 0.5), (0.0, 0.5)]
     ]
     assert all(0.0 <= value <= 1.0 for value in values) and values == sorted(values, reverse=True)
-    assert values[0] > 0.9 and judgement([]).reliability == 0.0
+    assert values[0] > 0.9 and judgement([]).confidence == 0.0
 
 
 def test_a_pose_that_is_more_likely_wrong_is_not_called_localized():
     """No sign alone is bad enough."""
     told = judgement([0.6], fit=0.85, usual=0.95, doubted=True)
-    assert 0.0 < told.reliability < 0.7 and told.state == "UNCERTAIN"
-    assert told.reason.startswith(f"all signs together make it right by {told.reliability:.0%} only; the map explains ")
+    assert 0.0 < told.confidence < 0.7 and told.state == "UNCERTAIN"
+    assert told.reason.startswith(f"all signs together make it right by {told.confidence:.0%} only; the map explains ")
     assert judgement([0.6], fit=0.95, usual=0.95).state == "LOCALIZED"  # scans fit as they always did here
     assert judgement([0.9], fit=0.93, usual=0.95, doubted=True).state == "LOCALIZED"
 

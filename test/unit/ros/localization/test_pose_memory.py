@@ -31,7 +31,7 @@ def estimate(state, second=1):
         "why",
         0.9,
         True,
-        reliability=0.9,
+        confidence=0.9,
     )
 
 
