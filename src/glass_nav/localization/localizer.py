@@ -259,7 +259,7 @@ class Localizer:
         """The pose is not known: follow all places where it may be. The particles are those places."""
         assert self._search is not None
         candidates = self._search.update(scan, odom_from_base, self._bearings_from(odom_from_base))
-        self._quality.seek(candidates)
+        self._quality.follow_search(candidates)
         if candidates.found:
             return self._settle(scan, odom_from_base, candidates.poses[0], candidates.fit)
         if len(candidates.poses):

@@ -24,15 +24,15 @@ from glass_nav.vocabulary import BeamCase
 VOTE_MODES = ("soft", "paper")
 _TIE_ORDER = (BeamCase.DIFFUSE, BeamCase.FIRST_PENETRATION, BeamCase.SECOND_PENETRATION, BeamCase.SPECULAR)
 _GATE_SIGMAS = 3.0
-_OTHER_SURFACE_M = 0.3  # of two expected ranges: an edge lies between them
-_TOLD_GATES = 2.0  # the samples that won the vote may stand one gate away from the pose told
+_OTHER_SURFACE_M = 0.3  # between two expected ranges: an edge lies between them
+_REPORTED_GATES = 2.0  # the samples that won the vote may be one gate away from the reported pose
 _PANE_INDEX = 1.51  # of soda-lime glass
-_WALL_OVER_DARK = 5.0  # reflectance of a wall over that of the darkest that is seen at the largest range
-_UNSEEN_SIDE = 0.002  # chance of a wall to be met from a side that no mapper saw, over that from the other
+_WALL_OVER_DARK = 5.0  # reflectance of a wall over that of the darkest one seen at the largest range
+_UNSEEN_SIDE = 0.002  # probability that a beam meets a wall from an unmapped side, over that from the mapped side
 _MIN_SEEN_THROUGH = 0.05  # a cell may hold a post and the edge of the pane beside it
-_TEMPER = 0.2  # of a sample's evidence: beams err together, and the best sample shall not vote alone
+_TEMPER = 0.2  # of a sample's evidence: the errors of beams are correlated, and the best sample shall not vote alone
 _REACH, _ROUNDS = 2, 3  # of the pull between neighbouring beams
-_BY_SAMPLE = ("range_m", "cos_incidence", "thickness_m")  # fields of expected that tell of all samples
+_BY_SAMPLE = ("range_m", "cos_incidence", "thickness_m")  # fields of ExpectedRanges that hold all samples
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class BeamCases:
     """What each beam of a scan met (B beams)."""
 
     case: np.ndarray  # (B,) uint8: 1 diffuse, 2 specular, 3 first penetration, 4 second, 0 uncertain
-    expected_m: np.ndarray  # (B,) reference range of that case at the estimated pose, NaN for case 0
+    expected_m: np.ndarray  # (B,) expected range of that case at the estimated pose, NaN for case 0
     residual_m: np.ndarray  # (B,) measured minus expected, NaN for case 0
     weight: np.ndarray  # (B,) share of the vote that the case won, 0..1
 
@@ -52,15 +52,15 @@ class BeamCases:
 
 @dataclass(frozen=True)
 class CaseVote:
-    """How beams are told apart."""
+    """How beams are classified."""
 
     vote_mode: str = "soft"
-    case_gate_m: float = 0.15  # a reference farther from the measured range gets no vote
+    case_gate_m: float = 0.15  # an expected range farther from the measured one gets no vote
     case_min_share: float = 0.5  # of the vote; a case with less is uncertain
     glass_max_thickness_m: float = 0.2  # a thicker run of occupied cells ends the beam
     normal_min_linearity: float = 0.9
-    prior_uncertain: float = 0.1  # chance to meet what is not on the map
-    prior_uncertain_behind: float = 0.2  # the same behind a pane: rooms that nobody mapped again, and outdoors
+    prior_uncertain: float = 0.1  # probability to meet what is not on the map
+    prior_uncertain_behind: float = 0.2  # the same behind a pane: rooms that have changed since, and outdoors
     mirror_gain: float = 2.0  # how much more light panes mirror than clear glass does
     neighbour_pull: float = 1.5  # log odds that equal cases of all neighbouring beams add
 
@@ -93,13 +93,13 @@ def classify(
 
     Args:
         measured_m: (B,) ranges by REP 117; beams without an answer are uncertain.
-        expected: of the preliminary samples; sample 0 is the pose that expected_m is told for, and for a beam that
-            passes an edge there, the sample that explains it best.
+        expected: of the preliminary samples; expected_m is that of sample 0, and for a beam that passes an edge
+            there, that of the sample that explains it best.
         residuals: where in a wall beams end, and how widely.
         vote: mode, gate and priors.
-        glass: (2, 2, B) chances to be seen through, and if so to be there, of the first and of the second surface
-            at sample 0; of the soft vote.
-        max_range_m: of the lidar: what it can still see; of the soft vote.
+        glass: (2, 2, B) probabilities that the first and the second surface at sample 0 can be seen through, and if so
+            that they are there; for the soft vote.
+        max_range_m: of the lidar; for the soft vote.
     """
     answered = np.isfinite(measured_m)
     if vote.vote_mode == "paper":
@@ -110,28 +110,30 @@ def classify(
     share[:, ~answered] = np.array([1.0, 0.0, 0.0, 0.0, 0.0])[:, None]
     won, beam = _winner(share), np.arange(len(measured_m))
     case = np.where(answered & (share[won, beam] >= vote.case_min_share), won, BeamCase.UNCERTAIN)
-    offered_m, across_m = (values[0] for values in _offered(case, measured_m, _of_sample_0(expected), residuals))
+    expected_m, across_m = (values[0] for values in _expected_of(case, measured_m, _of_sample_0(expected), residuals))
     elsewhere = np.flatnonzero((case > 0) & ~(across_m <= gate_m(residuals, vote)))
     if len(elsewhere):
-        offered_there_m, across_there_m = _offered(
+        expected_there_m, across_there_m = _expected_of(
             case[elsewhere], measured_m[elsewhere], _of_beams(expected, elsewhere), residuals
         )
         nearest = np.argmin(across_there_m, axis=0), np.arange(len(elsewhere))
-        offered_m[elsewhere], across_m[elsewhere] = offered_there_m[nearest], across_there_m[nearest]
-    return _told(case, share[case, beam], measured_m, offered_m, np.isfinite(across_m))
+        expected_m[elsewhere], across_m[elsewhere] = expected_there_m[nearest], across_there_m[nearest]
+    return _beam_cases(case, share[case, beam], measured_m, expected_m, np.isfinite(across_m))
 
 
 def as_seen_from(
     cases: BeamCases, measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote
 ) -> BeamCases:
-    """The same cases from a pose nearby, with the ranges expected at sample 0 of its expected.
+    """The same cases from a pose nearby, with the ranges expected at it, sample 0 of `expected`.
 
     A beam that passes an edge from there keeps its range; one that ends farther from its surface is uncertain.
     """
-    offered_m, across_m = _offered(cases.case, measured_m, _of_sample_0(expected), residuals)
-    other = np.abs(np.nan_to_num(offered_m[0] - cases.expected_m)) > _OTHER_SURFACE_M  # also where there is none
-    fits = across_m[0] <= _TOLD_GATES * gate_m(residuals, vote)
-    return _told(cases.case, cases.weight, measured_m, np.where(fits, offered_m[0], cases.expected_m), fits | other)
+    expected_m, across_m = _expected_of(cases.case, measured_m, _of_sample_0(expected), residuals)
+    other = np.abs(np.nan_to_num(expected_m[0] - cases.expected_m)) > _OTHER_SURFACE_M  # also where there is none
+    fits = across_m[0] <= _REPORTED_GATES * gate_m(residuals, vote)
+    return _beam_cases(
+        cases.case, cases.weight, measured_m, np.where(fits, expected_m[0], cases.expected_m), fits | other
+    )
 
 
 def _of_sample_0(expected: ExpectedRanges) -> ExpectedRanges:
@@ -142,19 +144,19 @@ def _of_beams(expected: ExpectedRanges, beams: np.ndarray) -> ExpectedRanges:
     return replace(expected, **{name: getattr(expected, name)[:, :, beams] for name in _BY_SAMPLE})
 
 
-def _offered(
+def _expected_of(
     case: np.ndarray, measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals
 ) -> Tuple[np.ndarray, np.ndarray]:
-    """(N, B) ranges that the samples offer for the case of each beam, and how far across the surface it ended."""
+    """(N, B) ranges expected at the samples for the case of each beam, and the distance from the surface to its end."""
     expected = _inside_walls(expected, residuals)
     row, beam = np.maximum(case.astype(int) - 1, 0), np.arange(len(case))
-    offered_m = expected.range_m[row, :, beam].T
+    expected_m = expected.range_m[row, :, beam].T
     with np.errstate(invalid="ignore"):
-        across_m = np.abs(measured_m - offered_m) * expected.cos_incidence[row, :, beam].T
-    return offered_m, np.where(np.isnan(across_m), np.inf, across_m)
+        across_m = np.abs(measured_m - expected_m) * expected.cos_incidence[row, :, beam].T
+    return expected_m, np.where(np.isnan(across_m), np.inf, across_m)
 
 
-def _told(
+def _beam_cases(
     case: np.ndarray, weight: np.ndarray, measured_m: np.ndarray, expected_m: np.ndarray, known: np.ndarray
 ) -> BeamCases:
     known = known & (case > 0)
@@ -186,7 +188,7 @@ def _winner(share: np.ndarray) -> np.ndarray:
 def _paper_votes(
     measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote
 ) -> np.ndarray:
-    """(5, B) share of the samples whose nearest reference is that case; equal votes."""
+    """(5, B) share of the samples whose nearest expected range is of that case; equal votes."""
     expected = _inside_walls(expected, residuals)
     with np.errstate(invalid="ignore"):
         off = np.abs(measured_m - expected.range_m)  # (4, N, B)
@@ -201,10 +203,10 @@ def _paper_votes(
 def _soft_votes(
     measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote, prior: np.ndarray
 ) -> np.ndarray:
-    """(5, B) posterior over the cases; samples count by how well each explains the scan.
+    """(5, B) posterior over the cases; samples are weighted by how well each explains the scan.
 
-    A reference has a normal density of width residuals.sigma_m, cut at the gate, across the surface; each case has its
-    prior, (5, B) of _priors(), times the density of its reference. The samples are summed before the cases compete: a
+    The density around an expected range is normal of width residuals.sigma_m, cut at the gate, across the surface; each
+    case has its prior, (5, B) of _priors(), times that density. The samples are summed before the cases compete: a
     corner that some of them graze and others miss is no surface to explain the beam by, if without it a likelier case
     does. The evidence of a sample is the product over the beams that answered, to the power of _TEMPER over the root of
     their number.
@@ -226,19 +228,19 @@ def _soft_votes(
 
 
 def reach_m(residuals: RangeResiduals, vote: CaseVote) -> float:
-    """How far behind the end of a beam a reference may be that still is voted for."""
+    """How far behind the end of a beam an expected range may be and still get a vote."""
     return gate_m(residuals, vote) / MIN_COS
 
 
 def gate_m(residuals: RangeResiduals, vote: CaseVote) -> float:
-    """How far across the surface a beam may end from it: a map that fits badly everywhere needs a wider gate."""
+    """How far across the surface a beam may end from it: a map that fits poorly everywhere needs a wider gate."""
     return max(vote.case_gate_m, _GATE_SIGMAS * residuals.sigma_m)
 
 
 def _priors(expected: ExpectedRanges, glass: np.ndarray, max_range_m: float, vote: CaseVote) -> np.ndarray:
-    """(5, B) chance of cases 1 to 4, and last to end at the second surface where the first is gone (case 0).
+    """(5, B) prior of cases 1 to 4, and last of an end at the second surface where the first is gone (case 0).
 
-    From how glassy the walls proved and how a pane answers at that incidence.
+    From the probability of glass and the glass return model at that incidence.
     """
     incidence = expected.pane_incidence[0]
     (first, second), (there, _) = glass
@@ -254,11 +256,11 @@ def _priors(expected: ExpectedRanges, glass: np.ndarray, max_range_m: float, vot
 
 
 def _chance_of_a_mirror(expected: ExpectedRanges, max_range_m: float, gain: float) -> np.ndarray:
-    """(B,) chance that a mirrored echo is the strongest one, at sample 0; 0 where nothing can mirror.
+    """(B,) probability that a mirrored echo is the strongest one, at sample 0; 0 where nothing can mirror.
 
-    Echo powers as in the lidar equation for diffuse targets: T^2 / d3^2 behind the pane, R^2 / d2^2 by way of the
-    mirror (Fresnel, unpolarised, two surfaces); one must be above what the lidar still sees of a dark wall at its
-    largest range. Reflectances of walls differ by factors: the chance rises over one decade.
+    Echo powers as in the lidar equation for diffuse targets: T^2 / d3^2 behind the pane, R^2 / d2^2 along the path
+    over the mirror (Fresnel, unpolarised, two surfaces); one must be above what the lidar still sees of a dark wall at its
+    largest range. Reflectances of walls differ by factors: the probability rises over one decade.
     """
     incidence = np.nan_to_num(expected.pane_incidence[0])
     inside = np.arcsin(np.sin(incidence) / _PANE_INDEX)
@@ -279,7 +281,7 @@ def _chance_of_a_mirror(expected: ExpectedRanges, max_range_m: float, gain: floa
 def _pulled(share: np.ndarray, answered: np.ndarray, pull: float) -> np.ndarray:
     """(5, B) shares after neighbouring beams have pulled each other: mean field of a chain, a few rounds.
 
-    Neighbours mostly meet the same wall the same way; a single beam that fits a farther wall is mostly chance.
+    Neighbours mostly meet the same wall the same way; a single beam that fits a farther wall mostly does so by chance.
     """
     log_share = np.log(share + 1e-6)
     belief = share
@@ -291,7 +293,7 @@ def _pulled(share: np.ndarray, answered: np.ndarray, pull: float) -> np.ndarray:
 
 
 def _mean_of_neighbours(belief: np.ndarray, answered: np.ndarray) -> np.ndarray:
-    """(5, B) mean over the answering ones of the _REACH beams to either side."""
+    """(5, B) mean over the returns among the _REACH beams to either side."""
     width = 2 * _REACH + 1
     padded = np.pad(np.vstack([belief, answered]), ((0, 0), (_REACH + 1, _REACH)))
     running = np.cumsum(padded, axis=1)

@@ -1,7 +1,7 @@
 """Cases, first surfaces -> the scan as a costmap should see it.
 
-A beam that passed a pane, or was mirrored at it, is cut at the pane: what is drawn on the map stands in
-the robot's way, whatever the lidar sees behind. B beams.
+A beam that passed a pane, or was mirrored at it, is cut at the pane: what is drawn on the map is an obstacle, whatever
+the lidar sees behind. B beams.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 from glass_nav.localization.beam_classification.expected_ranges import ExpectedRanges
 from glass_nav.vocabulary import BeamCase
 
-_SURE = 0.5  # chance from which a wall is taken for glass, and for being there
-_UNANSWERED_BY_GLASS, _UNANSWERED_BY_WALLS = 0.3, 0.01  # share of the beams that do not come back
+_SURE = 0.5  # probability from which a wall counts as glass, and as being there
+_NO_RETURN_GLASS, _NO_RETURN_WALL = 0.3, 0.01  # share of the beams that do not return
 _DARK_TO_DIM = 3.0  # reflectance of nearly all walls over that of the darkest one a lidar sees
 _SAME_WALL_M, _SAME_WALL_RAD = 0.05, np.radians(5.0)
 
@@ -26,7 +26,7 @@ class SurfaceScan:
 
     ranges_m: np.ndarray  # (B,) as measured, or the range of the first mapped surface where cut
     cut: np.ndarray  # (B,) bool
-    trusted: bool  # False: the pose is not to be relied on, and nothing is cut
+    trusted: bool  # False: the pose is unreliable, and nothing is cut
 
 
 def of(
@@ -41,14 +41,14 @@ def of(
     """Cut a scan.
 
     A beam is cut if its case says that it passed or was mirrored; if it ended beyond the middle of a wall that stands
-    there, whatever it met behind; and if it did not come back though a wall would have been seen, unless the wall
-    proved solid.
+    there, whatever it met behind; and if it did not return although a wall would have been seen, unless the wall is
+    known to be solid.
 
     Args:
         ranges_m: (B,) as measured, REP 117.
         case: (B,) what each beam met.
         expected: of the pose, its sample 0.
-        glass: (2, B) chances of the first surface to be seen through, and if so to be there.
+        glass: (2, B) probabilities that the first surface can be seen through, and if so that it is there.
         gate_m: (B,) along the beam; what is measured within it of the first surface is that surface.
         max_range_m: at which the lidar still sees a dark wall, face on.
         trusted: whether the pose is.
@@ -59,11 +59,11 @@ def of(
     first_m = expected.line_m[0]
     beside, within = _walls_beside(expected)
     with np.errstate(invalid="ignore"):
-        behind = np.isfinite(first_m) & (ranges_m > first_m + gate_m)  # also without an answer
+        behind = np.isfinite(first_m) & (ranges_m > first_m + gate_m)  # also without a return
     explained = np.isin(case, (BeamCase.SPECULAR, BeamCase.FIRST_PENETRATION, BeamCase.SECOND_PENETRATION))
     lost = np.isposinf(ranges_m) & _would_answer(expected, max_range_m)
-    silent = _UNANSWERED_BY_GLASS * seen_through
-    gone_through = silent > _SURE * (silent + _UNANSWERED_BY_WALLS * (1.0 - seen_through))
+    silent = _NO_RETURN_GLASS * seen_through
+    gone_through = silent > _SURE * (silent + _NO_RETURN_WALL * (1.0 - seen_through))
     known = seen_through * there > _SURE
     passed = (there > _SURE) & np.where(
         np.isfinite(ranges_m), within, beside & gone_through & lost & _has_beside(behind)
@@ -93,5 +93,5 @@ def _would_answer(expected: ExpectedRanges, max_range_m: float) -> np.ndarray:
 
 
 def _has_beside(beams: np.ndarray) -> np.ndarray:
-    """(B,) bool: one of the beams is beside it; a single one without an answer may be a fault of the lidar."""
+    """(B,) bool: one of the beams is beside it; a single one without a return may be a fault of the lidar."""
     return np.append(False, beams[:-1]) | np.append(beams[1:], False)
