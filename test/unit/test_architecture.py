@@ -40,7 +40,7 @@ MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or les
     "replay compare",
     "ros": "geometry world sensing hypotheses localization topology driving recording simulation evaluation checkup",
 }
-FOR_ALL = {"amcl_parameters", "health", "params", "vocabulary"}  # modules of no room
+FOR_ALL = {"amcl_parameters", "health", "params", "rate_limiter", "vocabulary"}  # modules of no room
 ONLY_BY = {  # compiled modules, each behind its face; and what is heavy, where it is needed
     "glass_nav._beam_vote": "localization",
     "glass_nav._mrpt_grid": "hypotheses sensing",

@@ -49,7 +49,9 @@ class PreparedReplay:
             RecordingError: not one scan of the log can be used.
         """
         options = self.options
-        return replay_run.run(self.recording, self.localizer, self.start, options.seed, options.use.window, step_done, listen)
+        return replay_run.run(
+            self.recording, self.localizer, self.start, options.seed, options.use.window, step_done, listen
+        )
 
 
 def prepare(options: ReplayOptions) -> PreparedReplay:
@@ -101,5 +103,7 @@ def _start(
     if pose is not None:
         return lambda stamp_ns: localizer.set_pose(np.array(pose), covariance), "--initial-pose"
     if truth is not None and len(truth):
-        return lambda stamp_ns: localizer.set_pose(truth.at(np.int64(stamp_ns)), covariance), "the ground truth's first pose"
+        return lambda stamp_ns: localizer.set_pose(
+            truth.at(np.int64(stamp_ns)), covariance
+        ), "the ground truth's first pose"
     return lambda stamp_ns: localizer.set_pose(defaults.pose, covariance), "initial_pose_* of the parameters"

@@ -58,13 +58,13 @@ from glass_nav.msg import (
     TraverseEdgeResult,
     TurnChoice,
 )
+from glass_nav.rate_limiter import RateLimiter
 from glass_nav.ros import action_status, conversions, shutdown
 from glass_nav.ros.driver import driver_displays, driver_messages
 from glass_nav.ros.driver.driver_params import MOVE_BASE, DriverParams
 from glass_nav.ros.driver.move_base_task import MoveBase, MoveBaseTask
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Mailbox
-from glass_nav.ros.rate_limiter import RateLimiter
 from glass_nav.ros.scan_input import STALE_SCANS, ScanInput
 from glass_nav.sensing.scan import ScanError
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
