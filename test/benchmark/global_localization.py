@@ -30,7 +30,7 @@ import numpy as np
 import tracks
 from glass_nav.localization.localizer import Localizer
 from glass_nav.localization.localizer_params import LocalizerParams
-from glass_nav.localization.integrity.pose_state import LOCALIZED
+from glass_nav.vocabulary import LocalizationState
 
 MAX_M = 60.0  # of a search
 KNOWN_M = 5.0  # driven with the right pose before the robot is carried away
@@ -54,7 +54,7 @@ def find(track: tracks.Track, seed: int) -> Dict[str, Any]:
         estimate = localizer.update(moment.scan, moment.odom_from_base)
         right_now = tracks.is_right(estimate.map_from_base, moment.map_from_base)
         last_m = way_m
-        if estimate.state == LOCALIZED:
+        if estimate.state == LocalizationState.LOCALIZED:
             wrong = wrong or not right_now
             found_m = way_m if found_m is None else found_m
             if way_m > found_m + 3.0:
@@ -83,13 +83,13 @@ def kidnap(track: tracks.Track, seed: int) -> Dict[str, Any]:
             break
         estimate = localizer.update(moment.scan, moment.odom_from_base)
         right = tracks.is_right(estimate.map_from_base, moment.map_from_base)
-        if left_m is None and (estimate.state != LOCALIZED or right):
+        if left_m is None and (estimate.state != LocalizationState.LOCALIZED or right):
             left_m = float(way_m)
-        if estimate.state == LOCALIZED and right:
+        if estimate.state == LocalizationState.LOCALIZED and right:
             back_m = float(way_m)
             break
     return {
-        "localized_before": before[-1] == LOCALIZED,
+        "localized_before": before[-1] == LocalizationState.LOCALIZED,
         "left_m": left_m,
         "back_m": back_m,
         "left": left_m is not None and left_m <= LEFT_M,
@@ -108,7 +108,7 @@ def elsewhere(track: tracks.Track, seed: int) -> Dict[str, Any]:
     wrong_m: Optional[float] = None
     way_m = 0.0
     for way_m, moment in tracks.moments_of(track, tracks.start_of(track, rng), 20.0):
-        if localizer.update(moment.scan, moment.odom_from_base).state == LOCALIZED:
+        if localizer.update(moment.scan, moment.odom_from_base).state == LocalizationState.LOCALIZED:
             wrong_m = way_m
             break
     return {"map": other, "wrong": wrong_m is not None, "wrong_m": wrong_m, "driven_m": way_m}

@@ -29,7 +29,7 @@ import global_localization
 import tracks
 from glass_nav.localization.localizer import Localizer
 from glass_nav.localization.localizer_params import LocalizerParams
-from glass_nav.localization.integrity.pose_state import LOCALIZED
+from glass_nav.vocabulary import LocalizationState
 
 AFTER_M = 10.0  # driven after each beginning
 WRONG_START = np.diag([0.25, 0.25, (np.pi / 12.0) ** 2])
@@ -79,7 +79,7 @@ def _follow(localizer: Localizer, moments: List[tracks.Moment]) -> List[Told]:
                 Told(
                     float(estimate.reliability),
                     tracks.is_right(estimate.map_from_base, moment.map_from_base),
-                    estimate.state == LOCALIZED,
+                    estimate.state == LocalizationState.LOCALIZED,
                 )
             )
     return told

@@ -16,6 +16,7 @@ import pytest
 
 from glass_nav.simulation import lidar
 from glass_nav.simulation.building import Building, Pane, Wall
+from glass_nav.vocabulary import BeamCase
 
 PANE_M = 5.05
 BINS_DEG = np.arange(0.0, 45.0, 5.0)  # edges; from 40 degrees on the pane ends
@@ -58,7 +59,7 @@ def simulated_shares() -> np.ndarray:
     case = np.stack([lidar.scan(model, building, np.zeros(3), 0.0, rng).case for _ in range(FRAMES)])
     incidence_deg = np.broadcast_to(np.abs(np.rad2deg(model.angles_rad)), case.shape)
     returned, sent = (
-        np.histogram(values, BINS_DEG)[0] for values in (incidence_deg[case == lidar.DIFFUSE], incidence_deg)
+        np.histogram(values, BINS_DEG)[0] for values in (incidence_deg[case == BeamCase.DIFFUSE], incidence_deg)
     )
     return returned / sent
 

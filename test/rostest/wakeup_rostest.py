@@ -153,7 +153,7 @@ class WakeUp(unittest.TestCase):
         self.assertIn("wakes up at x ", printed)
         self.assertIn("  match node M0: degree 3, r ", printed)
         self.assertIn("  match edge E0: ", printed)
-        self.assertIn(f"CONFIRMED behind {self.topology.last.depth} edges, right: hands over x ", printed)
+        self.assertIn(f"CONFIRMED after {self.topology.last.depth} edges, right: hands over x ", printed)
         self.assertRegex(printed, r"goto_node \d+: it stands at the goal, .* m driven; truly 0\.[01]\d m from the node")
         tracking = re.search(r"tracking over (\d+) m: mean (\d\.\d+) m", printed)
         self.assertIsNotNone(tracking, printed)

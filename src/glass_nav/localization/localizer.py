@@ -29,6 +29,7 @@ from glass_nav.localization.update_schedule import UpdateSchedule
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.scan import Scan
+from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
 from glass_nav.world.landmark_map import LandmarkMap
 
@@ -47,7 +48,7 @@ class Estimate:
     cases: BeamCases  # of every beam of the scan
     surface_scan: SurfaceScan  # the scan in which glass is an obstacle
     particles: np.ndarray  # (P, 3) poses in map
-    state: str  # UNKNOWN, GLOBAL_SEARCH, LOCALIZED, UNCERTAIN, LOST
+    state: LocalizationState
     reason: str  # the state in words
     used_share: float  # share of the answering beams that a case 1-4 explains
     updated: bool  # whether this scan moved the particles
@@ -282,7 +283,7 @@ class Localizer:
         if updated:
             self._quality.observe(used_share)
         judgement = self._quality.judge(self._filter.best)
-        trusted = judgement.state == pose_state.LOCALIZED
+        trusted = judgement.state == LocalizationState.LOCALIZED
         return Estimate(
             scan.stamp_ns,
             map_from_base,

@@ -17,7 +17,7 @@ import numpy as np
 import yaml
 
 from glass_nav.geometry import se2
-from glass_nav.localization.integrity.pose_state import LOCALIZED, UNCERTAIN
+from glass_nav.vocabulary import LocalizationState
 
 _MIN_DEVIATION = np.array([0.1, 0.1, 0.05])  # [m, m, rad] of a start: somebody may have leant against the robot
 _DEVIATION_PER_M = np.array([0.1, 0.1, 0.05])  # of odometry while nobody looked
@@ -72,7 +72,7 @@ def save(path: Path, saved: SavedPose) -> None:
     text = yaml.safe_dump(
         {
             "stamp_ns": int(saved.stamp_ns),
-            "state": saved.state,
+            "state": str(saved.state),
             "map": saved.map_digest,
             "map_from_base": _numbers(saved.map_from_base),
             "covariance": [_numbers(row) for row in saved.covariance],
@@ -139,7 +139,7 @@ def resumed(
         SavedPoseError: it is not to be believed.
     """
     age_s = (now_ns - saved.stamp_ns) * 1e-9
-    if saved.state not in (LOCALIZED, UNCERTAIN):
+    if saved.state not in (LocalizationState.LOCALIZED, LocalizationState.UNCERTAIN):
         raise SavedPoseError(f"the robot was {saved.state} when it was written")
     if saved.map_digest != map_digest:
         raise SavedPoseError(f"it is of map {saved.map_digest}, the map in use is {map_digest}")

@@ -12,11 +12,11 @@ from glass_nav.evaluation.metrics import case_scores, pose_errors
 from glass_nav.evaluation.metrics.case_scores import CaseScores, SurfaceScores
 from glass_nav.evaluation.metrics.replay_result import NO_BEAM, BeamExample, KeptScan, ReplayResult
 from glass_nav.geometry import se2
-from glass_nav.localization.integrity.pose_state import GLOBAL_SEARCH, UNKNOWN
 from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.recording.recording import BeamTruth, Recording, RecordingError, Refusal, Step
 from glass_nav.replay.window import Window
 from glass_nav.sensing.scan import Scan, ScanError
+from glass_nav.vocabulary import LocalizationState
 
 EXAMPLES = 3  # scans whose beams are kept for the picture, spread over the log
 WORST = 10  # scans kept that went worst, each from another part of the log
@@ -126,7 +126,7 @@ class _WorstScans:
         errors = pose_errors.of(np.array([estimate.stamp_ns]), estimate.map_from_base[None], self._reference)
         # Nobody relies on a pose that is still being looked for: such scans come last.
         bad = (
-            estimate.state not in (UNKNOWN, GLOBAL_SEARCH),
+            estimate.state not in (LocalizationState.UNKNOWN, LocalizationState.GLOBAL_SEARCH),
             float(errors.position_m[0]) if errors.matched[0] else 1.0 - estimate.reliability,
         )
         part = row * PARTS // self._expected

@@ -19,11 +19,11 @@ from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.evaluation.plots import passed_nodes_picture
 from glass_nav.evaluation.plots.run_pictures import MapImage
 from glass_nav.geometry import se2
-from glass_nav.localization.integrity.pose_state import GLOBAL_SEARCH, LOST, UNKNOWN
 from glass_nav.localization.localizer import Estimate
 from glass_nav.recording.recording import Step
 from glass_nav.topology.atlas import atlas_builder, atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import RING_MARKER, Atlas
+from glass_nav.vocabulary import LocalizationState
 from glass_nav.world import map_file
 from glass_nav.world.grid_map import GridMap
 
@@ -121,7 +121,9 @@ def poses(result: ReplayResult) -> np.ndarray:
     """(S, 3) map_from_base by the reference, NaN where it does not reach; without one the estimates, NaN while lost."""
     if result.reference is not None and len(result.reference):
         return np.where(result.errors.matched[:, None], result.reference.at(result.stamps_ns), np.nan)
-    lost = np.isin(np.array(result.states), [UNKNOWN, GLOBAL_SEARCH, LOST])
+    lost = np.isin(
+        np.array(result.states), [LocalizationState.UNKNOWN, LocalizationState.GLOBAL_SEARCH, LocalizationState.LOST]
+    )
     return np.where(lost[:, None], np.nan, result.map_from_base)
 
 

@@ -19,10 +19,10 @@ import numpy as np
 from glass_nav.geometry import angles
 from glass_nav.simulation import building_map, glass, people
 from glass_nav.simulation.building import LARGEST_GAP_M, MIRROR, OPAQUE, Building, Surfaces, joined
+from glass_nav.vocabulary import BeamCase
 
 ECHOES = ("first", "strongest", "last")
 VISIBILITIES = ("logistic", "lobe")
-UNCERTAIN, DIFFUSE, MIRRORED, BEHIND_ONE, BEHIND_TWO = 0, 1, 2, 3, 4  # true cases
 FLOOR_REFLECTANCE = 0.1  # what a lidar still sees at its largest range, face on
 USUAL_DIRT = 0.004  # of a pane; dirty_share is the model's for this
 LARGEST_PANES = 8  # of one way that are looked at, two for each double glazing
@@ -210,7 +210,7 @@ def _reported(model: LidarModel, echoes: List[_Echoes], first_m: np.ndarray, rng
     passed_m = np.where(first_m <= model.range_max_m, first_m, np.nan)  # by what did not come back
     return TrueScan(
         np.where(answered, measured_m, np.where(near, -np.inf, np.inf)),
-        np.where(answered, case[beams, best], UNCERTAIN).astype(np.uint8),
+        np.where(answered, case[beams, best], BeamCase.UNCERTAIN).astype(np.uint8),
         np.where(answered, exact_m, np.nan),
         np.where(answered, crossing_m[beams, best], passed_m),
     )
@@ -225,7 +225,7 @@ def _direct_echoes(
     rng: np.random.Generator,
 ) -> List[_Echoes]:
     """From every pane on the way and from the end of it; passing (B, K + 1) is the light that comes so far."""
-    behind = np.array([DIFFUSE, BEHIND_ONE, BEHIND_TWO, UNCERTAIN])
+    behind = np.array([BeamCase.DIFFUSE, BeamCase.FIRST_PENETRATION, BeamCase.SECOND_PENETRATION, BeamCase.UNCERTAIN])
     pane_power = _pane_power(model, surfaces, direct, rng)
     echoes = []
     for k in range(direct.pane_m.shape[1] + 1):
@@ -239,7 +239,7 @@ def _direct_echoes(
             _Echoes(
                 power,
                 range_m,
-                np.where(known, behind[np.minimum(passed, 3)], UNCERTAIN),
+                np.where(known, behind[np.minimum(passed, 3)], BeamCase.UNCERTAIN),
                 np.where(passed > 0, first_m, np.nan),
             )
         )
@@ -330,16 +330,21 @@ def _mirrored_echoes(
             one = range_m - to_mirror_m < LARGEST_GAP_M  # it ended at what it was mirrored at, for the map
             case = np.where(
                 known & mapped & (passed == 0) & (ways.missing_m >= range_m),
-                np.where(one, DIFFUSE, MIRRORED),
-                UNCERTAIN,
+                np.where(one, BeamCase.DIFFUSE, BeamCase.SPECULAR),
+                BeamCase.UNCERTAIN,
             )
             crossing_m = np.where(np.isnan(crossed_m) & (passed > 0), later_m, crossed_m)
-            crossing_m = np.where(case == DIFFUSE, np.nan, crossing_m)
+            crossing_m = np.where(case == BeamCase.DIFFUSE, np.nan, crossing_m)
             echoes.append(
                 _Echoes(
                     *(
                         _spread(values, rows, beams, rest)
-                        for values, rest in ((power, 0.0), (range_m, np.inf), (case, UNCERTAIN), (crossing_m, np.nan))
+                        for values, rest in (
+                            (power, 0.0),
+                            (range_m, np.inf),
+                            (case, BeamCase.UNCERTAIN),
+                            (crossing_m, np.nan),
+                        )
                     )
                 )
             )

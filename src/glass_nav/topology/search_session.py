@@ -16,6 +16,7 @@ from typing import Callable, List, Optional, Tuple, Union
 
 import numpy as np
 
+from glass_nav.log_line import LogLine
 from glass_nav.topology.atlas import atlas_file
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
@@ -115,15 +116,6 @@ class GoalEnd:
     outcome: GoalOutcome
     reason: str
     status: SearchStatus
-
-
-@dataclass(frozen=True)
-class LogLine:
-    """To be logged."""
-
-    text: str
-    level: int = logging.INFO
-    often: bool = False  # may come with every report: at most one in some seconds is worth reading
 
 
 Decision = Union[SearchStatus, Progress, Turn, InitialPose, GoalEnd, LogLine]

@@ -11,6 +11,7 @@ import pytest
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.simulation import building_file, building_map, lidar
 from glass_nav.simulation.building import Building, Door, Mirror, Pane, Thing, Wall, box, distances
+from glass_nav.vocabulary import BeamCase
 from glass_nav.world import map_file
 
 MAPS = Path(__file__).resolve().parents[3] / "maps"
@@ -170,7 +171,7 @@ def test_rays_on_the_map_meet_what_rays_in_the_building_meet(name):
             scan = lidar.scan(model, building, pose, 0.0, np.random.default_rng(0))
             cells_m = caster.cast(pose[None], model.angles_rad, model.range_max_m)[0]
             answered = np.isfinite(scan.exact_m)
-            assert (scan.case[answered] == lidar.DIFFUSE).mean() > 0.99
+            assert (scan.case[answered] == BeamCase.DIFFUSE).mean() > 0.99
             late_m.append((scan.exact_m - cells_m)[answered])
     late = np.concatenate(late_m)
     assert np.median(np.abs(late)) < 0.05

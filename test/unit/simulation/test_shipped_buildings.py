@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from glass_nav import package_files
 from glass_nav.simulation import building_file, building_map, shipped_buildings
 from glass_nav.simulation.building_file import BuildingError
 from glass_nav.simulation.path_follower import PathFollower
@@ -46,18 +47,8 @@ def test_what_is_not_there_is_said_with_what_is(tmp_path):
         shipped_buildings.find(str(tmp_path))
 
 
-def test_an_installed_package_has_them_in_its_share(tmp_path, monkeypatch):
-    module = tmp_path / "lib" / "python3" / "dist-packages" / "glass_nav" / "simulation" / "shipped_buildings.py"
-    module.parent.mkdir(parents=True)
-    module.write_text("")
-    assert shipped_buildings.maps_folder(module) is None
-    maps = tmp_path / "share" / "glass_nav" / "maps"
-    maps.mkdir(parents=True)
-    assert shipped_buildings.maps_folder(module) == maps
-
-
 def test_without_any_the_list_is_empty(monkeypatch):
-    monkeypatch.setattr(shipped_buildings, "maps_folder", lambda: None)
+    monkeypatch.setattr(package_files, "folder", lambda name: None)
     assert shipped_buildings.shipped() == {}
     with pytest.raises(BuildingError, match="^office: no such file, nor a building of the package, which are none$"):
         shipped_buildings.find("office")

@@ -19,10 +19,10 @@ from glass_nav import _beam_vote
 from glass_nav.localization.beam_classification import glass_return_model
 from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, ExpectedRanges
 from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
+from glass_nav.vocabulary import BeamCase
 
-UNCERTAIN, DIFFUSE, SPECULAR, FIRST_PENETRATION, SECOND_PENETRATION = range(5)
 VOTE_MODES = ("soft", "paper")
-_TIE_ORDER = (DIFFUSE, FIRST_PENETRATION, SECOND_PENETRATION, SPECULAR)
+_TIE_ORDER = (BeamCase.DIFFUSE, BeamCase.FIRST_PENETRATION, BeamCase.SECOND_PENETRATION, BeamCase.SPECULAR)
 _GATE_SIGMAS = 3.0
 _OTHER_SURFACE_M = 0.3  # of two expected ranges: an edge lies between them
 _TOLD_GATES = 2.0  # the samples that won the vote may stand one gate away from the pose told
@@ -109,7 +109,7 @@ def classify(
         share = _pulled(_soft_votes(measured_m, references, residuals, vote, prior), answered, vote.neighbour_pull)
     share[:, ~answered] = np.array([1.0, 0.0, 0.0, 0.0, 0.0])[:, None]
     won, beam = _winner(share), np.arange(len(measured_m))
-    case = np.where(answered & (share[won, beam] >= vote.case_min_share), won, UNCERTAIN)
+    case = np.where(answered & (share[won, beam] >= vote.case_min_share), won, BeamCase.UNCERTAIN)
     offered_m, across_m = (values[0] for values in _offered(case, measured_m, _of_sample_0(references), residuals))
     elsewhere = np.flatnonzero((case > 0) & ~(across_m <= gate_m(residuals, vote)))
     if len(elsewhere):
@@ -161,7 +161,10 @@ def _told(
     with np.errstate(invalid="ignore"):
         residual_m = np.where(known, measured_m - expected_m, np.nan)
     return BeamCases(
-        np.where(known, case, UNCERTAIN).astype(np.uint8), np.where(known, expected_m, np.nan), residual_m, weight
+        np.where(known, case, BeamCase.UNCERTAIN).astype(np.uint8),
+        np.where(known, expected_m, np.nan),
+        residual_m,
+        weight,
     )
 
 
@@ -169,13 +172,14 @@ def _inside_walls(references: ExpectedRanges, residuals: RangeResiduals) -> Expe
     """References where beams end, not at the near boundary of the wall's cells."""
     depth = residuals.depth_share * references.thickness_m
     shift = depth / np.maximum(references.cos_incidence, MIN_COS)
-    shift[SPECULAR - 1] += 2.0 * depth[DIFFUSE - 1] * references.cos_incidence[DIFFUSE - 1]  # so much deeper a mirror
+    mirror = BeamCase.DIFFUSE - 1
+    shift[BeamCase.SPECULAR - 1] += 2.0 * depth[mirror] * references.cos_incidence[mirror]  # it lies so much deeper
     return replace(references, range_m=references.range_m + shift)
 
 
 def _winner(share: np.ndarray) -> np.ndarray:
     """(B,) case with the highest share; equal shares by _TIE_ORDER, uncertain last."""
-    order = np.array(_TIE_ORDER + (UNCERTAIN,))
+    order = np.array(_TIE_ORDER + (BeamCase.UNCERTAIN,))
     return order[np.argmax(share[order], axis=0)]
 
 
@@ -190,7 +194,7 @@ def _paper_votes(
     order = np.array(_TIE_ORDER) - 1
     nearest = order[np.argmin(off[order], axis=0)]  # first of equals
     near = np.take_along_axis(off, nearest[None], axis=0)[0] <= gate_m(residuals, vote)
-    voted = np.where(near, nearest + 1, UNCERTAIN)
+    voted = np.where(near, nearest + 1, BeamCase.UNCERTAIN)
     return np.stack([np.mean(voted == case, axis=0) for case in range(5)])
 
 
@@ -263,7 +267,8 @@ def _chance_of_a_mirror(references: ExpectedRanges, max_range_m: float, gain: fl
     r_p = ((across - _PANE_INDEX * parallel) / (across + _PANE_INDEX * parallel)) ** 2
     surface = 0.5 * (r_s + r_p)
     reflected = np.minimum(gain * 2.0 * surface / (1.0 + surface), 0.9)
-    behind_m, mirrored_m = references.range_m[FIRST_PENETRATION - 1, 0], references.range_m[SPECULAR - 1, 0]
+    behind_m = references.range_m[BeamCase.FIRST_PENETRATION - 1, 0]
+    mirrored_m = references.range_m[BeamCase.SPECULAR - 1, 0]
     with np.errstate(invalid="ignore", divide="ignore"):
         wins = (reflected * behind_m / ((1.0 - reflected) * mirrored_m)) ** 2
         seen = (reflected * max_range_m / mirrored_m) ** 2 * _WALL_OVER_DARK

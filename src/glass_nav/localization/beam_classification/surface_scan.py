@@ -11,8 +11,8 @@ from typing import Tuple
 
 import numpy as np
 
-from glass_nav.localization.beam_classification.case_votes import FIRST_PENETRATION, SECOND_PENETRATION, SPECULAR
 from glass_nav.localization.beam_classification.expected_ranges import ExpectedRanges
+from glass_nav.vocabulary import BeamCase
 
 _SURE = 0.5  # chance from which a wall is taken for glass, and for being there
 _UNANSWERED_BY_GLASS, _UNANSWERED_BY_WALLS = 0.3, 0.01  # share of the beams that do not come back
@@ -60,7 +60,7 @@ def of(
     beside, within = _walls_beside(references)
     with np.errstate(invalid="ignore"):
         behind = np.isfinite(first_m) & (ranges_m > first_m + gate_m)  # also without an answer
-    explained = np.isin(case, (SPECULAR, FIRST_PENETRATION, SECOND_PENETRATION))
+    explained = np.isin(case, (BeamCase.SPECULAR, BeamCase.FIRST_PENETRATION, BeamCase.SECOND_PENETRATION))
     lost = np.isposinf(ranges_m) & _would_answer(references, max_range_m)
     silent = _UNANSWERED_BY_GLASS * seen_through
     gone_through = silent > _SURE * (silent + _UNANSWERED_BY_WALLS * (1.0 - seen_through))

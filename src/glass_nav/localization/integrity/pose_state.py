@@ -15,9 +15,7 @@ import numpy as np
 from glass_nav.hypotheses.global_search import Candidates
 from glass_nav.localization.integrity.kidnap_detector import Verdict
 from glass_nav.localization.particle_filter.pose_estimate import PoseEstimate
-
-UNKNOWN, GLOBAL_SEARCH, LOCALIZED, UNCERTAIN, LOST = ("UNKNOWN", "GLOBAL_SEARCH", "LOCALIZED", "UNCERTAIN", "LOST")
-STATES = (UNKNOWN, GLOBAL_SEARCH, LOCALIZED, UNCERTAIN, LOST)
+from glass_nav.vocabulary import LocalizationState
 
 _POSSIBLE = 8.0  # nats behind the best: a place that still counts in words
 _LOST_BEHIND = 3.0  # nats that another place is better by
@@ -52,7 +50,7 @@ class QualityLimits:
 class Judgement:
     """What to think of the pose."""
 
-    state: str
+    state: LocalizationState
     reason: str  # in one sentence
     reliability: float  # chance that the pose is right, 0..1
     places: int = 1  # that are possible while the pose is looked for; 0: no scan has told anything yet
@@ -91,7 +89,12 @@ class PoseQuality:
         """Of the best cluster of particles."""
         if self._candidates is not None:
             known = best.share if len(self._candidates.poses) else 0.0
-            return Judgement(GLOBAL_SEARCH, _progress(self._candidates), min(known, 1.0), _possible(self._candidates))
+            return Judgement(
+                LocalizationState.GLOBAL_SEARCH,
+                _progress(self._candidates),
+                min(known, 1.0),
+                _possible(self._candidates),
+            )
         limits = self._limits
         position_sigma_m = float(np.sqrt(np.linalg.eigvalsh(best.covariance[:2, :2])[-1]))
         heading_sigma_rad = float(np.sqrt(best.covariance[2, 2]))
@@ -105,26 +108,26 @@ class PoseQuality:
             f"{np.degrees(heading_sigma_rad):.1f} deg"
         )
         if np.isnan(self._used_share):
-            return Judgement(UNCERTAIN, f"no scan has been used yet; {spread}", 0.0)
+            return Judgement(LocalizationState.UNCERTAIN, f"no scan has been used yet; {spread}", 0.0)
         explained = f"the map explains {self._used_share:.0%} of the answering beams"
         reliability = _reliability(self._used_share, self._verdict, best)
         elsewhere = _elsewhere(self._verdict)
         if elsewhere is not None and self._verdict is not None and self._verdict.behind > _LOST_BEHIND:
-            return Judgement(LOST, f"{elsewhere}; {explained}", reliability)
+            return Judgement(LocalizationState.LOST, f"{elsewhere}; {explained}", reliability)
         if self._used_share < limits.lost_used_share:
-            return Judgement(LOST, explained, reliability)
+            return Judgement(LocalizationState.LOST, explained, reliability)
         if elsewhere is not None:
-            return Judgement(UNCERTAIN, f"{elsewhere}; {explained}; {spread}", reliability)
+            return Judgement(LocalizationState.UNCERTAIN, f"{elsewhere}; {explained}; {spread}", reliability)
         if wide or self._used_share < limits.uncertain_used_share:
-            return Judgement(UNCERTAIN, f"{explained}; {spread}", reliability)
+            return Judgement(LocalizationState.UNCERTAIN, f"{explained}; {spread}", reliability)
         doubted = self._verdict is not None and self._verdict.doubted
         if doubted and reliability < limits.localized_min_reliability:
             return Judgement(
-                UNCERTAIN,
+                LocalizationState.UNCERTAIN,
                 f"all signs together make it right by {reliability:.0%} only; {explained}; {spread}",
                 reliability,
             )
-        return Judgement(LOCALIZED, f"{explained}; {spread}", reliability)
+        return Judgement(LocalizationState.LOCALIZED, f"{explained}; {spread}", reliability)
 
 
 def _possible(candidates: Candidates) -> int:

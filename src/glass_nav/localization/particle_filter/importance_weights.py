@@ -17,11 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from glass_nav.geometry import angles
-from glass_nav.localization.beam_classification.case_votes import DIFFUSE, SPECULAR, UNCERTAIN
 from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, cos_incidence
 from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.raycast import RayCaster
+from glass_nav.vocabulary import BeamCase
 
 WEIGHT_MODES = ("field", "ranges")
 
@@ -84,11 +84,11 @@ def by_ranges(
     log_w = np.zeros(len(map_from_laser))
     if not len(case):
         return log_w
-    for chosen in (case == DIFFUSE, case != DIFFUSE):
+    for chosen in (case == BeamCase.DIFFUSE, case != BeamCase.DIFFUSE):
         if not chosen.any():
             continue
         angle, z = angles_rad[chosen], measured_m[chosen]
-        if case[chosen][0] == DIFFUSE:
+        if case[chosen][0] == BeamCase.DIFFUSE:
             hits = caster.cast_first(map_from_laser, angle, max_range_m)
             expected, cell = hits.range_m, hits.cell
         else:
@@ -121,7 +121,7 @@ def by_field(
 
 def known_ends(case: np.ndarray) -> np.ndarray:
     """(B,) bool: the beam ended at a surface of the map, by a straight way."""
-    return (case != UNCERTAIN) & (case != SPECULAR)
+    return (case != BeamCase.UNCERTAIN) & (case != BeamCase.SPECULAR)
 
 
 def _log_density(across_m: np.ndarray, residuals: RangeResiduals, mixture: BeamMixture) -> np.ndarray:

@@ -20,7 +20,6 @@ Parameters: TopologyParams, read once; explained in config/topology.yaml.
 
 from __future__ import annotations
 
-import logging
 import threading
 from dataclasses import replace
 from typing import Any, Callable, List, Optional, Tuple
@@ -34,6 +33,7 @@ from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 from visualization_msgs.msg import Marker, MarkerArray
 
 from glass_nav import params
+from glass_nav.log_line import LogLine
 from glass_nav.msg import (
     EdgeTraversal,
     LocalizeGloballyAction,
@@ -58,8 +58,6 @@ from glass_nav.topology.observations import ObservationError
 from glass_nav.topology.search_session import Decision, GoalOutcome, SearchSession, SearchStatus
 
 SERVICE_TIMEOUT_S = 30.0
-LOG_PERIOD_S = 5.0  # of lines that may come with every report
-LOGGERS = {logging.INFO: rospy.loginfo, logging.WARNING: rospy.logwarn, logging.ERROR: rospy.logerr}
 
 
 class TopologyNode:
@@ -90,7 +88,7 @@ class TopologyNode:
             search_session.Turn: self._publish_turn,
             search_session.InitialPose: self._publish_pose,
             search_session.GoalEnd: self._end_goal,
-            search_session.LogLine: self._log_line,
+            LogLine: self._log.write,
         }
         self._carry_out(self._session.start())
         rospy.Service("~restart", Trigger, self._service(self._restart))
@@ -254,10 +252,6 @@ class TopologyNode:
     @property
     def _atlas(self) -> Optional[Atlas]:
         return None if self._session.localizer is None else self._session.localizer.atlas
-
-    def _log_line(self, line: search_session.LogLine) -> None:
-        if not line.often or self._log.is_due(line.text, LOG_PERIOD_S):
-            LOGGERS[line.level](line.text)
 
 
 def main() -> None:

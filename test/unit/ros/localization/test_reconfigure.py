@@ -33,8 +33,7 @@ def test_a_client_sees_every_parameter_with_its_type_and_value(described):
 def test_every_parameter_is_explained(described):
     assert not [name for name, each in described.items() if not each["description"]]
     assert described["transform_tolerance"]["description"] == (
-        "[s] map -> odom is stamped so far ahead of the scan; raise it if move_base complains about transforms of the "
-        "future"
+        "[s] map -> odom is stamped ahead of the scan by this time; raise it if move_base reports extrapolation errors"
     )
 
 

@@ -232,10 +232,3 @@ def test_shipped_atlases_are_found_by_name_and_a_near_miss_is_helped() -> None:
     with pytest.raises(AtlasError) as refused:
         shipped_atlases.find("document_exampel")
     assert str(refused.value).endswith("did you mean document_example?")
-    assert shipped_atlases.atlas_folder(Path("/")) is None
-
-
-def test_an_installed_package_finds_its_atlases_in_share(tmp_path: Path) -> None:
-    module = tmp_path / "lib" / "python3" / "dist-packages" / "glass_nav" / "topology" / "shipped_atlases.py"
-    (tmp_path / "share" / "glass_nav" / "atlas").mkdir(parents=True)
-    assert shipped_atlases.atlas_folder(module) == tmp_path / "share" / "glass_nav" / "atlas"

@@ -1,0 +1,1 @@
+"""What the wake-up demo shows and measures."""
