@@ -17,7 +17,6 @@ from glass_nav.demo import tour
 from glass_nav.demo.heard import Heard, SearchNews
 from glass_nav.evaluation.metrics import pose_errors
 from glass_nav.evaluation.plots import wake_up_picture
-from glass_nav.evaluation.plots.run_pictures import MapImage
 from glass_nav.evaluation.plots.wake_up_picture import Depth, WakeUpStory
 from glass_nav.geometry import angles, polyline
 from glass_nav.topology.atlas.atlas import Atlas
@@ -310,9 +309,8 @@ class WakeUpDemo:
             heard.poses.get(last_ns),
             heard.truth.get(last_ns),
         )
-        grid, path = heard.grid_map, Path(self._p.picture)
+        path = Path(self._p.picture)
         path.parent.mkdir(parents=True, exist_ok=True)
-        image = MapImage(grid.occupancy, grid.resolution_m, grid.map_from_grid)
         title = f"{self._atlas.name}: {outcome} after {max(len(self._depths) - 1, 0)} edges"
-        wake_up_picture.draw(path, image, story, title)
+        wake_up_picture.draw(path, heard.grid_map, story, title)
         self._robot.say(f"picture: {path}")

@@ -156,7 +156,7 @@ class SearchSession:
 
     @property
     def choice(self) -> Optional[TurnChoice]:
-        """The turn that the robot was last told to take; None if there is none to take."""
+        """The last turn of this search; None if there is none to take."""
         return None if self._status.estimate is None else self._status.estimate.choice
 
     @property
@@ -326,7 +326,7 @@ class SearchSession:
         )
 
     def _judge(self, localizer: AtlasLocalizer, estimate: SearchEstimate, stamp_ns: int) -> List[Decision]:
-        """What follows from what a meetpoint told."""
+        """The decisions on the estimate after a meetpoint."""
         goal = self._goal
         gives_up = goal is not None and not estimate.done and 0 < goal.max_edges <= estimate.depth
         if gives_up:

@@ -37,10 +37,9 @@ class FixParams:
         for name in ("window_s", "max_age_s", "rescue_period_s", "min_position_sigma_m", "min_heading_sigma_rad"):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise ValueError(f"~{name} must be >= 0 and finite, got {getattr(self, name)}")
-        states = [state.value for state in LocalizationState]
-        unknown = [state for state in self.rescue_states.split() if state not in states]
+        unknown = [state for state in self.rescue_states.split() if state not in LocalizationState.__members__]
         if unknown:
-            raise ValueError(f"~rescue_states must be words of {', '.join(states)}, got {unknown[0]!r}")
+            raise ValueError(f"~rescue_states must be words of {', '.join(LocalizationState)}, got {unknown[0]!r}")
 
 
 @dataclass(frozen=True)

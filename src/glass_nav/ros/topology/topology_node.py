@@ -169,7 +169,7 @@ class TopologyNode:
             self._carry_out(self._session.preempt())
 
     def _service(self, work: Callable[[], str]) -> Callable[[TriggerRequest], TriggerResponse]:
-        """A service that has the run loop do something and gives back what it says."""
+        """A service that lets the run loop do the work and returns its message."""
 
         def serve(_request: TriggerRequest) -> TriggerResponse:
             try:
