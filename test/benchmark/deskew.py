@@ -57,7 +57,7 @@ def errors(grid_map: GridMap, frames: List[Frame], straighten: bool, seed: int) 
     off = []
     for frame in frames:
         turns = straighten and frame.scan.time_increment_s > 0.0
-        scan = deskew.straightened(frame.scan, odometry) if turns else frame.scan
+        scan = deskew.deskewed(frame.scan, odometry) if turns else frame.scan
         error = localizer.update(scan, frame.odom_from_base).map_from_base - frame.map_from_base
         off.append((np.hypot(error[0], error[1]), angles.wrap(error[2])))
     return np.array(off)

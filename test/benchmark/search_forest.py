@@ -34,7 +34,7 @@ from glass_nav.topology.search import wake_up_trials
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search.search_params import SearchParams
-from glass_nav.topology.search.wake_up_trials import Surroundings, TrialParams
+from glass_nav.topology.search.atlas_robot import Surroundings, TrialParams
 
 LIMITS_MS = {10_000: 10.0, 100_000: 60.0, 1_000_000: 300.0}
 

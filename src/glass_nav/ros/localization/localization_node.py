@@ -36,7 +36,6 @@ import tf2_ros
 from geometry_msgs.msg import PolygonStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import SetMap, SetMapRequest, SetMapResponse
-from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from glass_nav.localization import health, initial_pose
@@ -55,8 +54,10 @@ from glass_nav.ros.localization.reconfigure import ReconfigureServer
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
-from glass_nav.ros.scan_input import STALE_SCANS, ScanInput
+from glass_nav.ros.scan_input import ScanInput
+from glass_nav.ros.tf_transforms import TfTransforms
 from glass_nav.sensing.scan import ScanError
+from glass_nav.sensing.scan_placement import RawScan
 from glass_nav.world import landmark_file
 from glass_nav.world.grid_map import GridMap
 
@@ -84,7 +85,7 @@ class LocalizationNode:
         self._outputs = Publishers(p.node)
         self._session = LocalizationSession(
             p.session,
-            self._odometry_at,
+            TfTransforms(self._tf, p.node.odom_frame_id, p.node.base_frame_id).odom_from_base,
             bool(rospy.get_param("/use_sim_time", False)),
             self._clock.now_s,
             self._outputs.start_over,
@@ -122,11 +123,12 @@ class LocalizationNode:
             if self._session.waits_for_pose and mail["scans"]:
                 mail["scans"], self._scans.last_arrival_s = [], self._clock.now_s
             for msg in mail["scans"]:
-                if self._scans.receive(msg, self._clock.now_s, self._session.refusal):
-                    self._restart(f"the last {STALE_SCANS} scans are older than the one before them")
+                stale = self._scans.receive(msg, self._clock.now_s, self._session.refusal)
+                if stale is not None:
+                    self._restart(stale)
             if self._session.refusal is None:
-                for msg in self._scans.take_ready(self._clock.now_s):
-                    self._step(msg)
+                for raw in self._scans.take_ready(self._clock.now_s):
+                    self._step(raw)
             self._send_glass_map()
             self._report()
 
@@ -208,12 +210,12 @@ class LocalizationNode:
 
     # -- scans
 
-    def _step(self, msg: LaserScan) -> None:
+    def _step(self, raw: RawScan) -> None:
         """One scan through the filter."""
         try:
-            placed = self._scans.place(msg)
+            placed = self._scans.place(raw)
         except ScanError as err:
-            self._pass_over(msg, str(err))
+            self._pass_over(raw.stamp_ns, str(err))
             return
         began_cpu_s, began_s = time.process_time(), time.monotonic()
         session, scan, odom_from_base = self._session, placed.scan, placed.odom_from_base
@@ -222,7 +224,7 @@ class LocalizationNode:
         try:
             estimate = session.update(scan, odom_from_base, self._clock.now_s)
         except ValueError as err:  # ScanError, and what the filter cannot work out: a robot drives on by odometry
-            self._pass_over(msg, str(err))
+            self._pass_over(raw.stamp_ns, str(err))
             return
         self._health.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
         if estimate is None:
@@ -230,15 +232,14 @@ class LocalizationNode:
             self._log.error("the filter's pose is not finite: nothing is published")
             return
         self._scans.counts.used += 1
-        self._outputs.send(msg, placed, estimate, self._clock.now_s, session.pose_is_news)
+        self._outputs.send(placed, estimate, self._clock.now_s, session.pose_is_news)
         session.pose_is_news = False
         self._memory.take(estimate, session.grid_map.digest, self._p.node.save_pose_rate, self._clock.now_s)
 
-    def _pass_over(self, msg: LaserScan, why: str) -> None:
+    def _pass_over(self, stamp_ns: int, why: str) -> None:
         """A scan that cannot be used: the pose moves on with the odometry all the same."""
         self._scans.refuse(why)
         if self._session.estimate is not None:
-            stamp_ns = conversions.ns_from_stamp(msg.header.stamp)
             self._outputs.send_transform(stamp_ns, self._session.estimate.map_from_odom)
 
     def _send_glass_map(self) -> None:
@@ -246,16 +247,6 @@ class LocalizationNode:
         if session.localizer is not None and session.grid_map is not None:
             stamp_ns = 0 if session.estimate is None else session.estimate.stamp_ns
             self._outputs.send_glass_map(session.localizer, session.grid_map, stamp_ns, self._clock.now_s)
-
-    def _odometry_at(self, stamp_ns: int) -> np.ndarray:
-        """odom_from_base (3,); ValueError if tf does not know it."""
-        try:
-            transform = self._tf.lookup_transform(
-                self._p.node.odom_frame_id, self._p.node.base_frame_id, conversions.stamp_from_ns(stamp_ns)
-            ).transform
-        except tf2_ros.TransformException as err:
-            raise ValueError(str(err)) from err
-        return conversions.planar_from_transform(transform)
 
     # -- time, and what is missing
 
