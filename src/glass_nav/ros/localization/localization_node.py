@@ -36,7 +36,6 @@ import tf2_ros
 from geometry_msgs.msg import PolygonStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import SetMap, SetMapRequest, SetMapResponse
-from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from glass_nav.localization import health
@@ -55,8 +54,9 @@ from glass_nav.ros.localization.reconfigure import ReconfigureServer
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
-from glass_nav.ros.scan_input import STALE_SCANS, ScanInput
+from glass_nav.ros.scan_input import ScanInput
 from glass_nav.sensing.scan import Scan, ScanError
+from glass_nav.sensing.scan_placement import RawScan
 from glass_nav.world import landmark_file
 from glass_nav.world.grid_map import GridMap
 
@@ -128,11 +128,12 @@ class LocalizationNode:
                 mail["scans"], self._scans.last_arrival_s = [], self._clock.now_s
             unusable = "there is no map yet" if self._localizer is None else None
             for msg in mail["scans"]:
-                if self._scans.receive(msg, self._clock.now_s, unusable):
-                    self._restart(f"the last {STALE_SCANS} scans are older than the one before them")
+                stale = self._scans.receive(msg, self._clock.now_s, unusable)
+                if stale is not None:
+                    self._restart(stale)
             if self._localizer is not None:
-                for msg in self._scans.take_ready(self._clock.now_s):
-                    self._step(msg)
+                for raw in self._scans.take_ready(self._clock.now_s):
+                    self._step(raw)
             if self._localizer is not None and self._map is not None:
                 stamp_ns = 0 if self._estimate is None else self._estimate.stamp_ns
                 self._outputs.send_glass_map(self._localizer, self._map, stamp_ns, self._clock.now_s)
@@ -266,13 +267,13 @@ class LocalizationNode:
 
     # -- scans
 
-    def _step(self, msg: LaserScan) -> None:
+    def _step(self, raw: RawScan) -> None:
         """One scan through the filter."""
         assert self._localizer is not None and self._map is not None
         try:
-            placed = self._scans.place(msg)
+            placed = self._scans.place(raw)
         except ScanError as err:
-            self._pass_over(msg, str(err))
+            self._pass_over(raw.stamp_ns, str(err))
             return
         began_cpu_s, began_s = time.process_time(), time.monotonic()
         if self._starts.apply(
@@ -285,7 +286,7 @@ class LocalizationNode:
         try:
             estimate = self._localizer.update(placed.scan, placed.odom_from_base)
         except ValueError as err:  # ScanError, and what the filter cannot work out: a robot drives on by odometry
-            self._pass_over(msg, str(err))
+            self._pass_over(raw.stamp_ns, str(err))
             return
         self._health.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
         if not conversions.is_finite(estimate):
@@ -294,15 +295,15 @@ class LocalizationNode:
             return
         self._scans.counts.used += 1
         self._estimate, self._scan, self._last_estimate_s = estimate, placed.scan, self._clock.now_s
-        self._outputs.send(msg, placed, estimate, self._clock.now_s, self._pose_is_news)
+        self._outputs.send(placed, estimate, self._clock.now_s, self._pose_is_news)
         self._pose_is_news = False
         self._memory.take(estimate, self._map.digest, self._p.node.save_pose_rate, self._clock.now_s)
 
-    def _pass_over(self, msg: LaserScan, why: str) -> None:
+    def _pass_over(self, stamp_ns: int, why: str) -> None:
         """A scan that cannot be used: the pose moves on with the odometry all the same."""
         self._scans.refuse(why)
         if self._estimate is not None:
-            self._outputs.send_transform(conversions.ns_from_stamp(msg.header.stamp), self._estimate.map_from_odom)
+            self._outputs.send_transform(stamp_ns, self._estimate.map_from_odom)
 
     # -- time, and what is missing
 

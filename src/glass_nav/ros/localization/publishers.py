@@ -18,7 +18,7 @@ from glass_nav.ros import conversions
 from glass_nav.ros.localization import beam_displays, legend, wall_display
 from glass_nav.ros.localization.params import LocalizationNodeParams
 from glass_nav.ros.rate_limiter import RateLimiter, period_s
-from glass_nav.ros.scan_input import PlacedScan
+from glass_nav.sensing.scan_placement import PlacedScan
 from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
 
@@ -62,18 +62,18 @@ class Publishers:
         """There is another glass map than the one that was sent."""
         self._glass_is_news = True
 
-    def send(self, msg: LaserScan, placed: PlacedScan, estimate: Estimate, now_s: float, pose_is_news: bool) -> None:
+    def send(self, placed: PlacedScan, estimate: Estimate, now_s: float, pose_is_news: bool) -> None:
         """All about one scan that was used.
 
         Args:
-            msg, placed: the scan.
+            placed: the scan.
             estimate: what the filter says of it.
             now_s: ROS time.
             pose_is_news: publish the pose even if this scan did not move the particles.
         """
         self._was_localized = self._was_localized or estimate.state == LocalizationState.LOCALIZED
         self.send_transform(estimate.stamp_ns, estimate.map_from_odom)
-        self._surfaces.publish(conversions.surface_scan_msg(msg, placed.scan, estimate.surface_scan))
+        self._surfaces.publish(conversions.surface_scan_msg(placed, estimate.surface_scan))
         self._status.publish(
             conversions.status_msg(
                 estimate.stamp_ns,
@@ -90,7 +90,7 @@ class Publishers:
                 self._particles.publish(conversions.pose_array(estimate.stamp_ns, self._frame, estimate.particles))
         self._glass_is_news = self._glass_is_news or estimate.updated
         if self._beam_cases.get_num_connections():
-            self._beam_cases.publish(conversions.beam_cases_msg(msg.header, placed.scan, estimate.cases))
+            self._beam_cases.publish(conversions.beam_cases_msg(placed.scan, estimate.cases))
         self._show_beams(placed, estimate, now_s)
 
     def send_transform(self, stamp_ns: int, map_from_odom: np.ndarray) -> None:
