@@ -50,8 +50,8 @@ ONLY_BY = {  # compiled modules, each behind its face; and what is heavy, where 
     "glass_nav._beam_vote": "localization",
     "glass_nav._mrpt_grid": "hypotheses sensing",
     "glass_nav._mrpt_io": "recording world",
+    "dask": "compare",
     "distributed": "compare",
-    "joblib": "compare",
     "matplotlib": "evaluation",
     "rosbags": "recording",
 }
