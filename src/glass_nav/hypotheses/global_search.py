@@ -20,8 +20,9 @@ from typing import Dict, Optional, Sequence, Tuple
 import numpy as np
 
 from glass_nav.geometry import angles, se2
-from glass_nav.hypotheses import bearing_weights, scan_alignment
+from glass_nav.hypotheses import bearing_weights, pose_tracker, scan_alignment
 from glass_nav.hypotheses.bearing_weights import BearingMixture
+from glass_nav.hypotheses.pose_tracker import PoseTracker
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
@@ -32,13 +33,11 @@ _BEAMS = 60
 _MIN_BEAMS = 10  # fewer tell nothing about where they were taken
 _PLACES = 4000  # of an exhaustive search, before they are aligned
 _SLIDE_M = 0.6  # that an alignment may lead away from where the scan was found
-_MOST = 1500  # candidates that are followed
+_MAX_CANDIDATES = 1500  # that are followed
 _EVIDENCE_SCALE_M = 0.2  # a beam that ends this far from a wall speaks for the place by one half
-_NATS_OF_A_FULL_FIT = 20.0  # between places where all beams end on walls and where none does, in one view
+_FULL_FIT = 20.0  # log likelihood ratio of a place where all beams end on walls to one where none does, in one view
 _VIEW_M = 2.0  # after so much way the surroundings are seen anew
-_HOPELESS = 40.0  # nats behind the best: dropped
-_SAME_CELL = np.array([0.3, 0.3, 0.15])  # candidates in one cell are one [m, m, rad]
-_SAME_PLACE_M, _SAME_PLACE_RAD = 0.7, 0.25  # candidates nearer than this are no rivals
+_MAX_BEHIND = 40.0  # log likelihood ratio of the best candidate to one that is dropped
 _SEARCH_AGAIN_M = 2.0
 _POOR_FIT = 0.75  # of its usual one: the best candidate may be none, look again at once
 _STEP_NOISE = np.array(
@@ -97,11 +96,10 @@ class GlobalSearch:
         params: when a place is found.
         """
         self._matcher, self._field, self._params = matcher, field, params
-        self._poses = np.zeros((0, 3))
-        self._evidence = np.zeros(0)  # (K,) nats
+        self._tracker = PoseTracker(_MAX_BEHIND, _MAX_CANDIDATES)
+        self._evidence = np.zeros(0)  # (K,) log likelihoods
         self._fit_sum = np.zeros(0)  # (K,) of fit times the share of a view
         self._views = np.zeros(0)  # (K,) of these shares
-        self._odom_from_base: Optional[np.ndarray] = None
         self._noise = _STEP_NOISE[:, 0]  # (3,) deviations of the last step
         self._looked = False
         self._way_m = 0.0  # since the last look everywhere
@@ -135,9 +133,9 @@ class GlobalSearch:
                 # This scan alone proposes them: they start behind what was followed so far, by how well each fits.
                 fits = fit(self._field, points, found)
                 start = self._evidence.max() - self._params.search_margin
-                self._append(found, start + _NATS_OF_A_FULL_FIT * (fits - fits.max()))
+                self._append(found, start + _FULL_FIT * (fits - fits.max()))
                 self._keep_distinct()
-        if len(self._poses):  # there are none before a scan proposes them
+        if len(self._tracker):  # there are none before a scan proposes them
             for taken, landmarks in bearings:
                 self._weigh_by(taken, landmarks)
         return self._candidates()
@@ -148,15 +146,13 @@ class GlobalSearch:
 
     def _move(self, scan: Scan, odom_from_base: np.ndarray) -> float:
         """The candidates by odometry; the share of a new view that this step gave."""
-        before, self._odom_from_base = self._odom_from_base, np.array(odom_from_base, float)
-        if before is None:
+        step = self._tracker.carry(odom_from_base)
+        if step is None:
             return 1.0
-        step = se2.compose(se2.inverse(before), odom_from_base)
         way_m, turn_rad = se2.travelled(step)
         self._way_m += way_m
         self._driven_m += way_m
         self._noise = _STEP_NOISE @ np.array([1.0, way_m, turn_rad])
-        self._poses = se2.compose(self._poses, step)
         # What a turn brings into view is what the lidar does not see already.
         unseen = max(0.0, 2.0 - float(np.ptp(scan.angles_rad)) / np.pi)
         return min(1.0, (way_m + unseen * turn_rad) / _VIEW_M)
@@ -164,13 +160,14 @@ class GlobalSearch:
     def _judge(self, points: np.ndarray, view: float) -> None:
         """Align the candidates with the scan, as far as odometry allows, and let it speak for each."""
         information = np.diag(_BEAM_VARIANCE * len(points) / _BEAMS / self._noise**2)
-        moved = scan_alignment.align_near(self._field, points, self._poses, information)
-        off = (moved - self._poses) / self._noise
-        off[:, 2] = angles.wrap(moved[:, 2] - self._poses[:, 2]) / self._noise[2]
+        poses = self._tracker.poses
+        moved = scan_alignment.align_near(self._field, points, poses, information)
+        off = (moved - poses) / self._noise
+        off[:, 2] = angles.wrap(moved[:, 2] - poses[:, 2]) / self._noise[2]
         penalty = np.minimum(0.125 * np.sum(off**2, axis=1), _MAX_PENALTY)
-        self._poses = moved
+        self._tracker.poses = moved
         fits = fit(self._field, points, moved)
-        self._evidence = self._evidence + view * _NATS_OF_A_FULL_FIT * fits - penalty
+        self._evidence = self._evidence + view * _FULL_FIT * fits - penalty
         self._fit_sum = self._fit_sum + view * fits
         self._views = self._views + view
         self._keep_distinct()
@@ -180,12 +177,14 @@ class GlobalSearch:
         new = np.array([self._driven_m - self._told_at_m.get(name, -_VIEW_M) >= _VIEW_M for name in bearings.ids], bool)
         bearings = bearings.subset(new)
         self._told_at_m.update(dict.fromkeys(bearings.ids, self._driven_m))
-        self._evidence = self._evidence + bearing_weights.log_weights(self._poses, bearings, landmarks, _BEARINGS)
+        self._evidence = self._evidence + bearing_weights.log_weights(
+            self._tracker.poses, bearings, landmarks, _BEARINGS
+        )
         self._keep_distinct()
 
     def _best_fits_poorly(self, points: np.ndarray) -> bool:
         best = int(np.argmax(self._evidence))
-        fit_now = fit(self._field, points, self._poses[best : best + 1])[0]
+        fit_now = fit(self._field, points, self._tracker.poses[best : best + 1])[0]
         return bool(fit_now < _POOR_FIT * self._fit_sum[best] / max(self._views[best], 1e-9))
 
     def _look_everywhere(self, points: np.ndarray) -> np.ndarray:
@@ -195,32 +194,29 @@ class GlobalSearch:
         places = scan_alignment.align(self._field, points, starts)
         near = np.hypot(*(places.poses[:, :2] - starts[:, :2]).T) < _SLIDE_M  # farther away it is another place
         poses = places.poses[near][np.argsort(-places.fit[near], kind="stable")]
-        return poses[_first_of_each_cell(poses)]
+        return poses[pose_tracker.first_of_each_cell(poses)]
 
     def _append(self, poses: np.ndarray, evidence: np.ndarray) -> None:
         nothing = np.zeros(len(poses))
-        self._poses = np.concatenate([self._poses, poses])
+        self._tracker.add(poses)
         self._evidence = np.concatenate([self._evidence, evidence])
         self._fit_sum = np.concatenate([self._fit_sum, nothing])
         self._views = np.concatenate([self._views, nothing])
 
     def _keep_distinct(self) -> None:
-        """Of candidates that have become one the best, of all those that have a chance, the best first."""
-        order = np.argsort(-self._evidence, kind="stable")
-        order = order[self._evidence[order] > self._evidence[order[0]] - _HOPELESS] if len(order) else order
-        chosen = order[_first_of_each_cell(self._poses[order])][:_MOST]
-        self._poses, self._evidence = self._poses[chosen], self._evidence[chosen]
+        chosen = self._tracker.keep_distinct(self._evidence)
+        self._evidence = self._evidence[chosen]
         self._fit_sum, self._views = self._fit_sum[chosen], self._views[chosen]
 
     def _candidates(self) -> Candidates:
-        if not len(self._poses):
-            return Candidates(self._poses, self._evidence, float("nan"), 0.0, False)
+        poses = self._tracker.poses
+        if not len(poses):
+            return Candidates(poses, self._evidence, float("nan"), 0.0, False)
         weights = np.exp(self._evidence - self._evidence[0])
-        rivals = ~same_place(self._poses, self._poses[0])
-        lead = float(self._evidence[0] - self._evidence[rivals].max()) if rivals.any() else float("inf")
+        lead = pose_tracker.lead(poses[0], self._evidence[0], poses, self._evidence)
         fit = float(self._fit_sum[0] / self._views[0]) if self._views[0] > 0.0 else float("nan")
         found = lead > self._params.search_margin and fit >= self._params.search_least_fit
-        return Candidates(self._poses, weights / weights.sum(), fit, lead, bool(found))
+        return Candidates(poses, weights / weights.sum(), fit, lead, bool(found))
 
 
 def telling_points(scan: Scan) -> Optional[np.ndarray]:
@@ -232,16 +228,3 @@ def telling_points(scan: Scan) -> Optional[np.ndarray]:
 def fit(field: DistanceField, points_m: np.ndarray, poses: np.ndarray) -> np.ndarray:
     """(K,) how well such points fit at poses (K, 3), 0..1."""
     return scan_alignment.fit(field, points_m, poses, _EVIDENCE_SCALE_M)
-
-
-def same_place(poses: np.ndarray, pose: np.ndarray) -> np.ndarray:
-    """(K,) bool: poses (K, 3) so near to a pose (3,) that they are no rivals of it."""
-    return (np.hypot(*(poses[:, :2] - pose[:2]).T) < _SAME_PLACE_M) & (
-        np.abs(angles.wrap(poses[:, 2] - pose[2])) < _SAME_PLACE_RAD
-    )
-
-
-def _first_of_each_cell(poses: np.ndarray) -> np.ndarray:
-    """Ascending indices of the poses (K, 3) that are the first in their cell of _SAME_CELL; yaw goes round."""
-    cells = np.round(np.column_stack([poses[:, :2], angles.wrap(poses[:, 2])]) / _SAME_CELL).astype(np.int64)
-    return np.sort(np.unique(cells, axis=0, return_index=True)[1])

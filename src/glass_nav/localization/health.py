@@ -10,7 +10,7 @@ import numpy as np
 from glass_nav.health import Health, Level
 from glass_nav.localization.localizer import Estimate
 from glass_nav.sensing.scan import Scan
-from glass_nav.sensing.waiting_scans import ScanCounts
+from glass_nav.sensing.scan_queue import ScanCounts
 from glass_nav.vocabulary import CASES_IN_ORDER, LocalizationState
 from glass_nav.world.grid_map import GridMap
 

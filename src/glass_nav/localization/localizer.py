@@ -12,7 +12,7 @@ from typing import Callable, List, Optional, Tuple
 import numpy as np
 
 from glass_nav.geometry import se2
-from glass_nav.hypotheses import global_search
+from glass_nav.hypotheses import pose_tracker
 from glass_nav.hypotheses.global_search import GlobalSearch
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.localization import initial_pose, start_area
@@ -263,7 +263,7 @@ class Localizer:
         if candidates.found:
             return self._settle(scan, odom_from_base, candidates.poses[0], candidates.fit)
         if len(candidates.poses):
-            here = global_search.same_place(candidates.poses, candidates.poses[0])
+            here = pose_tracker.same_place(candidates.poses, candidates.poses[0])
             self._filter.stand_for(candidates.poses, candidates.weights, here, candidates.covariance, _SHOWN)
         return self._classifier.classify(scan, self._filter.best.map_from_base, np.zeros((3, 3)))[0]
 

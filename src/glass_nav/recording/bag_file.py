@@ -29,8 +29,9 @@ from glass_nav.recording.recording import (
     Step,
     trajectory_from_samples,
 )
-from glass_nav.sensing import deskew
-from glass_nav.sensing.scan import Scan, ScanError, scan_from_fields
+from glass_nav.sensing.mounting import Mounting, level_mounting
+from glass_nav.sensing.scan import ScanError
+from glass_nav.sensing.scan_placement import NoTransform, RawScan, ScanPlacement, Transforms
 
 SCAN = "sensor_msgs/LaserScan"
 ODOMETRY = "nav_msgs/Odometry"
@@ -40,7 +41,6 @@ POSES = ("geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped",
 TRUE_BEAMS, BEAM_CASES = "glass_nav/TrueBeams", "glass_nav/BeamCases"
 LAST_CASE = 4
 BASE_FRAMES = ("base_link", "base_footprint")  # tried in this order when no base frame is given
-LEVEL = math.cos(math.radians(20.0))  # a scan plane tilted further does not show the plan of a floor
 
 
 def open_log(paths: Sequence[Path], options: LogOptions) -> Recording:
@@ -60,7 +60,7 @@ def open_log(paths: Sequence[Path], options: LogOptions) -> Recording:
             odometry = _odometry(bag, tree, options, notes)
             base_frame = _base_frame(bag, tree, odometry, options)
             _check_laser(bag, scan_topic, tree, base_frame, options)
-            notes += _turn_notes(bag, scan_topic, options.deskew)
+            notes += _sweep_notes(bag, scan_topic, options.deskew)
             truth = (
                 _tf_truth(bag, tree, odometry, base_frame, scan_topic, options, notes)
                 if (options.ground_truth or "").startswith(TF_SOURCE)
@@ -72,7 +72,8 @@ def open_log(paths: Sequence[Path], options: LogOptions) -> Recording:
             raise (RecordingError(f"{err}; {bag.damage}") if bag.damage else err) from err
         if bag.damage:
             notes.append(bag.damage)
-    entries = _Entries(paths, scan_topic, tree, odometry, base_frame, options)
+    placement = ScanPlacement(_BagTransforms(tree, odometry, base_frame, options), options.deskew)
+    entries = _Entries(paths, scan_topic, placement)
     beam_truth = None if truth_topic is None else _TrueBeams(paths, truth_topic)
     name = paths[0].name if len(paths) == 1 else f"{paths[0].name} and {len(paths) - 1} more"
     return Recording(name, scan_count, entries, truth, notes, beam_truth, odometry.frame or "odom", base_frame)
@@ -279,16 +280,14 @@ def _check_laser(bag: Bag, scan_topic: str, tree: FrameTree, base_frame: str, op
         return
 
 
-def _turn_notes(bag: Bag, scan_topic: str, straighten: bool) -> List[str]:
-    """What the first scans tell of the time that the lidar takes for its beams."""
+def _sweep_notes(bag: Bag, scan_topic: str, deskews: bool) -> List[str]:
+    """What the first scans say of the time that a sweep of the lidar takes."""
     for _, message in itertools.islice(bag.messages(scan_topic), 3):
-        beams, step_s = len(message.ranges), float(message.time_increment)
-        fault = deskew.fault(beams, step_s, float(message.scan_time))
-        if fault is not None:
-            return [f"scans are taken as of one moment: {fault}"]
-        turn_ns = deskew.turn_ns(beams, step_s)
-        if turn_ns and straighten:
-            return [f"the lidar turns for {turn_ns * 1e-6:.0f} ms: scans are straightened by odometry"]
+        raw = _raw_scan(message)
+        if raw.timing_fault is not None:
+            return [f"scans are taken as of one moment: {raw.timing_fault}"]
+        if raw.sweep_ns and deskews:
+            return [f"a sweep of the lidar takes {raw.sweep_ns * 1e-6:.0f} ms: scans are deskewed by odometry"]
     return []
 
 
@@ -387,76 +386,55 @@ def _trajectory(bag: Bag, topic: str) -> "Tuple[Trajectory, str]":
     return trajectory_from_samples(stamps, poses), child_frame
 
 
+class _BagTransforms(Transforms):
+    """What the bag knows of the robot's frames; the laser's place may be given instead."""
+
+    def __init__(self, tree: FrameTree, odometry: _Odometry, base_frame: str, options: LogOptions) -> None:
+        self._tree, self._odometry, self._base_frame = tree, odometry, base_frame
+        self._given = None if options.laser_pose is None else Mounting(np.array(options.laser_pose))
+
+    def odom_from_base(self, stamp_ns: int) -> np.ndarray:
+        try:
+            return self._odometry.at(self._tree, self._base_frame, stamp_ns)
+        except FrameError as err:
+            raise NoTransform(str(err)) from err
+
+    def mounting(self, lidar: str, stamp_ns: int) -> Mounting:
+        if self._given is not None:
+            return self._given
+        try:
+            transform = self._tree.lookup(self._base_frame, lidar, stamp_ns)
+        except FrameError as err:
+            raise NoTransform(str(err)) from err
+        return level_mounting(np.array(frames.planar(transform)), transform[0][2], frames.upwardness(transform))
+
+
 class _Entries:
     """Iterates the scans of a bag, opening it anew each time."""
 
-    def __init__(
-        self,
-        paths: Sequence[Path],
-        scan_topic: str,
-        tree: FrameTree,
-        odometry: _Odometry,
-        base_frame: str,
-        options: LogOptions,
-    ) -> None:
-        self._paths, self._scan_topic, self._tree, self._odometry = paths, scan_topic, tree, odometry
-        self._base_frame, self._laser_pose, self._deskew = base_frame, options.laser_pose, options.deskew
+    def __init__(self, paths: Sequence[Path], scan_topic: str, placement: ScanPlacement) -> None:
+        self._paths, self._scan_topic, self._placement = paths, scan_topic, placement
 
     def __iter__(self) -> Iterator[Entry]:
         latest_ns: Dict[str, int] = {}  # by frame: there may be several lidars
         with Bag(self._paths) as bag:
             for _, message in bag.messages(self._scan_topic):
-                stamp_ns, frame = _stamp_ns(message.header), message.header.frame_id
-                entry = self._entry(message, stamp_ns, latest_ns.get(frame, -1))
+                raw = _raw_scan(message)
+                entry = self._entry(raw, latest_ns.get(raw.lidar, -1))
                 if isinstance(entry, Step):
-                    latest_ns[frame] = stamp_ns
+                    latest_ns[raw.lidar] = raw.stamp_ns
                 yield entry
             if bag.damage:
                 yield Refusal(max(latest_ns.values(), default=0), bag.damage)
 
-    def _entry(self, message: Any, stamp_ns: int, latest_ns: int) -> Entry:
-        if stamp_ns < latest_ns:
-            return Refusal(stamp_ns, "time runs backwards")
-        laser_frame = message.header.frame_id.lstrip("/")
-        upside_down = False
+    def _entry(self, raw: RawScan, latest_ns: int) -> Entry:
+        if raw.stamp_ns < latest_ns:
+            return Refusal(raw.stamp_ns, "time runs backwards")
         try:
-            if self._laser_pose is not None:
-                base_from_laser = self._laser_pose
-            else:
-                transform = self._tree.lookup(self._base_frame, laser_frame, stamp_ns)
-                up = frames.upwardness(transform)
-                if abs(up) < LEVEL:
-                    tilt = math.degrees(math.acos(min(abs(up), 1.0)))
-                    return Refusal(stamp_ns, f"the laser is tilted by {tilt:.0f} degrees")
-                base_from_laser, upside_down = frames.planar(transform), up < 0.0
-            odom_from_base = self._odometry.at(self._tree, self._base_frame, stamp_ns)
-            scan = scan_from_fields(
-                stamp_ns,
-                message.ranges,
-                float(message.angle_min),
-                float(message.angle_increment),
-                float(message.range_min),
-                float(message.range_max),
-                np.array(base_from_laser),
-                upside_down,
-                laser_frame,
-                float(message.time_increment),
-            )
-            scan = self._straightened(scan, float(message.scan_time))
-        except FrameError as err:
-            return Refusal(stamp_ns, str(err))
+            placed = self._placement.place(raw)
         except ScanError as err:
-            return Refusal(stamp_ns, str(err).partition(": ")[2])
-        return Step(scan, odom_from_base)
-
-    def _straightened(self, scan: Scan, scan_time_s: float) -> Scan:
-        """The scan without the robot's motion while the lidar turned, where the log tells of its time."""
-        turn_ns = deskew.turn_ns(len(scan), scan.time_increment_s)
-        if not (self._deskew and turn_ns) or deskew.fault(len(scan), scan.time_increment_s, scan_time_s):
-            return scan
-        stamps_ns = deskew.knots_ns(scan.stamp_ns, turn_ns)
-        poses = [self._odometry.at(self._tree, self._base_frame, int(stamp_ns)) for stamp_ns in stamps_ns]
-        return deskew.straightened(scan, Trajectory(stamps_ns, np.array(poses)))
+            return Refusal(raw.stamp_ns, err.reason)
+        return Step(placed.scan, placed.odom_from_base)
 
 
 class _TrueBeams:
@@ -481,6 +459,22 @@ class _TrueBeams:
                         f"but {len(crossing)} crossings"
                     )
                 yield BeamTruth(stamp_ns, case, None if crossing is None else np.array(crossing, float))
+
+
+def _raw_scan(message: Any) -> RawScan:
+    """The fields of a LaserScan, nothing checked."""
+    return RawScan(
+        _stamp_ns(message.header),
+        message.header.frame_id.lstrip("/"),
+        message.ranges,
+        float(message.angle_min),
+        float(message.angle_max),
+        float(message.angle_increment),
+        float(message.range_min),
+        float(message.range_max),
+        float(message.time_increment),
+        float(message.scan_time),
+    )
 
 
 def _stamp_ns(header: Any) -> int:

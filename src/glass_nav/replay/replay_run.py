@@ -66,7 +66,7 @@ def run(
                 rows.append(_Row(entry.odom_from_base, estimate, cpu_ms, scores.take(entry.scan, estimate)))
                 listen(entry, estimate)
             except ScanError as err:
-                refusals[str(err).partition(": ")[2]] += 1
+                refusals[err.reason] += 1
         step_done()
     if not rows:
         raise RecordingError(f"{recording.name}: {_nothing_usable(refusals)}")

@@ -15,7 +15,7 @@ from typing import Callable, Deque, Optional, Tuple
 import numpy as np
 
 from glass_nav.geometry import se2
-from glass_nav.hypotheses import global_search
+from glass_nav.hypotheses import global_search, pose_tracker
 from glass_nav.hypotheses.global_search import Candidates, GlobalSearch, SearchParams
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.sensing.distance_field import DistanceField
@@ -124,7 +124,7 @@ class KidnapDetector:
 
     def _compare(self, candidates: Candidates, map_from_base: np.ndarray, doubted: bool) -> Verdict:
         """Of the believed pose with the best place elsewhere."""
-        here = global_search.same_place(candidates.poses, map_from_base)
+        here = pose_tracker.same_place(candidates.poses, map_from_base)
         with np.errstate(divide="ignore"):
             log_w = np.log(candidates.weights)
         elsewhere = log_w[~here].max() if not here.all() else -np.inf

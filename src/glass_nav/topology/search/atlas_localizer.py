@@ -15,9 +15,9 @@ from typing import List, Optional, Tuple
 import numpy as np
 
 from glass_nav.geometry import angles
+from glass_nav.hypotheses.followed_poses import MAX_LEAD, FollowedPoses, MapScans, Standing
 from glass_nav.topology.atlas.atlas import Atlas, Visits
 from glass_nav.topology.observations import Meetpoint, Traversal
-from glass_nav.topology.search.followed_poses import MAX_LEAD, FollowedPoses, MapScans, Standing
 from glass_nav.topology.search.graph_verdict import GraphVerdict
 from glass_nav.topology.search.matching import Explained, Matcher, poses_at
 from glass_nav.topology.search.passed_edges import PassedEdges
@@ -98,7 +98,7 @@ class AtlasLocalizer:
         self._edges_before, self._search, self._seen_places = 0, 1, 0
         self._passed.begin(meetpoint)
         if self._followed is not None:
-            self._followed.begin(meetpoint)
+            self._followed.begin(meetpoint.odom_from_base, meetpoint.scan)
         return self._begin(meetpoint)
 
     def update(self, traversal: Traversal, meetpoint: Meetpoint) -> SearchEstimate:
@@ -110,7 +110,7 @@ class AtlasLocalizer:
         self._forest.step(traversal, meetpoint)
         self._passed.add(traversal.rank, meetpoint, traversal.length_m)
         if self._followed is not None:
-            self._followed.follow(meetpoint, traversal.length_m)
+            self._followed.follow(meetpoint.odom_from_base, meetpoint.scan, traversal.length_m)
         return self._judged()
 
     def map_from_base(self, dart: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import made_atlases
 import numpy as np
 import pytest
 
-from glass_nav.topology.atlas import atlas_file, shipped_atlases
+from glass_nav.topology.atlas import atlas_file, atlas_npz, shipped_atlases
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 
 Data = Dict[str, Any]
@@ -18,7 +18,7 @@ SCHEMA = Path(__file__).parents[4] / "atlas" / "atlas.schema.json"
 
 
 def arrays(atlas: Atlas) -> Dict[str, np.ndarray]:
-    return atlas_file._arrays(atlas)
+    return atlas_npz.arrays_of(atlas)
 
 
 def example() -> Data:
@@ -165,7 +165,7 @@ def test_the_schema_takes_what_the_loader_takes_and_refuses_what_it_can() -> Non
 
 @pytest.mark.parametrize(
     "text, line",
-    [("{", "is not JSON: Expecting"), ("[]", "must be an object with format, version"), ("\x00", "is no JSON")],
+    [("{", "is not JSON: Expecting"), ("[]", "must be an object with format, version"), ("\x00", "is not JSON")],
 )
 def test_what_is_no_json_is_refused(text: str, line: str, tmp_path: Path) -> None:
     path = tmp_path / "atlas.json"

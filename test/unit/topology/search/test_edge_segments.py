@@ -85,7 +85,7 @@ def test_many_walls_are_compared_in_larger_pieces():
 
 def test_little_in_the_way_is_furniture_whatever_its_share():
     test = SegmentTest(segments_max_contradiction=0.4)
-    assert edge_segments.matches(0.9, 0.9, test) and edge_segments.fits(0.4, 5.0, test)
+    assert edge_segments.matches(0.9, 0.9, test) and edge_segments.matches(0.4, 5.0, test)
     assert not edge_segments.matches(0.41, 1.0, test)
 
 
