@@ -7,7 +7,6 @@ for scans) with one line for the log. B beams, P particles.
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from io import BytesIO
 
 import numpy as np
@@ -26,6 +25,7 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
 
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
+from glass_nav.localization.initial_pose import PoseGuess
 from glass_nav.localization.localizer import BeamCases, Estimate
 from glass_nav.msg import BeamCases as BeamCasesMsg
 from glass_nav.msg import LocalizationStatus
@@ -104,15 +104,6 @@ def planar_from_transform(transform: Transform) -> np.ndarray:
 def transform_stamped(stamp_ns: int, parent: str, child: str, parent_from_child: np.ndarray) -> TransformStamped:
     pose = pose_from_planar(parent_from_child)
     return TransformStamped(header(stamp_ns, parent), child, Transform(pose.position, pose.orientation))
-
-
-@dataclass(frozen=True)
-class PoseGuess:
-    """Where somebody says that the robot was at some time."""
-
-    stamp_ns: int  # 0: now, whenever that is
-    map_from_base: np.ndarray  # (3,)
-    covariance: np.ndarray  # (3, 3) of x, y, yaw
 
 
 def guess_from_msg(msg: PoseWithCovarianceStamped, map_frame: str) -> PoseGuess:
@@ -299,15 +290,6 @@ def grid_info(grid_map: GridMap) -> MapMetaData:
 
 
 # -- what the filter says
-
-
-def is_finite(estimate: Estimate) -> bool:
-    """Whether the estimate may go out: no NaN on tf, ever."""
-    return bool(
-        np.all(np.isfinite(estimate.map_from_base))
-        and np.all(np.isfinite(estimate.map_from_odom))
-        and np.all(np.isfinite(estimate.covariance))
-    )
 
 
 def status_msg(

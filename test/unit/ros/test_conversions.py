@@ -203,14 +203,6 @@ def test_the_packed_particles_arrive_as_poses(count):
     assert angles.wrap(back[:, 2] - poses[:, 2]) == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("field", ["map_from_base", "map_from_odom", "covariance"])
-def test_an_estimate_with_nan_is_told_from_one_without(field):
-    good = estimate()
-    assert conversions.is_finite(good)
-    getattr(good, field).flat[0] = np.nan
-    assert not conversions.is_finite(good)
-
-
 def test_the_status_says_the_state_as_number_and_word():
     msg = sent_and_received(conversions.status_msg(7, "map", "LOST", "nothing fits", 0.1, 0.25))
     assert (msg.state, msg.state_name, msg.reason) == (LocalizationStatus.LOST, "LOST", "nothing fits")

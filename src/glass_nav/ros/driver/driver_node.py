@@ -50,6 +50,7 @@ from glass_nav.msg import (
     TraverseEdgeFeedback,
     TurnChoice,
 )
+from glass_nav.rate_limiter import RateLimiter
 from glass_nav.ros import action_status, conversions, shutdown
 from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.driver import driver_displays, driver_messages
@@ -58,7 +59,6 @@ from glass_nav.ros.driver.move_base_task import MoveBase, MoveBaseTask
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
-from glass_nav.ros.rate_limiter import RateLimiter
 from glass_nav.ros.scan_input import ScanInput
 from glass_nav.sensing.scan import ScanError
 from glass_nav.sensing.scan_placement import RawScan

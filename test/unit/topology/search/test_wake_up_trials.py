@@ -12,8 +12,6 @@ from glass_nav.topology.search.atlas_robot import TrialParams
 from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.vocabulary import SearchState
 
-EXACT = TrialParams(noise_limit=0.0)
-
 
 @pytest.mark.parametrize("nodes, seed", [(100, 21), (1500, 22)])
 def test_the_truth_is_never_eliminated_while_errors_are_within_tolerance(nodes: int, seed: int) -> None:

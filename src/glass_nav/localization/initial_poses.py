@@ -1,69 +1,77 @@
-"""Where the filter starts: poses that somebody gave, moved on by odometry to the scan that they meet."""
+"""Which pose the localization starts from: the one given last, the one of the pose file, or the default."""
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
-from typing import Optional, Tuple
+from typing import Callable, Optional, Tuple
 
 import numpy as np
-import rospy
-import tf2_ros
 
 from glass_nav.geometry import se2
-from glass_nav.localization import saved_pose
+from glass_nav.localization import initial_pose, saved_pose
+from glass_nav.localization.initial_pose import PoseGuess, StartPose
 from glass_nav.localization.localizer import Localizer
-from glass_nav.ros import conversions
-from glass_nav.ros.conversions import PoseGuess
-from glass_nav.ros.localization.params import LocalizationParams
+from glass_nav.localization.saved_pose import PoseFile
 from glass_nav.world.grid_map import GridMap
 
-GUESS_WAIT_S = 1.0  # how long an initialpose waits for a scan at or after its stamp
+GUESS_WAIT_S = 1.0  # how long a given pose waits for a scan at or after its stamp
+
+OdometryAt = Callable[[int], np.ndarray]  # stamp [ns] -> odom_from_base (3,); ValueError if it is not known
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class _Waiting:
-    """A pose somebody gave, and when it came."""
+    """A given pose, and when it came."""
 
     guess: PoseGuess
     arrival_s: float
 
 
 class InitialPoses:
-    """The last start that was asked for, until there is a scan to make it with."""
+    """The start that was asked for last, until there is a scan to make it with."""
 
-    def __init__(self, p: LocalizationParams, tf: tf2_ros.Buffer) -> None:
-        self._p, self._tf = p, tf
+    def __init__(self, default: StartPose, start_without_guess: bool, file: PoseFile, odometry_at: OdometryAt) -> None:
+        """Args:
+        default: where to start if nothing else is known.
+        start_without_guess: search the whole map then instead.
+        file: the pose of the last run.
+        odometry_at: moves a given pose forward to the scan that it meets.
+        """
+        self._file, self._odometry_at = file, odometry_at
         self._waiting: Optional[_Waiting] = None
-        self._pose_file_waits = bool(p.pose_file.pose_file)
-        self._default = p.start.pose, p.start.covariance
-        self._home: Optional[Tuple[np.ndarray, np.ndarray]] = None if p.node.start_without_guess else self._default
+        self._pose_file_waits = bool(file.pose_file)
+        self._default = default.pose, default.covariance
+        self._home: Optional[Tuple[np.ndarray, np.ndarray]] = None if start_without_guess else self._default
         self._whose = "the pose of its parameters"
 
     def begin(self, localizer: Localizer) -> str:
-        """Place the particles of a new filter; where, in words that go on a sentence."""
+        """Place the particles of a new localizer; where, in words that go on a sentence."""
         if self._home is None:
             try:
                 localizer.scatter()
             except ValueError as err:
-                rospy.logwarn(f"no search of the whole map: {err}; starting at ~initial_pose_x, _y, _a")
+                _log.warning(f"no search of the whole map: {err}; starting at ~initial_pose_x, _y, _a")
             else:
                 return "anywhere in the map"
         pose, covariance = self._default if self._home is None else self._home
         localizer.set_pose(pose, covariance)
-        return f"at {self._whose}, x {pose[0]:.3f} m, y {pose[1]:.3f} m, yaw {pose[2]:.3f} rad"
+        return f"at {self._whose}, {_words(pose)}"
 
     def give(self, guess: PoseGuess, now_s: float) -> None:
-        """Somebody says where the robot is; it replaces what was said before, and what is in the file."""
+        """A pose from outside; it replaces the one before it, and the one in the file."""
         self._pose_file_waits = False
         self._waiting = _Waiting(guess, now_s)
 
     def forget(self) -> None:
-        """What waits is out of date."""
+        """Drop what waits: it is out of date."""
         self._pose_file_waits = False
         self._waiting = None
 
     def begin_at(self, map_from_base: np.ndarray, covariance: np.ndarray) -> None:
-        """Where begin() places the particles from now on: the last pose of a filter."""
+        """Where begin() places the particles from now on: the last pose of a localizer."""
         self._home, self._whose = (map_from_base, covariance), "its last pose"
 
     def apply(
@@ -82,34 +90,31 @@ class InitialPoses:
         self._waiting = None
         map_from_base = self._moved_on(guess, odom_from_base)
         try:
-            refuse_outside(guess, grid_map)
+            initial_pose.refuse_outside(guess, grid_map)
             localizer.set_pose(map_from_base, guess.covariance)
         except ValueError as err:
-            rospy.logwarn(f"initialpose refused: {err}")
+            _log.warning(f"initialpose refused: {err}")
             return False
         self._home, self._whose = (guess.map_from_base, guess.covariance), "the last pose it was given"
-        x, y, yaw = map_from_base
-        rospy.loginfo(f"starting at x {x:.3f} m, y {y:.3f} m, yaw {yaw:.3f} rad")
+        _log.info(f"starting at {_words(map_from_base)}")
         return True
 
     def _resume(self, localizer: Localizer, grid_map: GridMap, scan_ns: int, odom_from_base: np.ndarray) -> bool:
-        """Start where the pose file says, or search the whole map if it is not to be believed; whether one was done."""
-        limits = self._p.pose_file
+        """Start at the pose of the file, or search the whole map if it is not valid; whether one was done."""
         try:
-            saved = saved_pose.load(limits.path)
-            pose, covariance, why = saved_pose.resumed(saved, scan_ns, grid_map.digest, odom_from_base, limits)
+            saved = saved_pose.load(self._file.path)
+            pose, covariance, why = saved_pose.resumed(saved, scan_ns, grid_map.digest, odom_from_base, self._file)
             localizer.set_pose(pose, covariance)
         except FileNotFoundError:
-            rospy.loginfo(f"no pose file {limits.path} yet")
+            _log.info(f"no pose file {self._file.path} yet")
             return False
         except ValueError as err:
-            rospy.logwarn(f"the pose file {limits.path} is not used: {err}; the robot may be anywhere in the map")
+            _log.warning(f"the pose file {self._file.path} is not used: {err}; the robot may be anywhere in the map")
             self._home = None
             self.begin(localizer)
             return True
         self.begin_at(pose, covariance)
-        x, y, yaw = pose
-        rospy.loginfo(f"starting at x {x:.3f} m, y {y:.3f} m, yaw {yaw:.3f} rad of the pose file, {why}")
+        _log.info(f"starting at {_words(pose)} of the pose file, {why}")
         return True
 
     def _moved_on(self, guess: PoseGuess, odom_from_base: np.ndarray) -> np.ndarray:
@@ -117,21 +122,15 @@ class InitialPoses:
         if guess.stamp_ns == 0:
             return guess.map_from_base
         try:
-            odom_from_then = conversions.planar_from_transform(
-                self._tf.lookup_transform(
-                    self._p.node.odom_frame_id, self._p.node.base_frame_id, conversions.stamp_from_ns(guess.stamp_ns)
-                ).transform
-            )
-        except (tf2_ros.TransformException, ValueError) as err:
-            rospy.logwarn(
+            odom_from_then = self._odometry_at(guess.stamp_ns)
+        except ValueError as err:
+            _log.warning(
                 f"initialpose of {guess.stamp_ns * 1e-9:.3f} s taken as of now: no odometry at its stamp ({err})"
             )
             return guess.map_from_base
         return se2.compose(guess.map_from_base, se2.compose(se2.inverse(odom_from_then), odom_from_base))
 
 
-def refuse_outside(guess: PoseGuess, grid_map: GridMap) -> None:
-    """ValueError if the pose is not on the map."""
-    if not grid_map.contains(*grid_map.cells(guess.map_from_base[:2])):
-        x, y = guess.map_from_base[:2]
-        raise ValueError(f"the pose x {x:.3f} m, y {y:.3f} m lies outside the map")
+def _words(pose: np.ndarray) -> str:
+    x, y, yaw = pose
+    return f"x {x:.3f} m, y {y:.3f} m, yaw {yaw:.3f} rad"
