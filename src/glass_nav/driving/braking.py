@@ -30,7 +30,7 @@ def room_m(velocity: np.ndarray, obstacles_m: np.ndarray, limits: BaseLimits, re
         reach_m: no further than this is looked.
 
     Returns:
-        way [m] along the arc up to where the outline and its margin touch a point. What is within the margin already
+        distance [m] along the arc up to where the outline and its margin touch a point. What is within the margin already
         may come nearer by a centimetre, but not into the outline.
     """
     speed = math.hypot(velocity[0], velocity[1])

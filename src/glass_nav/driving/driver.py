@@ -343,7 +343,7 @@ class Driver:
         self._say(job.task.phase, job.task.reason, job.name)
 
     def _halt(self, job: _Job, ending: Ending) -> None:
-        """Stand until the trouble is over; somebody who waits is told when that takes too long."""
+        """Stand until the trouble is over; somebody who waits gets a result when that takes too long."""
         self._command(np.zeros(3))
         if math.isnan(job.halted_since_s):
             job.halted_since_s = self._now_s
@@ -356,7 +356,7 @@ class Driver:
             self._finish(job, Ending(ending.outcome, f"{ending.reason}, for {halted_s:.0f} s"))
 
     def _finish(self, job: _Job, ending: Ending) -> None:
-        """The task is over: the robot stands, whoever waits is told."""
+        """The task is over: the robot stands, whoever waits gets a result."""
         self._job = None
         arrival = job.task.arrival if isinstance(job.task, EdgeTask) else None
         if ending.outcome != Outcome.SUCCEEDED:

@@ -1,6 +1,6 @@
 """Scans, odometry, localization: what was heard last, and why the robot cannot be driven by it.
 
-Times are those of the data's clock, as the caller tells them.
+Times are those of the data's clock, as the caller gives them.
 """
 
 from __future__ import annotations

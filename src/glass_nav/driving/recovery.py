@@ -19,17 +19,17 @@ from glass_nav.geometry import angles, pure_pursuit
 # what is going on
 NONE = "NONE"  # nothing to recover from
 WAIT = "WAIT"  # stands: people walk on
-BACK_OFF = "BACK_OFF"  # a little way back
+BACK_OFF = "BACK_OFF"  # a short distance back
 TURN = "TURN"  # once round, to see what is there
 RETRY = "RETRY"  # drive as before
-NEXT_CHOICE = "NEXT_CHOICE"  # another way, if there is one
+NEXT_CHOICE = "NEXT_CHOICE"  # another path, if there is one
 ABORT = "ABORT"  # nothing helped
 
 LADDER = (WAIT, BACK_OFF, TURN, NEXT_CHOICE, ABORT)
 MOVES = (WAIT, BACK_OFF, TURN)
-STALL_TOLD_M = 0.4  # a base that was told to drive so far ...
+STALL_TOLD_M = 0.4  # a base that was commanded to drive so far ...
 STALL_MOVED_M = 0.1  # ... and did not come so far is held by something
-STILL_S = 2.0  # a base that makes no way for so long in a step cannot
+STILL_S = 2.0  # a base that makes no progress for so long in a step cannot
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Step:
 
 
 class Stall:
-    """Notices that the base makes no way though it is told to: it stands at something that the lidar does not see."""
+    """Notices that the base makes no progress though it is commanded to: it stands at something that the lidar does not see."""
 
     def __init__(self) -> None:
         self.clear()

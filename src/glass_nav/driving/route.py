@@ -1,8 +1,8 @@
-"""atlas, pose, goal -> the shortest way along edges: darts, and a polyline in the frame map.
+"""atlas, pose, goal -> the shortest path along edges: darts, and a polyline in the frame map.
 
-A robot may stand beside the graph, and so may its goal: the way begins at the nearest point of the nearest edge that is
-reached in a straight line, and ends likewise. Dijkstra's shortest way, by scipy. N nodes, E edges, darts as in
-atlas.py; M points of the way.
+A robot may stand beside the graph, and so may its goal: the path begins at the nearest point of the nearest edge that is
+reached in a straight line, and ends likewise. Dijkstra's shortest path, by scipy. N nodes, E edges, darts as in
+atlas.py; M points of the path.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from glass_nav.topology.atlas.atlas import DEAD_END, Atlas
 from glass_nav.world.grid_map import GridMap
 
 STEP_M = 0.02  # of the points that are looked at along a straight line
-JOINED_M = 0.02  # points of a way nearer to each other are one
+JOINED_M = 0.02  # points of a path nearer to each other are one
 
 
 class RouteError(ValueError):
-    """There is no way; one line: from where, to where, why."""
+    """There is no path; one line: from where, to where, why."""
 
 
 @dataclass(frozen=True)
 class Route:
-    """A way along edges of the atlas."""
+    """A path along edges of the atlas."""
 
     darts: Tuple[int, ...]  # in the order in which they are driven, the first and the last perhaps in part
     polyline_m: np.ndarray  # (M, 2) in the frame map, from the robot to the goal; M is 1 if it stands there
@@ -60,7 +60,7 @@ class RoutePlanner:
         self._room_m = None if grid_map is None else _room(grid_map)
 
     def to_node(self, from_m: np.ndarray, node: int, avoided: Collection[int] = ()) -> Route:
-        """The way from a point (2,) of the map to a node, without the edges that are to be avoided.
+        """The path from a point (2,) of the map to a node, without the edges that are to be avoided.
 
         Raises:
             RouteError: no such node, no edge in reach, or no way.
@@ -72,7 +72,7 @@ class RoutePlanner:
         return self._route(from_m, darts, points, None, f"node {node}")
 
     def to_point(self, from_m: np.ndarray, goal_m: np.ndarray, avoided: Collection[int] = ()) -> Route:
-        """The way from a point (2,) of the map to another one; straight, if that is free and no farther than round.
+        """The path from a point (2,) of the map to another one; straight, if that is free and no farther than round.
 
         Raises:
             RouteError: no edge in reach of either, or no way.
@@ -187,7 +187,7 @@ class RoutePlanner:
         )
 
     def _without_narrow_end(self, points_m: np.ndarray) -> np.ndarray:
-        """(n, 2) the way (M, 2) up to where the robot stands free for the last time."""
+        """(n, 2) the path (M, 2) up to where the robot stands free for the last time."""
         if self._room_m is None or len(points_m) < 2:
             return points_m
         line = Polyline(points_m)

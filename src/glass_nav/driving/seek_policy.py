@@ -28,7 +28,7 @@ class SeekPolicy:
         self._sought = True
 
     def fails(self) -> None:
-        """What the search asked for, or the way to a meetpoint, failed."""
+        """What the search asked for, or the drive to a meetpoint, failed."""
         self._failures += 1
 
     def succeeds(self) -> None:

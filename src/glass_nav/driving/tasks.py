@@ -21,7 +21,7 @@ from glass_nav.driving.route_follower import RouteFollower, RouteFollowerParams
 from glass_nav.topology.observations import turn_name
 from glass_nav.vocabulary import DriverPhase, Outcome
 
-HELD = "the robot makes no way, something that the lidar does not see may hold it"
+HELD = "the robot makes no progress, something that the lidar does not see may hold it"
 BLOCKED_S = 3.0  # braked to a standstill for so long
 OFF_ROUTE_M = 0.6  # then there is another route
 STANDSTILL_M_S = 0.03
@@ -224,7 +224,7 @@ class GoTask:
         if self._recovery.is_on:
             return self._recovery_reason
         if self.route is None:
-            return "looks for a way"
+            return "looking for a path"
         return f"along {len(self.route.darts)} edges, {self.remaining_m:.1f} of {self.route.length_m:.1f} m to go"
 
     @property

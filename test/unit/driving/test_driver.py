@@ -262,7 +262,7 @@ def test_where_every_attempt_fails_it_gives_up_until_a_search_waits_anew():
     robot.held = True
     robot.run(lambda: len([line for line in lines(robot.decided) if "BLOCKED" in line]) == 2, 240.0)
     assert robot.phase == DriverPhase.FAILED
-    assert robot.driver.status.reason.startswith("~seek_at_start: gives up: the robot makes no way")
+    assert robot.driver.status.reason.startswith("~seek_at_start: gives up: the robot makes no progress")
     assert robot.driver.health.level == Level.ERROR
     assert not only(robot.run_for(2.0), DriveStatus)
     robot.driver.search_reports(SearchState.WAITING)

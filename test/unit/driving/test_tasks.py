@@ -159,7 +159,7 @@ def node_near(planner, x, y):
 def test_a_node_is_driven_to_along_the_edges(planner):
     drive = Drive(corridor(), (1.5, 0.8, 2.0))
     task = going(drive, planner, node_near(planner, 5.0, 1.0))
-    assert task.reason == "looks for a way" and math.isnan(task.remaining_m)
+    assert task.reason == "looking for a path" and math.isnan(task.remaining_m)
     drive.run(task, until=lambda: drive.last[0] > 0.4)
     assert task.phase == DriverPhase.GOING and 0.0 < task.remaining_m < task.route.length_m
     assert drive.run(task).outcome == Outcome.SUCCEEDED
@@ -243,11 +243,11 @@ def test_a_search_that_is_held_everywhere_is_given_up():
     drive = Drive(corridor(), (5.0, 4.0, 0.0))
     drive.simulation.move = lambda dt_s, command, move=drive.simulation.move: move(dt_s, command * [0.0, 0.0, 1.0])
     ending = drive.run(EdgeTask(drive.driver, QUICK, LIMITS), limit_s=400.0)
-    assert ending.outcome == Outcome.BLOCKED and ending.reason.startswith("gives up: the robot makes no way")
+    assert ending.outcome == Outcome.BLOCKED and ending.reason.startswith("gives up: the robot makes no progress")
 
 
 def test_a_goal_behind_a_ledge_is_given_up(planner):
     drive = Drive(corridor(), (6.0, 1.0, 0.0), ledge_x=8.0)
     ending = drive.run(going(drive, planner, np.array([11.0, 1.0])))
-    assert ending.outcome == Outcome.BLOCKED and ending.reason.startswith("gives up: the robot makes no way")
+    assert ending.outcome == Outcome.BLOCKED and ending.reason.startswith("gives up: the robot makes no progress")
     assert drive.simulation.map_from_base[0] < 8.3

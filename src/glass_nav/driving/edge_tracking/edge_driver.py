@@ -3,7 +3,7 @@
 No pose in a map is needed: the graph is that of a small map around the robot, see local_map.py, made by the same code
 as the atlas, so that both see the same meetpoints. What lies ahead may turn out otherwise (a pane that was not seen
 yet, a corner that hid something), so a meetpoint counts only once the robot stands there and has looked again. What
-comes in is odom_from_base (3,); map, graph and ways are in the frame local, odom without its drift, see local_pose.py.
+comes in is odom_from_base (3,); map, graph and lines are in the frame local, odom without its drift, see local_pose.py.
 
 Choset, Burdick, Sensor-based exploration: the hierarchical generalized Voronoi graph (IJRR 2000): tracing and homing;
 here both go along a line of the local graph instead of a gradient of the distances.

@@ -40,7 +40,7 @@ class Node:
 
 
 class Trace:
-    """The way along one edge so far, from the node where it began."""
+    """The path along one edge so far, from the node where it began."""
 
     def __init__(self, start_m: np.ndarray) -> None:
         self._points = [np.array(start_m, float)]

@@ -1,6 +1,6 @@
-"""The Voronoi graph around the robot: where the robot is on it, what lies ahead, which ways leave a node.
+"""The Voronoi graph around the robot: where the robot is on it, what lies ahead, which branches leave a node.
 
-Coordinates are those of the grid, odom. A way (n, 2) runs from where the robot is along an edge to a node.
+Coordinates are those of the grid, odom. A line (n, 2) runs from where the robot is along an edge to a node.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Ahead:
 
 @dataclass(frozen=True)
 class Branch:
-    """A way that leaves a node."""
+    """An edge as it leaves a node."""
 
     bearing_rad: float  # as in the atlas, from the node to the point BEARING_AT_M along
     way_m: np.ndarray  # (n, 2) from the node on
@@ -46,7 +46,7 @@ def params_beside(atlas: VoronoiParams) -> VoronoiParams:
 
 
 def in_sight(grid: GridMap, from_m: np.ndarray, to_m: np.ndarray) -> bool:
-    """Whether nothing of a map stands on the straight way between two points (2,) in it."""
+    """Whether nothing of a map stands on the straight line between two points (2,) in it."""
     count = int(np.hypot(*(to_m - from_m)) / (0.5 * grid.resolution_m)) + 2
     points = from_m + np.linspace(0.0, 1.0, count)[:, None] * (to_m - from_m)
     rows, columns = grid.cells(points)
@@ -123,7 +123,7 @@ class LocalGraph:
         return sorted(found, key=lambda branch: -branch.bearing_rad)
 
     def walk(self, start: Ahead, wanted: "np.ndarray") -> Tuple[np.ndarray, int]:
-        """The way from there on to the next node whose flag (N,) is set, straight on at others; or to where it ends."""
+        """The line from there on to the next node whose flag (N,) is set, straight on at others; or to where it ends."""
         way, node, edge, end = start.way_m, start.node, start.edge, start.end
         for _ in range(len(self)):
             if wanted[node] or self.degree[node] == 1:
@@ -151,7 +151,7 @@ class LocalGraph:
 
 
 def direction_at_end(way_m: np.ndarray) -> np.ndarray:
-    """(2,) unit vector in which a way (n, 2) arrives, over its last half metre."""
+    """(2,) unit vector in which a line (n, 2) arrives, over its last half metre."""
     bearing = atlas_builder.bearings(way_m[::-1])[0]
     return -np.array([math.cos(bearing), math.sin(bearing)])
 

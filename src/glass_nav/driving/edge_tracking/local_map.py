@@ -208,7 +208,7 @@ class LocalMap:
         step = float(scan.angles_rad[1] - scan.angles_rad[0]) if count > 1 else 2.0 * np.pi
         ranges_m = np.where(np.isposinf(scan.ranges_m), min(self._p.unanswered_m, scan.range_max_m), scan.ranges_m)
         ranges_m = np.where(np.isfinite(ranges_m), ranges_m, 0.0) - _BEFORE_M
-        around = ndimage.minimum_filter1d(ranges_m, 3, mode="nearest")  # a beam beside it tells as well
+        around = ndimage.minimum_filter1d(ranges_m, 3, mode="nearest")  # a beam beside it counts as well
         away = np.hypot(x, y)
         relative = np.arctan2(y, x) - laser[2] - scan.angles_rad[0]
         middle = 0.5 * step * (count - 1)

@@ -45,7 +45,7 @@ class LocalPose:
         self._field = DistanceField(walls, 1.0) if walls.occupied.any() else None
 
     def correct(self, scan: Scan, odom_from_base: np.ndarray) -> np.ndarray:
-        """(3,) local_from_base at a scan, as far as its beams and odometry's pose (3,) tell."""
+        """(3,) local_from_base at a scan, as far as its beams and odometry's pose (3,) determine it."""
         predicted = self.now(odom_from_base)
         if self._field is None:
             return predicted

@@ -3,7 +3,7 @@
 What the edge driver looks at, watched without driving: the graph of the same local map, by the same code. The driver
 homes to a node and looks until some graphs agree; a robot that only drives past has the graphs that were made on its
 way. So a node is followed from graph to graph while the robot is near, and told once the robot has left it, with what
-the graphs around the nearest point of the way agree on.
+the graphs around the nearest point of the path agree on.
 
 Poses are local_from_base, see local_pose.py.
 """
@@ -27,7 +27,7 @@ from glass_nav.topology.atlas.voronoi_graph import VoronoiParams
 
 _SAME_NODE_M = 0.3  # a node moves by no more from one graph to the next
 _STILL_M, _STILL_RAD = 0.02, 0.05  # a robot that moved less since the last graph sees nothing new
-_AGREE = 5  # graphs next to the nearest point of the way whose word counts: some before, some after
+_AGREE = 5  # graphs next to the nearest point of the path whose word counts: some before, some after
 _FOOT_M = 1.0  # the robot follows an edge if it is no further away than this
 
 
@@ -41,7 +41,7 @@ class PassingParams:
     graph_period_s: float = 0.3  # of the log, between two graphs,
     graph_step_m: float = 0.15  # unless the robot moved so far
     least_looks: int = 3  # graphs that must have a node
-    least_share: float = 0.5  # of those made next to the nearest point of the way
+    least_share: float = 0.5  # of those made next to the nearest point of the path
     most_doubt_m: float = 0.15  # its obstacles are no further from any wall: the driver would look around first
     graph: VoronoiParams = field(default_factory=VoronoiParams)  # as the atlas was built with
     local_map: LocalMapParams = field(default_factory=LocalMapParams)
@@ -77,7 +77,7 @@ class PassedNode:
     r_m: float
     doubt_m: float
     looks: int  # graphs that had it
-    share: float  # of those next to the nearest point of the way, from first_ns on
+    share: float  # of those next to the nearest point of the path, from first_ns on
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class _Track:
         return self.looks[-1]
 
     def share(self) -> float:
-        """Of the graphs next to the nearest point of the way, those that have it."""
+        """Of the graphs next to the nearest point of the path, those that have it."""
         nearest = min(self.away_m, key=lambda number: self.away_m[number])
         beside = [number for number in self.away_m if abs(number - nearest) <= _AGREE // 2]
         return sum(look.number in beside for look in self.looks) / len(beside)
