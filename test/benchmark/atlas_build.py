@@ -5,8 +5,8 @@
     python test/benchmark/atlas_build.py --map ../shared/data/maps/huge_map.yaml
     /usr/bin/time -v python test/benchmark/atlas_build.py
 
-The map is a generated office floor of --cells x --cells cells of 0.05 m (corridors, rooms with doors and furniture, 30 %
-of the cells along the walls rough), or --map. Prints CPU seconds of the graph and of the segment maps on one thread,
+The map is a generated office floor of --cells x --cells cells of 0.05 m (corridors, rooms with doors and furniture, 30
+% of the cells along the walls rough), or --map. Prints CPU seconds of the graph and of the segment maps on one thread,
 the peak memory, and with --others the cost of alternatives: scipy's Voronoi instead of Delaunay, and the feature
 transform that thinning of the free space would start from. Exit 1 if --limit-s or --limit-mb is exceeded.
 """

@@ -133,8 +133,8 @@ def main() -> None:
             if arguments.out:
                 arguments.out.write_text(json.dumps(rows, indent=1))
     print(
-        "| building | lidar | passed | seen | missed | doubtful / unsteady / nothing | false positives | degree right | "
-        "nodes off, m | edge length off, m |\n"
+        "| building | lidar | passed | seen | missed | doubtful / unsteady / nothing | false positives | "
+        "degree right | nodes off, m | edge length off, m |\n"
         "|---|---|---|---|---|---|---|---|---|---|"
     )
     for building in [*arguments.buildings, "all"]:

@@ -13,6 +13,7 @@ from typing import Dict, List, Optional, Tuple
 Vector = Tuple[float, float, float]
 Quaternion = Tuple[float, float, float, float]
 Transform = Tuple[Vector, Quaternion]
+Planar = Tuple[float, float, float]  # x, y, yaw
 
 IDENTITY: Transform = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 EXTRAPOLATION_NS = 100_000_000  # a robot that stops publishing for a beat is not lost yet
@@ -151,7 +152,7 @@ def inverse(a_from_b: Transform) -> Transform:
     return (-p, -q, -r), back
 
 
-def planar(transform: Transform) -> Tuple[float, float, float]:
+def planar(transform: Transform) -> Planar:
     """x, y and the direction of the x axis seen from above."""
     (x, y, _), rotation = transform
     ahead = _rotate(rotation, (1.0, 0.0, 0.0))
@@ -182,7 +183,7 @@ def _rotate(q: Quaternion, v: Vector) -> Vector:
 
 def _slerp(a: Quaternion, b: Quaternion, share: float) -> Quaternion:
     dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
-    sign = -1.0 if dot < 0.0 else 1.0  # q and -q are one rotation: take the shorter way
+    sign = -1.0 if dot < 0.0 else 1.0  # q and -q are one rotation: take the shorter arc
     angle = math.acos(min(abs(dot), 1.0))
     if angle < 1e-6:
         return a

@@ -1,4 +1,4 @@
-"""The last scans, placed when they are asked for by their stamps: what did the robot see when it reported a meetpoint?"""
+"""The last scans, placed when they are asked for by the stamp of a meetpoint."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A simulated robot that lives in an atlas: it reports meetpoints and edges, and drives as it is told.
+"""A simulated robot that lives in an atlas: it reports meetpoints and edges, and drives as the search says.
 
 It has no coordinates. It measures what its sensors would show of the atlas (lengths, chords, equidistances, angles) by
 dead reckoning, with normally distributed errors; a detector that fails joins and splits edges. For a robot outside the
