@@ -74,8 +74,8 @@ class Candidates:
 
     poses: np.ndarray  # (K, 3) map_from_base at the last scan
     weights: np.ndarray  # (K,) sum 1
-    fit: float  # mean fit of the best since it is followed, 0..1; NaN: no scan told anything yet
-    lead: float  # nats that the best rival is behind; inf: there is none
+    fit: float  # mean fit of the best since it is followed, 0..1; NaN: no informative scan yet
+    lead: float  # log likelihood ratio to the best rival; inf: no rival
     found: bool  # the best is the place
 
     @property
@@ -104,7 +104,7 @@ class GlobalSearch:
         self._looked = False
         self._way_m = 0.0  # since the last look everywhere
         self._driven_m = 0.0  # since the first scan
-        self._told_at_m: Dict[str, float] = {}  # id of a landmark -> way driven when its bearing last counted
+        self._counted_at_m: Dict[str, float] = {}  # id of a landmark -> way driven when its bearing last counted
 
     def decide_by(self, params: SearchParams) -> None:
         """Other limits from the next scan on."""
@@ -118,7 +118,7 @@ class GlobalSearch:
         Args:
             scan: a lidar's turn.
             odom_from_base: (3,) odometry at its stamp.
-            bearings: told with regard to where the robot is at the scan, with the landmarks that they are of.
+            bearings: relative to the robot's pose at the scan, with their landmarks.
         """
         view = self._move(scan, odom_from_base)
         points = telling_points(scan)
@@ -174,9 +174,11 @@ class GlobalSearch:
 
     def _weigh_by(self, bearings: LandmarkBearings, landmarks: LandmarkMap) -> None:
         """Let bearings speak for each candidate, those of one landmark once in a view: a mirror stays where it is."""
-        new = np.array([self._driven_m - self._told_at_m.get(name, -_VIEW_M) >= _VIEW_M for name in bearings.ids], bool)
+        new = np.array(
+            [self._driven_m - self._counted_at_m.get(name, -_VIEW_M) >= _VIEW_M for name in bearings.ids], bool
+        )
         bearings = bearings.subset(new)
-        self._told_at_m.update(dict.fromkeys(bearings.ids, self._driven_m))
+        self._counted_at_m.update(dict.fromkeys(bearings.ids, self._driven_m))
         self._evidence = self._evidence + bearing_weights.log_weights(
             self._tracker.poses, bearings, landmarks, _BEARINGS
         )

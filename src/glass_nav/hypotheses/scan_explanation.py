@@ -108,8 +108,8 @@ class ScanExplanation:
         offered = np.stack([hits.first_m, hits.second_m, hits.third_m, hits.mirrored_m])  # (4, P, B)
         explained = (np.abs(offered - measured) <= self._near_m).any(axis=0)
         ends_m = np.stack([se2.transform_points(pose, points_m) for pose in poses])
-        told = explained | (hits.first_m < measured) | ~self._is_unknown(ends_m)
-        count = told.sum(axis=1)
+        counted = explained | (hits.first_m < measured) | ~self._is_unknown(ends_m)
+        count = counted.sum(axis=1)
         few = count < max(_MIN_BEAMS, _MIN_TOLD * len(beams))
         return np.where(few, np.nan, explained.sum(axis=1) / np.maximum(count, 1))
 

@@ -40,7 +40,9 @@ class BeamTruth:
 
     stamp_ns: int
     case: np.ndarray  # (B,) uint8: 0..4
-    crossing_m: Optional[np.ndarray]  # (B,) range of the first pane passed or mirrored at, NaN: none; None: not told
+    crossing_m: Optional[
+        np.ndarray
+    ]  # (B,) range of the first pane passed or mirrored at, NaN: none; None: not recorded
 
 
 @dataclass

@@ -164,7 +164,7 @@ class ResultBag(MessageWriter):
         self._send("/ground_truth", stamp_ns, header=self._header(stamp_ns, self._map), pose=self._pose(map_from_base))
 
     def glass_map(self, stamp_ns: int, grid_map: GridMap, glass: np.ndarray) -> None:
-        """How glassy each wall cell proved so far: (H, W) int8, percent, -1 unknown."""
+        """Probability of glass of each wall cell so far: (H, W) int8, percent, -1 unknown."""
         self._grid(NODE + "/glass_map", stamp_ns, grid_map, glass)
 
     def _grid(self, topic: str, stamp_ns: int, grid_map: GridMap, cells: np.ndarray) -> None:

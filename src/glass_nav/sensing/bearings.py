@@ -30,7 +30,7 @@ class LandmarkBearing:
 
 @dataclass(frozen=True, eq=False)
 class LandmarkBearings:
-    """Bearings to different landmarks, all told with regard to one pose of the robot: base at stamp_ns.
+    """Bearings to different landmarks, all relative to one pose of the robot: base at stamp_ns.
 
     A sensor that turns for a minute takes each bearing from another place. `base_from_sensor` holds these places as
     odometry has them, so whoever uses the bearings need not know whether the robot moved.
@@ -79,7 +79,7 @@ class LandmarkBearings:
         )
 
     def seen_from(self, stamp_ns: int, later_from_base: np.ndarray) -> "LandmarkBearings":
-        """The same bearings told with regard to the robot's pose at another time, by odometry between the two (3,)."""
+        """The same bearings relative to the robot's pose at another time, by odometry between the two (3,)."""
         return replace(self, stamp_ns=stamp_ns, base_from_sensor=se2.compose(later_from_base, self.base_from_sensor))
 
 

@@ -1,4 +1,4 @@
-"""A robot driven through rooms: tracked, with its beams told apart, and unmoved by what it cannot use."""
+"""A robot driven through rooms: tracked, with its beams classified, and unmoved by what it cannot use."""
 
 from __future__ import annotations
 
@@ -208,7 +208,7 @@ def test_a_new_pose_on_the_same_map_keeps_its_glass():
 
 @pytest.mark.long_run
 def test_scans_that_fit_nowhere_teach_nothing():
-    """A robot that was carried away would take all walls for glass."""
+    """A kidnapped robot would take all walls for glass."""
     drive = GlassDrive(steps=20)
     localizer = started(GLASS_ROOM, drive.true[0])
     drive.through(localizer, last=12)
@@ -386,7 +386,7 @@ def test_a_scan_without_answers_leaves_a_search_where_it_is():
     localizer = Localizer(parameters(), MAPS[L_ROOM], np.random.default_rng(0))
     localizer.scatter()
     blind = localizer.update(replace(drive.scans[0], ranges_m=np.full(len(drive.scans[0]), np.nan)), drive.odometry[0])
-    assert blind.state == "GLOBAL_SEARCH" and blind.reason == "no scan has told anything yet"
+    assert blind.state == "GLOBAL_SEARCH" and blind.reason == "no informative scan yet"
     assert np.isfinite(blind.map_from_base).all() and blind.reliability < 0.5
     seen = localizer.update(drive.scans[1], drive.odometry[1])
     assert "possible" in seen.reason

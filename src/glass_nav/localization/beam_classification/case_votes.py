@@ -4,7 +4,7 @@ Seed document glass_localization.txt, sec. III.A, eq. (1) and steps 3 and 4: eac
 votes for the reference nearest to the measured range, and the case with the highest vote wins. What the
 document leaves open (it breaks off at step 1) is ours: the gate, ties, and the soft vote, in which a
 sample votes with shares, and the more the better it explains the whole scan; in which the chance of each
-case before the beam is looked at follows from how glassy its walls proved and from the physics of a pane;
+case before the beam is looked at follows from the probability that its walls are glass and from the physics of a pane;
 and in which neighbouring beams pull each other. N samples, B beams.
 """
 
@@ -25,7 +25,7 @@ VOTE_MODES = ("soft", "paper")
 _TIE_ORDER = (BeamCase.DIFFUSE, BeamCase.FIRST_PENETRATION, BeamCase.SECOND_PENETRATION, BeamCase.SPECULAR)
 _GATE_SIGMAS = 3.0
 _OTHER_SURFACE_M = 0.3  # of two expected ranges: an edge lies between them
-_TOLD_GATES = 2.0  # the samples that won the vote may stand one gate away from the pose told
+_MAX_GATES = 2.0  # the samples that won the vote may stand one gate away from the estimated pose
 _PANE_INDEX = 1.51  # of soda-lime glass
 _WALL_OVER_DARK = 5.0  # reflectance of a wall over that of the darkest that is seen at the largest range
 _UNSEEN_SIDE = 0.002  # chance of a wall to be met from a side that no mapper saw, over that from the other
@@ -52,7 +52,7 @@ class BeamCases:
 
 @dataclass(frozen=True)
 class CaseVote:
-    """How beams are told apart."""
+    """How beams are classified."""
 
     vote_mode: str = "soft"
     case_gate_m: float = 0.15  # a reference farther from the measured range gets no vote
@@ -93,7 +93,7 @@ def classify(
 
     Args:
         measured_m: (B,) ranges by REP 117; beams without an answer are uncertain.
-        references: of the preliminary samples; sample 0 is the pose that expected_m is told for, and for a beam that
+        references: of the preliminary samples; sample 0 is the pose that expected_m is given for, and for a beam that
             passes an edge there, the sample that explains it best.
         residuals: where in a wall beams end, and how widely.
         vote: mode, gate and priors.
@@ -118,7 +118,7 @@ def classify(
         )
         nearest = np.argmin(across_there_m, axis=0), np.arange(len(elsewhere))
         offered_m[elsewhere], across_m[elsewhere] = offered_there_m[nearest], across_there_m[nearest]
-    return _told(case, share[case, beam], measured_m, offered_m, np.isfinite(across_m))
+    return _decided(case, share[case, beam], measured_m, offered_m, np.isfinite(across_m))
 
 
 def as_seen_from(
@@ -130,8 +130,8 @@ def as_seen_from(
     """
     offered_m, across_m = _offered(cases.case, measured_m, _of_sample_0(references), residuals)
     other = np.abs(np.nan_to_num(offered_m[0] - cases.expected_m)) > _OTHER_SURFACE_M  # also where there is none
-    fits = across_m[0] <= _TOLD_GATES * gate_m(residuals, vote)
-    return _told(cases.case, cases.weight, measured_m, np.where(fits, offered_m[0], cases.expected_m), fits | other)
+    fits = across_m[0] <= _MAX_GATES * gate_m(residuals, vote)
+    return _decided(cases.case, cases.weight, measured_m, np.where(fits, offered_m[0], cases.expected_m), fits | other)
 
 
 def _of_sample_0(references: ExpectedRanges) -> ExpectedRanges:
@@ -154,7 +154,7 @@ def _offered(
     return offered_m, np.where(np.isnan(across_m), np.inf, across_m)
 
 
-def _told(
+def _decided(
     case: np.ndarray, weight: np.ndarray, measured_m: np.ndarray, expected_m: np.ndarray, known: np.ndarray
 ) -> BeamCases:
     known = known & (case > 0)
@@ -238,7 +238,7 @@ def gate_m(residuals: RangeResiduals, vote: CaseVote) -> float:
 def _priors(references: ExpectedRanges, glass: np.ndarray, max_range_m: float, vote: CaseVote) -> np.ndarray:
     """(5, B) chance of cases 1 to 4, and last to end at the second surface where the first is gone (case 0).
 
-    From how glassy the walls proved and how a pane answers at that incidence.
+    From the probability that the walls are glass and how a pane answers at that incidence.
     """
     incidence = references.pane_incidence[0]
     (first, second), (there, _) = glass

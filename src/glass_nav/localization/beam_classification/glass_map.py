@@ -1,4 +1,4 @@
-"""Beams that passed or ended at walls -> how glassy is each wall cell?
+"""Beams that passed or ended at walls -> the probability of glass of each wall cell.
 
 A wall seldom lets a beam through, a pane mostly does unless it is looked at head on, and where a mapped
 thing is gone every beam passes. Every beam that was known to cross a surface of the map is evidence on
@@ -102,7 +102,7 @@ class GlassMap:
         return _chance(self._prior + log_odds).reshape(2, *cell.shape)
 
     def occupancy(self) -> np.ndarray:
-        """(H, W) int8 [percent]: how glassy each wall cell proved; -1 where no beam said anything.
+        """(H, W) int8 [percent]: probability of glass of each wall cell; -1 where no beam was evidence.
 
         What lets beams pass and never answered any has not proved to be there: at most 50.
         """

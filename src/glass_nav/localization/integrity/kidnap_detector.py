@@ -1,6 +1,6 @@
 """Scans, tracked poses -> is the robot still there?  Watches a pose that is believed, and finds another if it is wrong.
 
-A filter that was carried away, or told a wrong pose, settles where the scan fits best nearby, and is sure of itself.
+The filter of a kidnapped robot, or one that was given a wrong pose, settles where the scan fits best nearby, and is sure of itself.
 What gives it away is that the scans fit worse than they used to. Then the scan is looked for everywhere, with the
 believed pose as one candidate ahead of the others (global_search.py): people all round fit nowhere, and the pose stays;
 if another place is better and stays so over some way, the robot is there. The formulation is ours.
@@ -39,7 +39,7 @@ _CLOSE = 1.0  # nats that another place is behind, or less: it may be the right 
 class Verdict:
     """What the scans say of the pose that is believed."""
 
-    fit: float  # present fit at it, 0..1; NaN: no scan told anything yet
+    fit: float  # present fit at it, 0..1; NaN: no informative scan yet
     usual: float  # what it has been so far
     behind: float  # nats that it is behind the best place elsewhere; <= 0: it is the best; -inf: nobody asked
     doubted: bool  # the scans fit worse than they used to
@@ -48,7 +48,7 @@ class Verdict:
 
     @property
     def fit_there(self) -> float:
-        """Of the best of the candidates, 0..1; NaN: there is none."""
+        """Of the best of the candidates, 0..1; NaN: no candidate."""
         return float("nan") if self.candidates is None else self.candidates.fit
 
     @property

@@ -53,7 +53,7 @@ class Judgement:
     state: LocalizationState
     reason: str  # in one sentence
     reliability: float  # chance that the pose is right, 0..1
-    places: int = 1  # that are possible while the pose is looked for; 0: no scan has told anything yet
+    places: int = 1  # that are possible while the pose is looked for; 0: no informative scan yet
 
 
 class PoseQuality:
@@ -139,7 +139,7 @@ def _possible(candidates: Candidates) -> int:
 
 def _progress(candidates: Candidates) -> str:
     if not len(candidates.poses):
-        return "no scan has told anything yet"
+        return "no informative scan yet"
     possible = _possible(candidates)
     x, y, yaw = candidates.poses[0]
     best = f"the best at x {x:.1f} m, y {y:.1f} m, {np.degrees(yaw):.0f} deg, where scans fit by {candidates.fit:.0%}"
@@ -164,7 +164,7 @@ def _reliability(used_share: float, verdict: Optional[Verdict], best: PoseEstima
     """Chance that the pose is right.
 
     Logistic regression over 5500 poses of five real logs and five simulated buildings (drives as those of
-    test/benchmark/reliability.py, seeds 20 to 22), in which robots were carried away, started wrong, or were right;
+    test/benchmark/reliability.py, seeds 20 to 22), in which robots were kidnapped, started wrong, or were right;
     the constant from 4400 poses of all tracks (seed 200).
     """
     sigma_m = float(np.clip(np.sqrt(np.trace(best.covariance[:2, :2])), 0.005, 2.0))

@@ -1,8 +1,8 @@
 """One scan, rough pose -> corrected pose, by the beams that ended at walls: segments and cases take turns.
 
-What a beam met is told at a pose (case_votes.py), and the pose is corrected by beams whose case is known
+What a beam met is decided at a pose (case_votes.py), and the pose is corrected by beams whose case is known
 (segment_correction.py), so each needs the other. First all beams pull, from the rough pose and others around it, and
-the end where most points lie near walls counts; then only those of case 1, 3 and 4 pull, told anew at each pose that
+the end where most points lie near walls counts; then only those of case 1, 3 and 4 pull, decided again at each pose that
 this leads to. A mirrored beam (2) or one that is not understood (0) ends nowhere on the map and must
 not pull; one that passed panes pulls on the wall behind. Unlike the particle filter this remembers no glass. B beams.
 """

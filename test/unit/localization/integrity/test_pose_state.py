@@ -145,7 +145,7 @@ def test_a_search_says_how_many_places_are_possible():
     quality.seek(candidates(1))
     assert quality.judge(best()).reason.startswith("one place is possible, the best at x 2.0 m")
     quality.seek(Candidates(np.zeros((0, 3)), np.zeros(0), np.nan, 0.0, False))
-    assert quality.judge(best()).reason == "no scan has told anything yet"
+    assert quality.judge(best()).reason == "no informative scan yet"
 
 
 @pytest.mark.parametrize(
