@@ -77,7 +77,7 @@ def _follow(localizer: Localizer, moments: List[tracks.Moment]) -> List[Told]:
         if estimate.updated:
             told.append(
                 Told(
-                    float(estimate.reliability),
+                    float(estimate.confidence),
                     tracks.is_right(estimate.map_from_base, moment.map_from_base),
                     estimate.state == LocalizationState.LOCALIZED,
                 )

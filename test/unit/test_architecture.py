@@ -52,6 +52,7 @@ ONLY_BY = {  # compiled modules, each behind its face; and what is heavy, where 
     "glass_nav._mrpt_io": "recording world",
     "dask": "compare",
     "distributed": "compare",
+    "jinja2": "evaluation",
     "matplotlib": "evaluation",
     "rosbags": "recording",
 }

@@ -1,15 +1,15 @@
-"""Scans, odometry -> the one place of the map where they fit: nothing is known at the start.
+"""Scans, odometry -> the one place of the map where they fit, with no initial pose.
 
-Multi-hypothesis tracking over an exhaustive search. The first scan is looked for everywhere
-(hypotheses/scan_matcher.py); each place where it lies well becomes a candidate. The candidates go with the odometry,
-are aligned with every scan as far as odometry allows, and gather evidence; from time to time the scan is looked
-for everywhere again, as the truth may have been missed (people, an odometry that slipped). A place is found when all
-others are behind by a margin. The formulation is ours; evidence is that of Thrun, Burgard, Fox, Probabilistic
-Robotics (2005), sec. 6.4, much flattened: scans taken close to each other err alike, and so does a map that has
-changed since, so evidence grows with the way that was driven and not with the number of scans, and it tells
-places apart by where they differ by decimetres. A particle filter finds a place only if a particle falls near it,
-and believes its luck; here every place is tried, and look-alikes stay in the race until something tells them apart.
-K candidates, B beams.
+Multi-hypothesis tracking over an exhaustive search. The first scan is matched against every pose of the map
+(scan_matcher.py); each place where it fits becomes a candidate. Odometry moves the candidates, every scan aligns them
+as far as odometry allows, and each gathers evidence. From time to time a scan is matched everywhere again, because the
+true place may have been missed (people, wheels that slipped). A place is found when all others are behind by a margin.
+
+The formulation is ours. Evidence is the log likelihood of Thrun, Burgard, Fox, Probabilistic Robotics (2005), sec. 6.4,
+much flattened: scans taken close to each other have the same errors, and so has a map that has changed since.
+Therefore evidence grows with the distance driven, not with the number of scans, and it distinguishes places
+by differences of decimetres. A particle filter finds a place only if a particle falls near it; here every place is tried,
+and places that look alike remain candidates until a scan distinguishes them. K candidates, B beams.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ from glass_nav.sensing.scan import Scan, spread_evenly
 from glass_nav.world.landmark_map import LandmarkMap
 
 _BEAMS = 60
-_MIN_BEAMS = 10  # fewer tell nothing about where they were taken
+_MIN_BEAMS = 10  # with fewer a scan is no evidence
 _PLACES = 4000  # of an exhaustive search, before they are aligned
-_SLIDE_M = 0.6  # that an alignment may lead away from where the scan was found
+_SLIDE_M = 0.6  # that an alignment may move a match
 _MAX_CANDIDATES = 1500  # that are followed
-_EVIDENCE_SCALE_M = 0.2  # a beam that ends this far from a wall speaks for the place by one half
+_EVIDENCE_SCALE_M = 0.2  # a beam that ends this far from a wall fits by one half
 _FULL_FIT = 20.0  # log likelihood ratio of a place where all beams end on walls to one where none does, in one view
-_VIEW_M = 2.0  # after so much way the surroundings are seen anew
+_VIEW_M = 2.0  # after this distance the surroundings are seen anew
 _MAX_BEHIND = 40.0  # log likelihood ratio of the best candidate to one that is dropped
 _SEARCH_AGAIN_M = 2.0
-_POOR_FIT = 0.75  # of its usual one: the best candidate may be none, look again at once
+_POOR_FIT = 0.75  # of the best candidate's usual fit: it may be wrong, search again at once
 _STEP_NOISE = np.array(
     [
         [0.03, 0.1, 0.0],  # deviations of odometry: a base, per metre, per radian of the step
@@ -48,18 +48,18 @@ _STEP_NOISE = np.array(
     ]
 )
 _BEAM_VARIANCE = 0.03  # [m2] of a beam of 60 that are worth 20 independent ones of 0.1 m
-_MAX_PENALTY = 1.0  # nats for a step that odometry does not explain: wheels slip
-# Flat: candidates are right to decimetres, and one bearing, 5.4 nats at most, may be a mirror's: it needs a second.
+_MAX_PENALTY = 1.0  # of log likelihood for a step that odometry does not explain: wheels slip
+# Flat: candidates are right to decimetres, and one bearing, which adds 5.4 at most, may be a mirror's: it needs a second.
 _BEARINGS = BearingMixture(bearing_wrong_share=0.1, bearing_sigma_floor=0.1)
 
 
 @dataclass(frozen=True)
 class SearchParams:
-    """When a place is taken for found."""
+    """When a place is accepted as found."""
 
-    search_margin: float = 8.0  # nats that all other places have to be behind
-    search_least_fit: float = 0.5  # of the scans at the place found, mean since it is followed, 0..1
-    recover_when_lost: bool = True  # look everywhere when the scans contradict the pose
+    search_margin: float = 8.0  # log likelihood ratio of the place to all others
+    search_least_fit: float = 0.5  # scan fit at the place, mean since it is followed, 0..1
+    recover_when_lost: bool = True  # search everywhere when the scans contradict the pose
 
     def __post_init__(self) -> None:
         if not 0.0 < self.search_margin < np.inf:
@@ -70,13 +70,13 @@ class SearchParams:
 
 @dataclass(frozen=True)
 class Candidates:
-    """Places that are still possible, the best first."""
+    """Poses that are still possible, the best first."""
 
     poses: np.ndarray  # (K, 3) map_from_base at the last scan
     weights: np.ndarray  # (K,) sum 1
-    fit: float  # mean fit of the best since it is followed, 0..1; NaN: no informative scan yet
-    lead: float  # log likelihood ratio to the best rival; inf: no rival
-    found: bool  # the best is the place
+    fit: float  # mean fit of the best since it is followed, 0..1; NaN: no scan has been evidence yet
+    lead: float  # log likelihood ratio of the best to its best rival; inf: it has none
+    found: bool  # the robot is at the best
 
     @property
     def covariance(self) -> np.ndarray:
@@ -87,13 +87,13 @@ class Candidates:
 
 
 class GlobalSearch:
-    """Follows all candidates until one is left."""
+    """Follows all candidates until one is far ahead."""
 
     def __init__(self, matcher: ScanMatcher, field: DistanceField, params: SearchParams) -> None:
         """Args:
-        matcher: where to look, the whole map or a part.
+        matcher: of the whole map or a part.
         field: of the map.
-        params: when a place is found.
+        params: when a place is accepted.
         """
         self._matcher, self._field, self._params = matcher, field, params
         self._tracker = PoseTracker(_MAX_BEHIND, _MAX_CANDIDATES)
@@ -101,10 +101,10 @@ class GlobalSearch:
         self._fit_sum = np.zeros(0)  # (K,) of fit times the share of a view
         self._views = np.zeros(0)  # (K,) of these shares
         self._noise = _STEP_NOISE[:, 0]  # (3,) deviations of the last step
-        self._looked = False
-        self._way_m = 0.0  # since the last look everywhere
+        self._searched = False
+        self._since_search_m = 0.0  # distance since the last search everywhere
         self._driven_m = 0.0  # since the first scan
-        self._counted_at_m: Dict[str, float] = {}  # id of a landmark -> way driven when its bearing last counted
+        self._counted_at_m: Dict[str, float] = {}  # id of a landmark -> distance driven when its bearing last counted
 
     def decide_by(self, params: SearchParams) -> None:
         """Other limits from the next scan on."""
@@ -113,24 +113,24 @@ class GlobalSearch:
     def update(
         self, scan: Scan, odom_from_base: np.ndarray, bearings: Sequence[Tuple[LandmarkBearings, LandmarkMap]] = ()
     ) -> Candidates:
-        """One scan more; a scan with too few answers moves the candidates only.
+        """One more scan; a scan with too few returns only moves the candidates.
 
         Args:
-            scan: a lidar's turn.
+            scan: one revolution of a lidar.
             odom_from_base: (3,) odometry at its stamp.
-            bearings: relative to the robot's pose at the scan, with their landmarks.
+            bearings: from the robot's pose at the scan, each with the landmarks that they are of.
         """
         view = self._move(scan, odom_from_base)
-        points = telling_points(scan)
+        points = evidence_points(scan)
         if points is not None:
-            if not self._looked:
-                found = self._look_everywhere(points)
+            if not self._searched:
+                found = self._search_everywhere(points)
                 self._append(found, np.zeros(len(found)))
                 view = 1.0
             self._judge(points, view)
-            if self._way_m >= _SEARCH_AGAIN_M or self._best_fits_poorly(points):
-                found = self._look_everywhere(points)
-                # This scan alone proposes them: they start behind what was followed so far, by how well each fits.
+            if self._since_search_m >= _SEARCH_AGAIN_M or self._best_fits_poorly(points):
+                found = self._search_everywhere(points)
+                # Only this scan proposes them: they start behind the candidates so far, by how well each fits.
                 fits = fit(self._field, points, found)
                 start = self._evidence.max() - self._params.search_margin
                 self._append(found, start + _FULL_FIT * (fits - fits.max()))
@@ -141,24 +141,24 @@ class GlobalSearch:
         return self._candidates()
 
     def add(self, map_from_base: np.ndarray, head_start: float) -> None:
-        """Before the first scan: a candidate where the robot is believed to be, ahead by so many nats."""
+        """Before the first scan: a candidate at the tracked pose, with a head start of log likelihood."""
         self._append(np.asarray(map_from_base, float)[None], np.array([head_start]))
 
     def _move(self, scan: Scan, odom_from_base: np.ndarray) -> float:
-        """The candidates by odometry; the share of a new view that this step gave."""
+        """Move the candidates by odometry; the share of a new view that this step gave."""
         step = self._tracker.carry(odom_from_base)
         if step is None:
             return 1.0
-        way_m, turn_rad = se2.travelled(step)
-        self._way_m += way_m
-        self._driven_m += way_m
-        self._noise = _STEP_NOISE @ np.array([1.0, way_m, turn_rad])
+        distance_m, turn_rad = se2.travelled(step)
+        self._since_search_m += distance_m
+        self._driven_m += distance_m
+        self._noise = _STEP_NOISE @ np.array([1.0, distance_m, turn_rad])
         # What a turn brings into view is what the lidar does not see already.
         unseen = max(0.0, 2.0 - float(np.ptp(scan.angles_rad)) / np.pi)
-        return min(1.0, (way_m + unseen * turn_rad) / _VIEW_M)
+        return min(1.0, (distance_m + unseen * turn_rad) / _VIEW_M)
 
     def _judge(self, points: np.ndarray, view: float) -> None:
-        """Align the candidates with the scan, as far as odometry allows, and let it speak for each."""
+        """Align the candidates with the scan, as far as odometry allows, and add its evidence to each."""
         information = np.diag(_BEAM_VARIANCE * len(points) / _BEAMS / self._noise**2)
         poses = self._tracker.poses
         moved = scan_alignment.align_near(self._field, points, poses, information)
@@ -173,7 +173,7 @@ class GlobalSearch:
         self._keep_distinct()
 
     def _weigh_by(self, bearings: LandmarkBearings, landmarks: LandmarkMap) -> None:
-        """Let bearings speak for each candidate, those of one landmark once in a view: a mirror stays where it is."""
+        """Add the evidence of bearings, of each landmark once in a view: a mirror stays where it is."""
         new = np.array(
             [self._driven_m - self._counted_at_m.get(name, -_VIEW_M) >= _VIEW_M for name in bearings.ids], bool
         )
@@ -189,9 +189,9 @@ class GlobalSearch:
         fit_now = fit(self._field, points, self._tracker.poses[best : best + 1])[0]
         return bool(fit_now < _POOR_FIT * self._fit_sum[best] / max(self._views[best], 1e-9))
 
-    def _look_everywhere(self, points: np.ndarray) -> np.ndarray:
-        """(K, 3) places where this scan fits, the best first, each only once."""
-        self._looked, self._way_m = True, 0.0
+    def _search_everywhere(self, points: np.ndarray) -> np.ndarray:
+        """(K, 3) poses where this scan fits, the best first, each place once."""
+        self._searched, self._since_search_m = True, 0.0
         starts = self._matcher.search(points, _PLACES).poses
         places = scan_alignment.align(self._field, points, starts)
         near = np.hypot(*(places.poses[:, :2] - starts[:, :2]).T) < _SLIDE_M  # farther away it is another place
@@ -221,8 +221,8 @@ class GlobalSearch:
         return Candidates(poses, weights / weights.sum(), fit, lead, bool(found))
 
 
-def telling_points(scan: Scan) -> Optional[np.ndarray]:
-    """(B, 2) end points [m] in the robot's frame of the beams that places are judged by; None: too few answered."""
+def evidence_points(scan: Scan) -> Optional[np.ndarray]:
+    """(B, 2) end points [m], in the robot's frame, of the beams that are evidence; None: too few returned."""
     beams = spread_evenly(scan.answered, _BEAMS)
     return scan.points_in_base()[beams] if len(beams) >= _MIN_BEAMS else None
 

@@ -34,7 +34,7 @@ ENTRIES = ("pose", "scans", "beams", "timing", "map")
 
 
 class LocalizationHealth:
-    """The entries about one situation; some tell of the time since the last report."""
+    """The entries about one situation; some cover the time since the last report."""
 
     def __init__(self, warn_deviations: np.ndarray, counts: ScanCounts) -> None:
         """Args:
@@ -52,7 +52,7 @@ class LocalizationHealth:
         self._wall_s.append(wall_s)
 
     def report(self, now: Situation) -> Dict[str, Health]:
-        """All entries by name; what they tell of the time since the last report starts over."""
+        """All entries by name; those that cover the time since the last report start over."""
         entries = {
             "pose": self._pose(now),
             "scans": self._scans(now),
@@ -71,8 +71,8 @@ class LocalizationHealth:
         values = dict(
             zip(("std_x [m]", "std_y [m]", "std_yaw [rad]"), np.round(std, 4)),
             particles=len(estimate.particles),
-            used_share=round(float(estimate.used_share), 3),
-            reliability=round(float(estimate.reliability), 3),
+            used_share=round(float(estimate.inlier_ratio), 3),
+            reliability=round(float(estimate.confidence), 3),
             state=estimate.state,
         )
         if estimate.state == LocalizationState.LOST:
@@ -112,7 +112,7 @@ class LocalizationHealth:
         text = f"{answered} of {beams} beams answered"
         if answered < FEW_BEAMS:
             return Health(Level.WARN, f"only {text}: odometry leads", values)
-        return Health(Level.OK, f"{text}, {now.estimate.used_share:.0%} of them are explained", values)
+        return Health(Level.OK, f"{text}, {now.estimate.inlier_ratio:.0%} of them are explained", values)
 
     def _timing(self, now: Situation) -> Health:
         if not self._wall_s:

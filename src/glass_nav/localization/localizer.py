@@ -50,9 +50,9 @@ class Estimate:
     particles: np.ndarray  # (P, 3) poses in map
     state: LocalizationState
     reason: str  # the state in words
-    used_share: float  # share of the answering beams that a case 1-4 explains
+    inlier_ratio: float  # share of the answering beams that a case 1-4 explains
     updated: bool  # whether this scan moved the particles
-    reliability: float  # chance that the pose is right, 0..1
+    confidence: float  # chance that the pose is right, 0..1
     places: int = 1  # that are possible, see pose_state.Judgement
 
 
@@ -259,7 +259,7 @@ class Localizer:
         """The pose is not known: follow all places where it may be. The particles are those places."""
         assert self._search is not None
         candidates = self._search.update(scan, odom_from_base, self._bearings_from(odom_from_base))
-        self._quality.seek(candidates)
+        self._quality.follow_search(candidates)
         if candidates.found:
             return self._settle(scan, odom_from_base, candidates.poses[0], candidates.fit)
         if len(candidates.poses):
@@ -279,9 +279,9 @@ class Localizer:
         """The pose with its state; `expected` is of that pose."""
         cases = self._classifier.seen_from(cases, scan, expected)
         answered = int(scan.answered.sum())
-        used_share = float(np.count_nonzero(cases.case)) / answered if answered else float("nan")
+        inlier_ratio = float(np.count_nonzero(cases.case)) / answered if answered else float("nan")
         if updated:
-            self._quality.observe(used_share)
+            self._quality.observe(inlier_ratio)
         judgement = self._quality.judge(self._filter.best)
         trusted = judgement.state == LocalizationState.LOCALIZED
         return Estimate(
@@ -294,9 +294,9 @@ class Localizer:
             self._filter.particles,
             judgement.state,
             judgement.reason,
-            used_share,
+            inlier_ratio,
             updated,
-            judgement.reliability,
+            judgement.confidence,
             judgement.places,
         )
 

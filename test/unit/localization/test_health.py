@@ -38,7 +38,7 @@ def estimate(state="LOCALIZED", std=0.05, used_share=0.9, beams=100):
         "why",
         used_share,
         True,
-        reliability=0.8,
+        confidence=0.8,
     )
 
 

@@ -30,7 +30,7 @@ def estimate(state, second=1, ahead_m=0.0):
         "why",
         0.9,
         True,
-        reliability=0.9,
+        confidence=0.9,
     )
 
 

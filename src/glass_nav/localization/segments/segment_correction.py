@@ -72,15 +72,15 @@ class SegmentCorrection:
     before: SegmentQuality  # at the pose given
     after: SegmentQuality  # at the corrected one
     free: np.ndarray  # (K, 3) orthonormal directions of x [m], y [m], yaw [lever m] that no segment constrains
-    lever_m: float  # length that makes of yaw a way, for free; 0: no points
+    lever_m: float  # length that turns yaw into a distance, for free; 0: no points
 
     @property
     def free_heading_rad(self) -> Optional[float]:
         """Along which direction of the map the position is not constrained, in [0, pi); None: no or every direction."""
-        ways = self.free[:, :2]
-        if len(self.free) != 1 or float(np.hypot(*ways[0])) < 0.5:
+        shifts = self.free[:, :2]
+        if len(self.free) != 1 or float(np.hypot(*shifts[0])) < 0.5:
             return None
-        return float(np.mod(np.arctan2(ways[0, 1], ways[0, 0]), np.pi))
+        return float(np.mod(np.arctan2(shifts[0, 1], shifts[0, 0]), np.pi))
 
 
 class SegmentCorrector:

@@ -80,8 +80,8 @@ class Publishers:
                 self._frame,
                 estimate.state,
                 estimate.reason,
-                estimate.used_share,
-                estimate.reliability,
+                estimate.inlier_ratio,
+                estimate.confidence,
             )
         )
         if estimate.updated or pose_is_news:
@@ -141,7 +141,7 @@ class Publishers:
             markers = beam_displays.beam_markers(placed.scan, estimate.cases, estimate.surface_scan, height_m, base)
             markers.markers.append(
                 beam_displays.status_marker(
-                    estimate.map_from_base, self._frame, estimate.state, estimate.reason, estimate.used_share
+                    estimate.map_from_base, self._frame, estimate.state, estimate.reason, estimate.inlier_ratio
                 )
             )
             self._beam_markers.publish(markers)
