@@ -144,7 +144,7 @@ class SearchSession:
         self._read_atlas = read_atlas
         self._p, self._search_params = p, search
         self._explanation = ServedExplanation()
-        self._map: Optional[Tuple[str, str]] = None  # fingerprint of the map that is served, and its name for people
+        self._map: Optional[Tuple[GridMap, str]] = None  # that is served, and its name for people
         self._localizer: Optional[AtlasLocalizer] = None
         self._status = SearchStatus(SearchState.NO_ATLAS, "no atlas was read yet")
         self._goal: Optional[Goal] = None
@@ -218,11 +218,11 @@ class SearchSession:
             self._explanation.take(grid_map)
         if not self._p.check_map:
             return []
-        self._map = grid_map.fingerprint, name
+        self._map = grid_map, name
         try:
             if self._localizer is not None:
-                self._localizer.atlas.refuse_other_map(*self._map)
-                return []
+                warning = self._localizer.atlas.check_map(*self._map)
+                return [LogLine(f"the atlas {warning}", logging.WARNING)] if warning else []
             return [self._load(), self._await_meetpoint("there is another map")]
         except (ValueError, OSError) as err:
             self._localizer = None
@@ -278,14 +278,16 @@ class SearchSession:
     def _load(self) -> LogLine:
         """Raises what reading raises, and AtlasError if the atlas is of another map than the one that is served."""
         found_at, atlas = self._read_atlas()
+        warning = ""
         if self._map is not None:
             try:
-                atlas.refuse_other_map(*self._map)
+                warning = atlas.check_map(*self._map)
             except AtlasError as err:
                 raise AtlasError(f"{found_at}: {err}") from err
         scans = (self._explanation.shares, self._explanation) if self._p.judge_by_scans else (None, None)
         self._localizer = AtlasLocalizer(atlas, self._search_params, *scans)
-        return LogLine(f"{found_at}: {len(atlas.nodes)} nodes, {len(atlas.edges)} edges")
+        text = f"{found_at}: {len(atlas.nodes)} nodes, {len(atlas.edges)} edges"
+        return LogLine(f"{text}; it {warning}", logging.WARNING) if warning else LogLine(text)
 
     def _await_meetpoint(self, why: str) -> SearchStatus:
         return self._show(SearchState.WAITING, f"the next meetpoint begins a search: {why}")

@@ -215,7 +215,9 @@ class DriverNode:
             self._map, self._planner = conversions.map_from_msg(msg), None
             self._map_fault = ""
             if self._atlas is not None:
-                self._atlas.refuse_other_map(self._map.fingerprint, f"that of topic {topic}")
+                warning = self._atlas.check_map(self._map, f"that of topic {topic}")
+                if warning:
+                    rospy.logwarn(f"the atlas {warning}")
         except AtlasError as err:
             self._map_fault = f"the atlas {err}"
             rospy.logerr(f"goto_node cannot be used: {self._map_fault}")
