@@ -8,7 +8,7 @@ the other enums is that of the constants in the messages, which a test compares.
 from __future__ import annotations
 
 from enum import Enum, IntEnum
-from typing import Dict, Tuple
+from typing import Dict, Iterable, List, Tuple
 
 Rgb = Tuple[int, int, int]  # 0..255
 
@@ -25,7 +25,12 @@ class BeamCase(IntEnum):
     @property
     def label(self) -> str:
         """For people, with its number: "3 behind one pane"."""
-        return f"{self.value} {CASE_WORDS[self]}"
+        return f"{self.value} {self.words}"
+
+    @property
+    def words(self) -> str:
+        """The same without the number."""
+        return CASE_WORDS[self]
 
     @property
     def rgb(self) -> Rgb:
@@ -99,6 +104,18 @@ STATE_COLOURS = {
     LocalizationState.GLOBAL_SEARCH: "#9467bd",
     LocalizationState.UNKNOWN: "#7f7f7f",
 }
+
+
+def state_colour(state: str) -> str:
+    """The colour of a state of localization by its name, as "#rrggbb"; black for one that a later version wrote."""
+    return LocalizationState(state).colour if state in LocalizationState.__members__ else "#000000"
+
+
+def states_in_order(states: Iterable[str]) -> List[str]:
+    """Those that occur, each once, in the order of the colours; states that a later version wrote come last."""
+    found = set(states)
+    known = [str(state) for state in STATE_COLOURS if state in found]
+    return known + sorted(found - set(known))
 
 
 class SearchState(Word):

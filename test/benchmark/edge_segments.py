@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Do the walls seen along an edge tell edges apart, and never rule out the true one?  Simulated drives along edges.
+"""Do the walls seen along an edge distinguish edges, and never rule out the true one? Simulated drives along edges.
 
     python test/benchmark/edge_segments.py
     python test/benchmark/edge_segments.py --seed 210 --edges 120 --changed 0.33
 
 A robot drives edges of the atlases of the simulated buildings, with glass in them and lidars that see more or less of
-it; dead reckoning errs by 2 % in way and 0.07 rad in heading over an edge. It collects its scans in the local map of
-the driver and reports the walls that it saw as the driver does. Of all directions of edges of the same atlas that fit
+it; dead reckoning errs by 2 % in distance and 0.07 rad in heading over an edge. It collects its scans in the local map of
+the driver and reports the walls that it saw as the driver does. Of all directions of edges of the same atlas that match
 its report in length, chord and directions, as of the true one, the contradiction of walls is computed: as often as the
 true edge is ruled out the search would lose the robot. Exit 1 if that happens once.
 """
@@ -70,7 +70,7 @@ def driven(atlas: Atlas, building: Building, model: LidarModel, dart: int, rng: 
 def compare(
     arguments: argparse.Namespace, name: str
 ) -> Tuple[List[Tuple[float, float]], List[Tuple[float, float]], float]:
-    """(share, metres) of true edges, and of others that fit by numbers; CPU ms of a comparison."""
+    """(share, metres) of true edges, and of others that match by numbers; CPU ms of a comparison."""
     atlas = atlas_file.load(ATLASES / name / "atlas.json")
     matcher = Matcher(atlas, Tolerances(), use_angles=True)
     rng = np.random.default_rng([arguments.seed, len(name)])
@@ -108,14 +108,14 @@ def main() -> int:
     arguments = parser.parse_args()
     test = SegmentTest(segments_max_contradiction=arguments.limit)
     print(
-        "| building | edges driven | ruled out | largest contradiction | others that fit by numbers | ruled out | "
+        "| building | edges driven | ruled out | largest contradiction | others that match by numbers | ruled out | "
         "ms each |\n|---|---|---|---|---|---|---|"
     )
     lost, count, told_apart, others = 0, 0, 0, 0
     for name in arguments.buildings:
         true, wrong, each_ms = compare(arguments, name)
-        out_true = sum(not edge_segments.fits(*each, test) for each in true)
-        out_wrong = sum(not edge_segments.fits(*each, test) for each in wrong)
+        out_true = sum(not edge_segments.matches(*each, test) for each in true)
+        out_wrong = sum(not edge_segments.matches(*each, test) for each in wrong)
         print(
             f"| {name} | {len(true)} | {out_true} | {max(share for share, _ in true):.2f} | {len(wrong)} | "
             f"{out_wrong / max(len(wrong), 1):.2f} | {each_ms:.1f} |",

@@ -41,9 +41,9 @@ from glass_nav.evaluation.metrics.case_scores import CaseScores, SurfaceScores
 from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.localization.localizer import Estimate
 from glass_nav.localization.localizer_params import LocalizerParams
+from glass_nav.vocabulary import CASES_IN_ORDER
 
 START_DEVIATION = np.array([0.1, 0.1, np.radians(3.0)])  # of the pose the localizers are told, and what they are told
-CASE_NAMES = ("uncertain", "diffuse", "specular", "1st penetration", "2nd penetration")
 FIGURES = ("position_rmse_m", "position_median_m", "yaw_mean_deg")
 
 
@@ -163,11 +163,12 @@ def print_confusion(runs: Sequence[Run]) -> None:
     if not parts:
         return
     confusion = sum(parts, case_scores.none_yet()).confusion
-    print("| true \\ told | " + " | ".join(CASE_NAMES) + " | beams |\n|---|" + "---|" * 6)
-    for name, row in zip(CASE_NAMES, confusion):
+    print("| true \\ told | " + " | ".join(case.label for case in CASES_IN_ORDER) + " | beams |\n|---|" + "---|" * 6)
+    for true in CASES_IN_ORDER:
+        row = confusion[true]
         print(
-            f"| {name} | "
-            + " | ".join(f"{100 * count / max(row.sum(), 1):.1f} %" for count in row)
+            f"| {true.label} | "
+            + " | ".join(f"{100 * row[told] / max(row.sum(), 1):.1f} %" for told in CASES_IN_ORDER)
             + f" | {row.sum()} |"
         )
 

@@ -30,7 +30,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import floors
 import numpy as np
 
-from glass_nav.driving import tasks
 from glass_nav.driving.base_limits import BaseLimits
 from glass_nav.driving.edge_driver import Arrival, EdgeDriver, EdgeDriverParams
 from glass_nav.driving.recovery import RecoveryParams
@@ -43,10 +42,10 @@ from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.hypotheses.scan_explanation import ScanExplanation
 from glass_nav.simulation import lidar, shipped_buildings, start_place
 from glass_nav.simulation.simulation import Frame, Simulation
-from glass_nav.vocabulary import SearchState
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search.search_estimate import SearchEstimate
 from glass_nav.topology.search.search_params import SearchParams
+from glass_nav.vocabulary import Outcome, SearchState
 
 CONTROL_S = 0.05
 SEARCH_S, LEG_S = 900.0, 120.0  # simulated, at most
@@ -118,7 +117,7 @@ class Trial:
                 self.command = task.step(Moment(odom_from_base, pose, self.command, CONTROL_S))
                 self.simulation.move(CONTROL_S, self.command)
                 self.collisions += self.simulation.blocked
-            if task.outcome is not None:
+            if task.ending is not None:
                 return
         task.cancel()
 
@@ -134,7 +133,7 @@ class Trial:
             for _ in self.do(task, SEARCH_S - self.now_s):
                 pass
             if task.arrival is None:
-                failures.append("" if task.outcome is None else task.outcome.code)
+                failures.append("" if task.ending is None else task.ending.outcome)
                 if len(failures) > 5:
                     break
                 rank = None
@@ -230,7 +229,7 @@ class Trial:
                 estimate = mcl.update(frame.scan, frame.odom_from_base)
                 self.map_from_odom = se2.compose(estimate.map_from_base, se2.inverse(frame.odom_from_base))
                 off_m.append(float(np.hypot(*(estimate.map_from_base[:2] - frame.map_from_base[:2]))))
-            outcomes.append("TIME" if task.outcome is None else task.outcome.code)
+            outcomes.append("TIME" if task.ending is None else task.ending.outcome)
         return {
             "legs": outcomes,
             "tracking_m": float(np.mean(off_m)) if off_m else math.nan,
@@ -295,7 +294,7 @@ def line(name: str, runs: List[Dict[str, Any]]) -> str:
         f"{', '.join(f'{states.count(state)} {state}' for state in sorted(set(states))) or '-'} | "
         f"{np.mean([each['edges'] for each in runs]):.1f} | {np.mean([each['search_s'] for each in runs]):.0f} | "
         f"{sum(each['collisions'] > 0 for each in runs)} | {mean('error_m')} | {mean('tracking_m')} | "
-        f"{sum(leg == tasks.SUCCEEDED for leg in legs)}/{len(legs)} |"
+        f"{sum(leg == Outcome.SUCCEEDED for leg in legs)}/{len(legs)} |"
     )
 
 

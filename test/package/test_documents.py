@@ -34,7 +34,7 @@ PAGES = [
 ]
 MAX_README_LINES = 150
 MAX_PICTURE_BYTES = 150_000
-MAX_SCANS = "60"  # of each log that a command replays
+MAX_SCANS = "30"  # of each log that a command replays
 FIRST_COMMANDS = (  # of the quickstart: their files are there for every page
     "glass_nav simulate glass_office --path first --out run.bag",
     "glass_nav replay run.bag --map run.map.yaml --out results/",

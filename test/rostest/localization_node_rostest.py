@@ -24,6 +24,7 @@ from glass_nav.geometry import angles
 from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.msg import BeamCases, LocalizationStatus
 from glass_nav.ros import conversions
+from glass_nav.vocabulary import LocalizationState
 
 LOG = "uob_trace0"
 DURATION_S, SPEED = 15.0, 1.5
@@ -105,7 +106,7 @@ class LocalizationOnARealRobot(unittest.TestCase):
         self.check_poses()
         for msg in self.status.all:
             if conversions.ns_from_stamp(msg.header.stamp) in self.scans:
-                self.assertEqual(msg.state, conversions.STATES[msg.state_name])
+                self.assertEqual(msg.state, LocalizationState(msg.state_name).code)
                 self.assertTrue(msg.reason)
 
     def check_transforms(self) -> None:

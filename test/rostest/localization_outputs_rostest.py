@@ -31,6 +31,7 @@ from glass_nav.msg import LocalizationStatus
 from glass_nav.ros import conversions
 from glass_nav.ros.localization import beam_displays, wall_display
 from glass_nav.sensing.raycast import RayCaster
+from glass_nav.vocabulary import BeamCase
 from glass_nav.world.grid_map import GridMap
 
 PANE_COLUMN = 160
@@ -241,7 +242,7 @@ class LocalizationOutputs(unittest.TestCase):
             "no scan has the stamp of the markers",
         )
         names = {marker.ns for marker in markers.last.markers}
-        self.assertEqual(names, {*beam_displays.CASE_NAMES, beam_displays.STATUS_NAMESPACE})
+        self.assertEqual(names, {*(case.label for case in BeamCase), beam_displays.STATUS_NAMESPACE})
         (status,) = [marker for marker in markers.last.markers if marker.ns == beam_displays.STATUS_NAMESPACE]
         self.assertTrue(status.text.startswith("LOCALIZED"), status.text)
         self.assertEqual(status.header.frame_id, "map")

@@ -7,10 +7,10 @@ from collections import Counter
 import numpy as np
 
 from glass_nav.evaluation.metrics.replay_result import NO_BEAM, ReplayResult
-from glass_nav.evaluation.plots.run_pictures import MapImage
 from glass_nav.geometry.trajectory import Trajectory
+from glass_nav.world.grid_map import GridMap
 
-GRID = MapImage(
+GRID = GridMap(
     np.where(np.indices((80, 60)).sum(axis=0) % 17 == 0, 100, 0).astype(np.int8), 0.1, np.array([-1.0, -2.0, 0.3])
 )
 

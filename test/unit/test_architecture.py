@@ -1,4 +1,4 @@
-"""The rooms of the package: who may import whom, and that every file parses on Python 3.8."""
+"""The rooms of the package: who may import whom, that ros/ decides nothing, that every file parses on Python 3.8."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Iterator
 
 import pytest
+
+from glass_nav.vocabulary import DriverPhase, Outcome, SearchState
 
 REPO = Path(__file__).parents[2]
 PACKAGE = REPO / "src" / "glass_nav"
@@ -30,9 +32,9 @@ MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or les
     "recording": "geometry world sensing",
     "simulation": "geometry world sensing",
     "checkup": "geometry world sensing hypotheses localization recording",
-    "evaluation": "geometry",
+    "evaluation": "geometry world",
     "evaluation/metrics": "geometry",
-    "evaluation/plots": "geometry evaluation/metrics",
+    "evaluation/plots": "geometry world evaluation/metrics",
     "evaluation/pages": "geometry evaluation/metrics evaluation/plots",
     "replay": "geometry world sensing hypotheses localization topology driving recording evaluation",
     "compare": "geometry world sensing hypotheses localization topology driving recording evaluation replay",
@@ -42,7 +44,7 @@ MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or les
     "ros": "geometry world sensing hypotheses localization topology driving recording simulation evaluation checkup "
     "demo",
 }
-FOR_ALL = {"amcl_parameters", "health", "package_files", "params", "vocabulary"}  # modules of no room
+FOR_ALL = {"amcl_parameters", "health", "log_line", "package_files", "params", "vocabulary"}  # modules of no room
 ONLY_BY = {  # compiled modules, each behind its face; and what is heavy, where it is needed
     "glass_nav._beam_vote": "localization",
     "glass_nav._mrpt_grid": "hypotheses sensing",
@@ -69,6 +71,17 @@ MIDDLEWARE = {
     "tf2_geometry_msgs",
     "tf2_py",
     "tf2_ros",
+}
+STATES = {member.name for words in (SearchState, DriverPhase, Outcome) for member in words}
+STATE_OWNERS = {  # the enums, and the messages that have constants of the same names
+    "SearchState",
+    "DriverPhase",
+    "Outcome",
+    "GoalOutcome",
+    "TopologyStatus",
+    "DriverStatus",
+    "GotoNodeResult",
+    "TraverseEdgeResult",
 }
 
 
@@ -107,6 +120,31 @@ def breaches(room: str, source: str) -> Iterator[str]:
         for guarded, rooms in ONLY_BY.items():
             if (name + ".").startswith(guarded + ".") and top_room not in rooms.split():
                 yield name
+
+
+def state_names(node: ast.AST) -> Iterator[str]:
+    """Members of the state enums, constants of their messages, and strings of those names, anywhere below a node."""
+    for part in ast.walk(node):
+        if isinstance(part, ast.Attribute) and isinstance(part.value, (ast.Attribute, ast.Name)):
+            owner = part.value.attr if isinstance(part.value, ast.Attribute) else part.value.id
+            if owner in STATE_OWNERS and part.attr in STATES:
+                yield f"{owner}.{part.attr}"
+        elif isinstance(part, ast.Constant) and part.value in STATES:
+            yield repr(part.value)
+
+
+def state_branches(source: str) -> Iterator[str]:
+    """Comparisons with a state, or with a name that holds some: `==`, `in` and `is`, wherever they branch."""
+    tree = ast.parse(source)
+    held = {"SEARCH_IS_OVER"}
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.Assign, ast.AnnAssign)) and node.value is not None and list(state_names(node.value)):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            held |= {target.id for target in targets if isinstance(target, ast.Name)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Compare):
+            names = {name.id for name in ast.walk(node) if isinstance(name, ast.Name)} & held
+            yield from (f"line {node.lineno}: {name}" for name in [*state_names(node), *sorted(names)])
 
 
 def is_python(path: Path) -> bool:
@@ -155,6 +193,45 @@ def test_what_has_no_room_imports_no_room(path: Path) -> None:
 )
 def test_the_rule_sees_a_breach(room: str, source: str) -> None:
     assert list(breaches(room, source))
+
+
+@pytest.mark.parametrize(
+    "path", [pytest.param(path, id=str(path.relative_to(PACKAGE))) for path in sorted((PACKAGE / "ros").rglob("*.py"))]
+)
+def test_ros_holds_no_state_machine(path: Path) -> None:
+    """Search states, driver phases and outcomes are converted there; what follows from them is decided elsewhere."""
+    assert not list(state_branches(path.read_text()))
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        pytest.param("if state == SearchState.LOST: stop()", id="equal"),
+        pytest.param("x = 1 if phase is vocabulary.DriverPhase.HALTED else 2", id="is, in an expression"),
+        pytest.param("while outcome not in (Outcome.BLOCKED, Outcome.NO_WAY): wait()", id="in a tuple"),
+        pytest.param("if msg.state != TopologyStatus.WAITING: stop()", id="a constant of the message"),
+        pytest.param("if msg.state_name == 'AMBIGUOUS': stop()", id="a string"),
+        pytest.param("DONE = (SearchState.LOST,)\nif state in DONE: stop()", id="through a name"),
+        pytest.param("if state in SEARCH_IS_OVER: stop()", id="through a name of the vocabulary"),
+    ],
+)
+def test_the_rule_sees_a_state_machine(source: str) -> None:
+    assert list(state_branches(source))
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        pytest.param("code = getattr(GotoNodeResult, outcome.name)", id="to the message"),
+        pytest.param("state = SearchState(msg.state_name)", id="from the message"),
+        pytest.param(
+            "end = {Outcome.SUCCEEDED: server.set_succeeded}.get(outcome, server.set_aborted)", id="by a table"
+        ),
+        pytest.param("if state == LocalizationState.LOST: stop()", id="another enum"),
+    ],
+)
+def test_the_rule_lets_states_be_converted(source: str) -> None:
+    assert not list(state_branches(source))
 
 
 @pytest.mark.parametrize("path", [pytest.param(path, id=str(path.relative_to(REPO))) for path in PYTHON_FILES])

@@ -10,7 +10,6 @@ import numpy as np
 
 from glass_nav.evaluation.plots import atlas_picture
 from glass_nav.evaluation.plots.atlas_picture import AtlasDrawing
-from glass_nav.evaluation.plots.run_pictures import MapImage
 from glass_nav.simulation import shipped_buildings
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
@@ -59,12 +58,11 @@ def main(arguments: argparse.Namespace) -> None:
     if edge is not None and edge >= len(atlas.edges):
         raise AtlasError(f"{path}: --edge must be 0 to {len(atlas.edges) - 1}, got {edge}")
     grid = _map(atlas, arguments.map)
-    image = None if grid is None else MapImage(grid.occupancy, grid.resolution_m, grid.map_from_grid)
     out = arguments.out or Path(f"{atlas.name}.png" if edge is None else f"{atlas.name}_edge_{edge}.png")
     if edge is None:
-        atlas_picture.draw_atlas(out, image, _drawing(atlas), atlas.name)
+        atlas_picture.draw_atlas(out, grid, _drawing(atlas), atlas.name)
     else:
-        atlas_picture.draw_edge(out, image, _drawing(atlas), edge, atlas.name)
+        atlas_picture.draw_edge(out, grid, _drawing(atlas), edge, atlas.name)
     print(f"drawn to {out}" + ("" if grid is not None else "; --map MAP draws the map under it"))
 
 

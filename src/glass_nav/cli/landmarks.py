@@ -12,7 +12,6 @@ import numpy as np
 
 from glass_nav.evaluation.plots import landmark_picture
 from glass_nav.evaluation.plots.landmark_picture import Panel, Tags
-from glass_nav.evaluation.plots.run_pictures import MapImage
 from glass_nav.localization.bearings import bearing_errors, landmark_planning
 from glass_nav.localization.bearings.landmark_planning import Suggestion
 from glass_nav.sensing.raycast import RayCaster
@@ -129,7 +128,7 @@ def main(arguments: argparse.Namespace) -> None:
         )
     landmark_picture.draw(
         arguments.out / PICTURE,
-        MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid),
+        grid_map,
         points,
         arguments.spacing,
         panels,

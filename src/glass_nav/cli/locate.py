@@ -11,7 +11,6 @@ import numpy as np
 
 from glass_nav.evaluation.plots import location_picture
 from glass_nav.evaluation.plots.location_picture import LocatedScan
-from glass_nav.evaluation.plots.run_pictures import MapImage
 from glass_nav.geometry import angles
 from glass_nav.localization.segments.segment_correction import (
     METHODS,
@@ -119,7 +118,7 @@ def main(arguments: argparse.Namespace) -> None:
     drawn = LocatedScan(scan.points_in_base(), located.case, locator.segments_m, rough, found.map_from_base)
     location_picture.draw(
         arguments.out,
-        MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid),
+        grid_map,
         drawn,
         f"{arguments.scan.name} on {arguments.map.name}",
         f"before: {_measures(found.before)}",

@@ -12,8 +12,8 @@ from glass_nav.cli import log_arguments, replay
 from glass_nav.cli.progress import Progress
 from glass_nav.evaluation.metrics import replay_result, run_story
 from glass_nav.evaluation.pages import report_page
-from glass_nav.evaluation.plots import report_pictures, run_pictures
-from glass_nav.evaluation.plots.report_pictures import Ground
+from glass_nav.evaluation.plots import report_pictures
+from glass_nav.evaluation.plots.report.ground import Ground
 from glass_nav.replay.replay_files import Outputs
 from glass_nav.replay.replay_options import ReplayOptions
 from glass_nav.world import map_file
@@ -67,8 +67,7 @@ def main(arguments: argparse.Namespace) -> None:
     if arguments.map is None and not path_map.exists():
         raise ValueError(f"{folder}: the map of that replay, {path_map}, is not there from here: give --map")
     grid_map = map_file.load(path_map)
-    image = run_pictures.MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid)
-    ground = Ground(image, _glass(folder, grid_map.occupancy.shape))
+    ground = Ground(grid_map, _glass(folder, grid_map.occupancy.shape))
     arguments.out.mkdir(parents=True, exist_ok=True)
     scores: Optional[Dict[str, Any]] = metrics.get("cases")
     confusion = None if scores is None else np.array(scores["confusion"])

@@ -13,13 +13,13 @@ from typing import Optional
 import numpy as np
 
 from glass_nav.cli.progress import Progress
-from glass_nav.evaluation.metrics.case_scores import CASE_NAMES
 from glass_nav.recording.bag_writer import BagWriter
 from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings
 from glass_nav.simulation.lidar import ECHOES, LidarModel
 from glass_nav.simulation.path_follower import FIRST, FollowerParams
 from glass_nav.simulation.robot import KINDS, RobotParams
 from glass_nav.simulation.simulation import Frame, Simulation
+from glass_nav.vocabulary import CASES_IN_ORDER
 from glass_nav.world import map_file
 
 HELP = "drive a robot through a building of glass and record a bag"
@@ -168,7 +168,7 @@ class _Tally:
         seconds = (self._last_ns - self._first_ns) * 1e-9
         times = seconds / max(time.perf_counter() - self._began_s, 1e-9)
         total = sum(self._cases.values())
-        shares = ", ".join(f"{name} {100.0 * self._cases[case] / total:.1f} %" for case, name in enumerate(CASE_NAMES))
+        shares = ", ".join(f"{case.words} {100.0 * self._cases[case] / total:.1f} %" for case in CASES_IN_ORDER)
         return (
             f"{self._scans} scans, {self.way_m:.1f} m, {seconds:.1f} s ({times:.0f} times real time); beams: {shares}"
         )

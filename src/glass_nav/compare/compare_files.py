@@ -9,7 +9,7 @@ from glass_nav.compare.contestants import Contestant
 from glass_nav.evaluation.metrics import comparison
 from glass_nav.evaluation.metrics.comparison import Comparison
 from glass_nav.evaluation.pages import comparison_page
-from glass_nav.evaluation.plots import comparison_pictures, run_pictures
+from glass_nav.evaluation.plots import comparison_pictures
 from glass_nav.replay import replay_files
 from glass_nav.world import map_file
 
@@ -30,8 +30,7 @@ def write(folder: Path, compared: Comparison, maps: Mapping[str, Path], everyone
     grids = {}
     for log in compared.logs[: comparison_pictures.MAX_LOGS]:
         if maps[log].exists():  # results may come from elsewhere
-            grid = map_file.load(maps[log])
-            grids[log] = run_pictures.MapImage(grid.occupancy, grid.resolution_m, grid.map_from_grid)
+            grids[log] = map_file.load(maps[log])
     drawn = comparison_pictures.draw_all(folder, compared, grids)
     page = folder / "compare.html"
     comparison_page.write(page, compared, drawn, about)

@@ -17,13 +17,13 @@ from glass_nav.demo import tour
 from glass_nav.demo.heard import Heard, SearchNews
 from glass_nav.evaluation.metrics import pose_errors
 from glass_nav.evaluation.plots import wake_up_picture
-from glass_nav.evaluation.plots.run_pictures import MapImage
 from glass_nav.evaluation.plots.wake_up_picture import Depth, WakeUpStory
 from glass_nav.geometry import angles, polyline
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.observations import turn_name
 from glass_nav.vocabulary import SEARCH_IS_OVER, LocalizationState, Outcome, SearchState
 
+SEARCH_ENDED = (*SEARCH_IS_OVER, SearchState.NO_ATLAS)  # nothing more will come
 RIGHT_M, RIGHT_RAD = 0.5, 0.35  # a pose that is handed over so near is right
 REQUESTS = 3  # for a node, where the driver has not heard of the localization yet
 LISTED = 8  # candidates in a row
@@ -131,7 +131,7 @@ class WakeUpDemo:
     def _search(self) -> Optional[SearchNews]:
         """How the last search ended; None if it did not."""
         for searches_left in reversed(range(self._p.searches)):
-            if not self._wait(lambda: self._state in SEARCH_IS_OVER, simulated_s=self._p.search_limit_s):
+            if not self._wait(lambda: self._state in SEARCH_ENDED, simulated_s=self._p.search_limit_s):
                 if not self._robot.is_ending():
                     self._robot.say(f"the search did not end within {self._p.search_limit_s:g} s")
                 return None
@@ -310,9 +310,8 @@ class WakeUpDemo:
             heard.poses.get(last_ns),
             heard.truth.get(last_ns),
         )
-        grid, path = heard.grid_map, Path(self._p.picture)
+        path = Path(self._p.picture)
         path.parent.mkdir(parents=True, exist_ok=True)
-        image = MapImage(grid.occupancy, grid.resolution_m, grid.map_from_grid)
         title = f"{self._atlas.name}: {outcome} after {max(len(self._depths) - 1, 0)} edges"
-        wake_up_picture.draw(path, image, story, title)
+        wake_up_picture.draw(path, heard.grid_map, story, title)
         self._robot.say(f"picture: {path}")

@@ -30,20 +30,10 @@ from glass_nav.geometry.polyline import Polyline
 from glass_nav.sensing.scan import Scan
 from glass_nav.topology.atlas.voronoi_graph import VoronoiParams
 from glass_nav.topology.observations import Meetpoint, Traversal, refuse_rank
+from glass_nav.vocabulary import DriverPhase, Outcome
 from glass_nav.world.grid_map import GridMap
 
-# phases
-IDLE = "IDLE"  # stands, nothing asked for
-SEEKING = "SEEKING"  # on its way to the graph and along it to any meetpoint
-FOLLOWING = "FOLLOWING"  # along an edge
-HOMING = "HOMING"  # the last way to a meetpoint, and a look around there
-RETURNING = "RETURNING"  # back along an edge to the meetpoint where it began
-ARRIVED = "ARRIVED"  # stands at a meetpoint
-FAILED = "FAILED"  # stands: cannot go on
-_DRIVING = (SEEKING, FOLLOWING, HOMING, RETURNING)
-
-# why it FAILED
-NO_GRAPH, BLOCKED = "NO_GRAPH", "BLOCKED"
+_DRIVING = (DriverPhase.SEEKING, DriverPhase.FOLLOWING, DriverPhase.HOMING, DriverPhase.RETURNING)
 
 _LOOKAHEAD_M = 0.35
 _TURN_FIRST_RAD = 0.7  # a point further to the side is turned to on the spot
@@ -91,19 +81,19 @@ class Arrival:
 class Progress:
     """Where the driver is."""
 
-    phase: str
+    phase: DriverPhase
     reason: str  # one sentence
     travelled_m: float  # since the last meetpoint
-    failure: str = ""  # NO_GRAPH or BLOCKED if FAILED
+    failure: Optional[Outcome] = None  # NO_GRAPH or BLOCKED if FAILED
 
 
 class EdgeDriver:
     """see() every scan, ask for a command() at every control step; seek(), leave(), go_back() and stop() say what."""
 
     # Of what it does just now; _begin() sets them all.
-    _phase: str
+    _phase: DriverPhase
     _reason: str
-    _failure: str
+    _failure: Optional[Outcome]
     _way: Optional[Polyline]  # that it drives along; None: none known yet
     _trace: Optional[Trace]  # of the edge so far; None: no edge that began at a meetpoint
     _rank: int  # by which the edge left
@@ -141,15 +131,15 @@ class EdgeDriver:
         self._velocity = np.zeros(3)
         self._node: Optional[Node] = None  # where it stands, or began
         self._arrival: Optional[Arrival] = None
-        self._halted: Optional[Tuple[str, Optional[Trace], int, Optional[Polyline]]] = None
-        self._begin(IDLE, "nothing to do")
+        self._halted: Optional[Tuple[DriverPhase, Optional[Trace], int, Optional[Polyline]]] = None
+        self._begin(DriverPhase.IDLE, "nothing to do")
 
     # -- what to do
 
     def seek(self) -> None:
         """Drive to a meetpoint, having looked around."""
         self._node = None
-        self._begin(SEEKING, "looking around")
+        self._begin(DriverPhase.SEEKING, "looking around")
         self._sweep_rad = 2.0 * math.pi
 
     def leave(self, rank: int) -> None:
@@ -159,10 +149,10 @@ class EdgeDriver:
             ValueError: it stands at none.
             ObservationError: that has no such edge; nothing is changed.
         """
-        if self._node is None or self._phase != ARRIVED:
+        if self._node is None or self._phase != DriverPhase.ARRIVED:
             raise ValueError(f"it stands at no meetpoint that it could leave: it is {self._phase}")
         refuse_rank(rank, self._node.degree)
-        self._begin(FOLLOWING, f"along edge {rank} of {self._node.degree}")
+        self._begin(DriverPhase.FOLLOWING, f"along edge {rank} of {self._node.degree}")
         self._rank = rank
         self._way = _line(self._node.branches[rank].way_m)
         self._trace = Trace(self._node.position_m)
@@ -179,12 +169,12 @@ class EdgeDriver:
             raise ValueError("it left no meetpoint that it could return to")
         self._trace.cut_back(self._pose[:2])
         way = np.concatenate([self._pose[None, :2], self._trace.way_m[::-1]])
-        self._begin(RETURNING, "back to the meetpoint that it left")
+        self._begin(DriverPhase.RETURNING, "back to the meetpoint that it left")
         self._way = _line(way)
 
     def stop(self) -> None:
         """Stand, whatever was asked for. resume() goes on with it, seek() begins anew, go_back() returns."""
-        self._halt(IDLE, "stopped")
+        self._halt(DriverPhase.IDLE, "stopped")
 
     def resume(self) -> None:
         """Go on with the edge, or the search for a meetpoint, that stop() or a failure ended.
@@ -192,7 +182,7 @@ class EdgeDriver:
         Raises:
             ValueError: there is none.
         """
-        if self._phase not in (IDLE, FAILED) or self._halted is None:
+        if self._phase not in (DriverPhase.IDLE, DriverPhase.FAILED) or self._halted is None:
             raise ValueError(f"nothing was stopped that it could go on with: it is {self._phase}")
         phase, trace, rank, way = self._halted
         self._begin(phase, "going on")
@@ -283,7 +273,9 @@ class EdgeDriver:
                     wanted[2] = self._p.limits.max_turn_rad_s
             elif self._way is not None and not self._looking:
                 wanted = self._along_way(self._way, pose)
-                goes_back = self._phase == RETURNING or (self._phase == FOLLOWING and self._rank == 0)
+                goes_back = self._phase == DriverPhase.RETURNING or (
+                    self._phase == DriverPhase.FOLLOWING and self._rank == 0
+                )
                 safe = braking.allowed(wanted, self._obstacles_at(pose), self._p.limits, creep=goes_back)
                 self._note_blocked(wanted, safe, dt_s)
                 wanted = safe
@@ -296,12 +288,12 @@ class EdgeDriver:
 
     def _along_way(self, way: Polyline, pose: np.ndarray) -> np.ndarray:
         passed_m = way.nearest(pose[:2])
-        at_node = self._phase == HOMING and float(np.hypot(*(pose[:2] - self._target))) < _AT_NODE_M
+        at_node = self._phase == DriverPhase.HOMING and float(np.hypot(*(pose[:2] - self._target))) < _AT_NODE_M
         if at_node or way.length - passed_m < _AT_END_M:
-            if self._phase == HOMING:
+            if self._phase == DriverPhase.HOMING:
                 self._begin_looking()
-            elif self._phase == RETURNING:
-                self._begin(ARRIVED, "back at the meetpoint that it left")
+            elif self._phase == DriverPhase.RETURNING:
+                self._begin(DriverPhase.ARRIVED, "back at the meetpoint that it left")
             return np.zeros(3)
         ahead = se2.transform_points(se2.inverse(pose), way.at(passed_m + _LOOKAHEAD_M))
         bearing = math.atan2(ahead[1], ahead[0])
@@ -313,7 +305,7 @@ class EdgeDriver:
         stuck = wanted[0] > 0.02 and safe[0] < 0.03
         self._blocked_s = self._blocked_s + dt_s if stuck else 0.0
         if (
-            self._phase == HOMING
+            self._phase == DriverPhase.HOMING
             and self._blocked_s > 1.0
             and float(np.hypot(*(self._pose[:2] - self._target))) < _ALMOST_M
         ):
@@ -321,12 +313,12 @@ class EdgeDriver:
         elif self._blocked_s > _BLOCKED_S:
             assert self._way is not None
             remaining_m = self._way.length - self._way.nearest(self._pose[:2])
-            if self._phase == FOLLOWING and remaining_m < _ALMOST_M:
+            if self._phase == DriverPhase.FOLLOWING and remaining_m < _ALMOST_M:
                 self._home(self._way.points[-1], self._way.points)
                 self._begin_looking()
             else:
                 self._fail(
-                    BLOCKED,
+                    Outcome.BLOCKED,
                     f"something stands in the way, {remaining_m:.1f} m before the end of what is seen of the edge",
                 )
 
@@ -349,9 +341,9 @@ class EdgeDriver:
     def _think(self) -> None:
         if self._looking:
             self._look_again()
-        elif self._phase == HOMING:
+        elif self._phase == DriverPhase.HOMING:
             self._correct_target()
-        elif self._phase in (SEEKING, FOLLOWING):
+        elif self._phase in (DriverPhase.SEEKING, DriverPhase.FOLLOWING):
             self._follow()
 
     def _follow(self) -> None:
@@ -432,16 +424,16 @@ class EdgeDriver:
             self._lost_since_ns = self._stamp_ns
         elif self._stamp_ns - self._lost_since_ns > _LOST_LINE_S * 1e9:
             if self._swept:
-                self._fail(NO_GRAPH, f"{why}, also after looking around")
+                self._fail(Outcome.NO_GRAPH, f"{why}, also after looking around")
             else:
                 self._swept, self._sweep_rad, self._lost_since_ns = True, 2.0 * math.pi, 0
-                if self._phase == SEEKING:  # any other edge will do
+                if self._phase == DriverPhase.SEEKING:  # any other edge will do
                     self._way = None
 
     # -- homing
 
     def _home(self, target_m: np.ndarray, way_m: np.ndarray) -> None:
-        self._phase, self._reason = HOMING, "to the meetpoint"
+        self._phase, self._reason = DriverPhase.HOMING, "to the meetpoint"
         self._target = np.array(target_m, float)
         self._way = _line(way_m)
         if self._way is None:
@@ -518,7 +510,7 @@ class EdgeDriver:
 
     def _dismiss(self) -> None:
         self._dismissed.append(self._target)
-        self._phase = FOLLOWING if self._trace is not None else SEEKING
+        self._phase = DriverPhase.FOLLOWING if self._trace is not None else DriverPhase.SEEKING
         self._looking, self._reason = False, "what looked like a meetpoint is none"
 
     def _node_of(self, graph: LocalGraph, node: int) -> Node:
@@ -545,12 +537,12 @@ class EdgeDriver:
         seen = replace(edge_report.meetpoint(node, self._pose, self._stamp_ns), scan=self._scan)
         self._arrival = Arrival(self._stamp_ns, self._pose, seen, driven)
         self._node = node
-        self._begin(ARRIVED, f"at a meetpoint of degree {node.degree}, {node.r_m:.2f} m from its obstacles")
+        self._begin(DriverPhase.ARRIVED, f"at a meetpoint of degree {node.degree}, {node.r_m:.2f} m from its obstacles")
 
     # -- phases
 
-    def _begin(self, phase: str, reason: str) -> None:
-        self._phase, self._reason, self._failure = phase, reason, ""
+    def _begin(self, phase: DriverPhase, reason: str) -> None:
+        self._phase, self._reason, self._failure = phase, reason, None
         self._way, self._trace = None, None
         self._rank = 0
         self._near_start_m = _SAME_NODE_M
@@ -563,15 +555,20 @@ class EdgeDriver:
         self._blocked_s = 0.0
         self._lost_since_ns = 0
 
-    def _fail(self, failure: str, reason: str) -> None:
-        self._halt(FAILED, reason)
+    def _fail(self, failure: Outcome, reason: str) -> None:
+        self._halt(DriverPhase.FAILED, reason)
         self._failure = failure
 
-    def _halt(self, phase: str, reason: str) -> None:
+    def _halt(self, phase: DriverPhase, reason: str) -> None:
         """Stand, and remember what it did; what it remembers already stays if it did nothing."""
-        if self._phase in _DRIVING and self._phase != RETURNING:
+        if self._phase in _DRIVING and self._phase != DriverPhase.RETURNING:
             seeking = self._trace is None
-            self._halted = (SEEKING if seeking else FOLLOWING, self._trace, self._rank, self._way)
+            self._halted = (
+                DriverPhase.SEEKING if seeking else DriverPhase.FOLLOWING,
+                self._trace,
+                self._rank,
+                self._way,
+            )
         trace = self._trace
         self._begin(phase, reason)
         self._trace = trace

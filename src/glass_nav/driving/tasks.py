@@ -12,19 +12,14 @@ from typing import Optional, Protocol, Set
 
 import numpy as np
 
-from glass_nav.driving import braking, edge_driver, recovery, velocity
+from glass_nav.driving import braking, recovery, velocity
 from glass_nav.driving.base_limits import BaseLimits
 from glass_nav.driving.edge_driver import Arrival, EdgeDriver
 from glass_nav.driving.recovery import Recovery, RecoveryParams, Stall
 from glass_nav.driving.route import Route, RouteError, RoutePlanner
 from glass_nav.driving.route_follower import FollowerParams, RouteFollower
 from glass_nav.topology.observations import turn_name
-
-# outcomes
-SUCCEEDED, BLOCKED, NO_GRAPH, NO_WAY = "SUCCEEDED", "BLOCKED", "NO_GRAPH", "NO_WAY"
-
-# states, besides those of EdgeDriver
-GOING, RECOVERING = "GOING", "RECOVERING"
+from glass_nav.vocabulary import DriverPhase, Outcome
 
 HELD = "the robot makes no way, something that the lidar does not see may hold it"
 BLOCKED_S = 3.0  # braked to a standstill for so long
@@ -43,10 +38,10 @@ class Moment:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """How a task ended."""
+class Ending:
+    """How a task ended, and why."""
 
-    code: str  # SUCCEEDED, BLOCKED, NO_GRAPH, NO_WAY, or another one of the actions
+    outcome: Outcome
     reason: str  # one sentence
 
 
@@ -55,7 +50,7 @@ class Task(Protocol):
 
     needs_pose: bool  # in the map
     steers: bool  # its commands go to the base; False: somebody else's do
-    outcome: Optional[Outcome]  # None: it goes on
+    ending: Optional[Ending]  # None: it goes on
 
     def step(self, now: Moment) -> np.ndarray:
         """(3,) the command of this control step; zero once there is an outcome."""
@@ -64,7 +59,7 @@ class Task(Protocol):
         """Nobody wants it any more."""
 
     @property
-    def state(self) -> str:
+    def phase(self) -> DriverPhase:
         """GOING, RECOVERING, or a phase of EdgeDriver."""
 
     @property
@@ -107,7 +102,7 @@ class EdgeTask:
         self._returning = False
         self._recovery_reason = ""
         self.arrival: Optional[Arrival] = None
-        self.outcome: Optional[Outcome] = None
+        self.ending: Optional[Ending] = None
         driver.take_arrival()  # of before
         if rank is None:
             driver.seek()
@@ -115,8 +110,8 @@ class EdgeTask:
             driver.leave(rank)
 
     @property
-    def state(self) -> str:
-        return RECOVERING if self._recovery.is_on else self._driver.progress.phase
+    def phase(self) -> DriverPhase:
+        return DriverPhase.RECOVERING if self._recovery.is_on else self._driver.progress.phase
 
     @property
     def reason(self) -> str:
@@ -132,7 +127,7 @@ class EdgeTask:
 
     def step(self, now: Moment) -> np.ndarray:
         """(3,) the command of this control step."""
-        if self.outcome is not None:
+        if self.ending is not None:
             return np.zeros(3)
         if self._recovery.is_on:
             return self._recover(now)
@@ -142,17 +137,17 @@ class EdgeTask:
             return self._recover(now)
         command = self._driver.command(now.odom_from_base, now.dt_s)
         progress = self._driver.progress
-        if progress.phase == edge_driver.FAILED:
+        if progress.phase == DriverPhase.FAILED:
             self._recovery.begin(progress.reason, now.odom_from_base)
             return self._recover(now)
-        if progress.phase == edge_driver.ARRIVED:
+        if progress.phase == DriverPhase.ARRIVED:
             self._arrive(progress.reason)
         return command
 
     def _arrive(self, reason: str) -> None:
         if not self._returning:
             self.arrival = self._driver.take_arrival()
-            self.outcome = Outcome(SUCCEEDED, reason)
+            self.ending = Ending(Outcome.SUCCEEDED, reason)
             return
         self._returning = False
         node = self._driver.node
@@ -164,7 +159,7 @@ class EdgeTask:
             self._driver.leave(left[0])
         else:
             name = turn_name(self._rank or 0, max(degree, 1))
-            self.outcome = Outcome(BLOCKED, f"edge {name} is blocked; it went back to the meetpoint")
+            self.ending = Ending(Outcome.BLOCKED, f"edge {name} is blocked; it went back to the meetpoint")
 
     def _recover(self, now: Moment) -> np.ndarray:
         self._stall.clear()
@@ -175,7 +170,7 @@ class EdgeTask:
             return velocity.limited(safe, now.last_command, self._limits, now.dt_s)
         if step.name == recovery.ABORT:
             failure = self._driver.progress.failure
-            self.outcome = Outcome(NO_GRAPH if failure == edge_driver.NO_GRAPH else BLOCKED, step.reason)
+            self.ending = Ending(Outcome.NO_GRAPH if failure == Outcome.NO_GRAPH else Outcome.BLOCKED, step.reason)
         elif self._rank is None:
             self._driver.seek()
         elif step.name == recovery.RETRY:
@@ -218,11 +213,11 @@ class GoTask:
         self._stopped_s = 0.0
         self._recovery_reason = ""
         self.route: Optional[Route] = None
-        self.outcome: Optional[Outcome] = None
+        self.ending: Optional[Ending] = None
 
     @property
-    def state(self) -> str:
-        return RECOVERING if self._recovery.is_on else GOING
+    def phase(self) -> DriverPhase:
+        return DriverPhase.RECOVERING if self._recovery.is_on else DriverPhase.GOING
 
     @property
     def reason(self) -> str:
@@ -241,7 +236,7 @@ class GoTask:
 
     def step(self, now: Moment) -> np.ndarray:
         """(3,) the command of this control step."""
-        if self.outcome is not None or now.map_from_base is None:
+        if self.ending is not None or now.map_from_base is None:
             return np.zeros(3)
         obstacles_m = self._driver.obstacles_m(now.odom_from_base)
         if self._recovery.is_on:
@@ -255,7 +250,7 @@ class GoTask:
             return self._recover(now, obstacles_m)
         wanted = self._follower.command(now.map_from_base)
         if self._follower.done:
-            self.outcome = Outcome(SUCCEEDED, "it stands at the goal")
+            self.ending = Ending(Outcome.SUCCEEDED, "it stands at the goal")
             return np.zeros(3)
         safe = braking.allowed(wanted, obstacles_m, self._limits)
         stuck = wanted[0] > STANDSTILL_M_S >= safe[0]
@@ -281,7 +276,7 @@ class GoTask:
                 self.route = self._planner.to_point(map_from_base[:2], self._goal, self._avoided)
         except RouteError as err:
             blocked = f", without the {len(self._avoided)} that are blocked" if self._avoided else ""
-            self.outcome = Outcome(BLOCKED if self._avoided else NO_WAY, f"{err}{blocked}")
+            self.ending = Ending(Outcome.BLOCKED if self._avoided else Outcome.NO_WAY, f"{err}{blocked}")
             return
         self._follower = RouteFollower(self.route.polyline_m, self._limits, self._follower_params, self._final_yaw_rad)
 
@@ -293,7 +288,7 @@ class GoTask:
             safe = braking.allowed(step.command, obstacles_m, self._limits)
             return velocity.limited(safe, now.last_command, self._limits, now.dt_s)
         if step.name == recovery.ABORT:
-            self.outcome = Outcome(BLOCKED, step.reason)
+            self.ending = Ending(Outcome.BLOCKED, step.reason)
             return np.zeros(3)
         if step.name == recovery.NEXT_CHOICE and now.map_from_base is not None and self.route is not None:
             edge = self._planner.nearest_edge(now.map_from_base[:2], self.route.darts)

@@ -15,10 +15,10 @@ import numpy as np
 from glass_nav.recording.message_writer import TF_TYPE, MessageWriter
 from glass_nav.recording.messages import BEAM_CASES, STATUS
 from glass_nav.sensing.scan import Scan
+from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
 
 NODE = "/glass_localization"
-STATES = ("UNKNOWN", "GLOBAL_SEARCH", "LOCALIZED", "UNCERTAIN", "LOST")
 SHOWN = 500  # particles at most: the cloud is for the eye
 _FLOAT32 = 7  # of sensor_msgs/PointField
 
@@ -152,7 +152,7 @@ class ResultBag(MessageWriter):
             NODE + "/status",
             stamp_ns,
             header=self._header(stamp_ns, self._map),
-            state=STATES.index(state),
+            state=LocalizationState(state).code,
             state_name=state,
             reason=reason,
             used_share=used_share,

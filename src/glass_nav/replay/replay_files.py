@@ -15,7 +15,6 @@ from glass_nav.evaluation.metrics import replay_result
 from glass_nav.evaluation.metrics.passed_nodes import TopologyScore
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.evaluation.plots import run_pictures
-from glass_nav.evaluation.plots.run_pictures import MapImage
 from glass_nav.localization.localizer import Estimate
 from glass_nav.recording.recording import Step
 from glass_nav.replay import replay_bag, replay_topology
@@ -70,8 +69,7 @@ class FiledReplay:
         """All other files; what the robot passed of the atlas, where there is one."""
         ready, folder = self._ready, self._outputs.folder
         grid_map, options = ready.grid_map, ready.options
-        image = run_pictures.MapImage(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid)
-        topology = self._write_topology(result, image)
+        topology = self._write_topology(result)
         about: Dict[str, Any] = {
             "log": " ".join(map(str, options.log)),
             "map": str(options.map),
@@ -85,12 +83,12 @@ class FiledReplay:
         glass = GridMap(ready.localizer.glass_map.occupancy(), grid_map.resolution_m, grid_map.map_from_grid)
         map_file.save(glass, folder / "glass_map.yaml", image_suffix=".png")
         if self._outputs.pictures:
-            run_pictures.draw_trajectory(folder / "trajectory.png", image, result, ready.recording.name)
+            run_pictures.draw_trajectory(folder / "trajectory.png", grid_map, result, ready.recording.name)
             if result.case_scores is not None:
-                run_pictures.draw_cases(folder / "cases.png", image, result, ready.recording.name)
+                run_pictures.draw_cases(folder / "cases.png", grid_map, result, ready.recording.name)
         return topology
 
-    def _write_topology(self, result: ReplayResult, image: MapImage) -> Optional[TopologyScore]:
+    def _write_topology(self, result: ReplayResult) -> Optional[TopologyScore]:
         if self._watch is None:
             return None
         topology = self._watch.finish(result)
@@ -98,7 +96,7 @@ class FiledReplay:
             self._outputs.folder,
             topology,
             self._watch.atlas,
-            image if self._outputs.pictures else None,
+            self._ready.grid_map if self._outputs.pictures else None,
             replay_topology.poses(result)[:, :2],
             self._ready.recording.name,
         )

@@ -18,7 +18,6 @@ from glass_nav.evaluation.metrics import passed_nodes
 from glass_nav.evaluation.metrics.passed_nodes import KnownNodes, Passing, SeenNode, TopologyScore
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.evaluation.plots import passed_nodes_picture
-from glass_nav.evaluation.plots.run_pictures import MapImage
 from glass_nav.geometry import se2
 from glass_nav.localization.localizer import Estimate
 from glass_nav.recording.recording import Step
@@ -131,7 +130,7 @@ def poses(result: ReplayResult) -> np.ndarray:
 
 
 def write(
-    folder: Path, found: TopologyScore, atlas: Atlas, grid: Optional[MapImage], way_m: np.ndarray, title: str
+    folder: Path, found: TopologyScore, atlas: Atlas, grid: Optional[GridMap], way_m: np.ndarray, title: str
 ) -> None:
     """topology.csv and, with a map, topology.png."""
     passed_nodes.write(folder / "topology.csv", found)

@@ -30,11 +30,8 @@ from glass_nav.localization.localizer import BeamCases, Estimate
 from glass_nav.msg import BeamCases as BeamCasesMsg
 from glass_nav.msg import LocalizationStatus
 from glass_nav.sensing.scan import Scan, ScanError, scan_from_fields
+from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
-
-STATES = {
-    name: getattr(LocalizationStatus, name) for name in ("UNKNOWN", "GLOBAL_SEARCH", "LOCALIZED", "UNCERTAIN", "LOST")
-}
 
 MAX_TILT_RAD = np.radians(20.0)  # a plane tilted by 20 degrees shortens its ranges seen from above by 6 %
 _X_Y_YAW = np.ix_([0, 1, 5], [0, 1, 5])  # of the 6x6 covariances of ROS: x y z roll pitch yaw
@@ -335,7 +332,9 @@ def is_finite(estimate: Estimate) -> bool:
 def status_msg(
     stamp_ns: int, map_frame: str, state: str, reason: str, used_share: float, reliability: float
 ) -> LocalizationStatus:
-    return LocalizationStatus(header(stamp_ns, map_frame), STATES[state], state, reason, used_share, reliability)
+    return LocalizationStatus(
+        header(stamp_ns, map_frame), LocalizationState(state).code, state, reason, used_share, reliability
+    )
 
 
 def area_from_msg(msg: PolygonStamped, map_frame: str) -> np.ndarray:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import logging
 import re
 import time
 from typing import Dict
 
 import rospy
 
+from glass_nav.log_line import LogLine
+
 _NUMBER = re.compile(r"\d+(\.\d+)?")
 _MAX_KINDS = 200
+_PERIOD_S = 5.0
+_WRITERS = {logging.INFO: rospy.loginfo, logging.WARNING: rospy.logwarn, logging.ERROR: rospy.logerr}
 
 
 class LogThrottle:
@@ -33,10 +38,14 @@ class LogThrottle:
         self._said_s[kind] = now_s
         return True
 
-    def warn(self, text: str, period_s: float = 5.0) -> None:
+    def write(self, line: LogLine) -> None:
+        if not line.often or self.is_due(line.text, _PERIOD_S):
+            _WRITERS[line.level](line.text)
+
+    def warn(self, text: str, period_s: float = _PERIOD_S) -> None:
         if self.is_due(text, period_s):
             rospy.logwarn(text)
 
-    def error(self, text: str, period_s: float = 5.0) -> None:
+    def error(self, text: str, period_s: float = _PERIOD_S) -> None:
         if self.is_due(text, period_s):
             rospy.logerr(text)

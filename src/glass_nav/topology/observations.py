@@ -1,8 +1,8 @@
-"""What the robot reports of its way through the Voronoi graph: meetpoints, and edges between them.
+"""What the robot reports on its path through the Voronoi graph: meetpoints, and edges between them.
 
 The document's match nodes and match edges (seed document global_localization_procedure.txt). The edges of a meetpoint
-have ranks: 0 is the reference edge, the one the robot came along (at the first meetpoint, where it may have come along
-none, any), the others count clockwise, seen from above. Rank 1 is to the LEFT, the last one to the RIGHT, rank 0 a
+have ranks: 0 is the reference edge, the one along which the robot came (any edge at the first meetpoint, if it came
+along none); the others count clockwise, seen from above. Rank 1 is to the LEFT, the last one to the RIGHT, rank 0 a
 U_TURN.
 """
 
@@ -21,12 +21,12 @@ U_TURN, LEFT, RIGHT, FORWARD = "U_TURN", "LEFT", "RIGHT", "FORWARD"
 
 
 class ObservationError(ValueError):
-    """A report that cannot be true; one line: what, what was given, what is allowed."""
+    """An impossible report; one line: what, what was given, what is allowed."""
 
 
 @dataclass(frozen=True)
 class Meetpoint:
-    """A place where the robot found so many edges to leave by."""
+    """A place where several edges of the graph meet, or where one ends."""
 
     degree: int  # number of edges, the one that the robot came along included
     r_m: float  # equidistance: mean distance of the nearest obstacles from the meetpoint
@@ -35,8 +35,8 @@ class Meetpoint:
     # of the edges in the robot's frame, by rank
     centre_m: np.ndarray = field(default_factory=lambda: np.zeros(2))  # (2,) of the meetpoint in the robot's frame
     stamp_ns: int = 0
-    scan: Optional[Scan] = None  # that was seen there, for judging candidates by it
-    odom_from_base: Optional[np.ndarray] = None  # (3,) of the robot by dead reckoning, for following poses
+    scan: Optional[Scan] = None  # taken there, to judge candidates by it
+    odom_from_base: Optional[np.ndarray] = None  # (3,) of the robot by dead reckoning, to follow poses
 
     def __post_init__(self) -> None:
         if self.degree < 1:

@@ -16,6 +16,7 @@ from typing import Callable, List, Optional, Tuple, Union
 
 import numpy as np
 
+from glass_nav.log_line import LogLine
 from glass_nav.topology.atlas import atlas_file
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
@@ -117,15 +118,6 @@ class GoalEnd:
     status: SearchStatus
 
 
-@dataclass(frozen=True)
-class LogLine:
-    """To be logged."""
-
-    text: str
-    level: int = logging.INFO
-    often: bool = False  # may come with every report: at most one in some seconds is worth reading
-
-
 Decision = Union[SearchStatus, Progress, Turn, InitialPose, GoalEnd, LogLine]
 
 
@@ -164,7 +156,7 @@ class SearchSession:
 
     @property
     def choice(self) -> Optional[TurnChoice]:
-        """The turn that the robot was last told to take; None if there is none to take."""
+        """The last turn of this search; None if there is none to take."""
         return None if self._status.estimate is None else self._status.estimate.choice
 
     @property
@@ -336,7 +328,7 @@ class SearchSession:
         )
 
     def _judge(self, localizer: AtlasLocalizer, estimate: SearchEstimate, stamp_ns: int) -> List[Decision]:
-        """What follows from what a meetpoint told."""
+        """The decisions on the estimate after a meetpoint."""
         goal = self._goal
         gives_up = goal is not None and not estimate.done and 0 < goal.max_edges <= estimate.depth
         if gives_up:

@@ -130,7 +130,7 @@ def test_the_tables_have_a_line_for_each(capsys):
     assert "| hall | amcl_field60 | 0.020 | 0.020 | 0.100 | 0.000 (0.000) | 40.0 | 50.0 |" in out
     assert "| hall | 0.50 (amcl_field60) |" in out
     assert "| hall | weak | 3 | 1.000 | 0.000 | 0.0000 | 1.000 |" in out
-    assert "| diffuse | 0.0 % | 100.0 % |" in out
+    assert "| 1 first surface | 100.0 % | 0.0 % |" in out
 
 
 @pytest.mark.parametrize(

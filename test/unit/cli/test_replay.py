@@ -398,7 +398,7 @@ def test_a_log_with_the_truth_about_its_beams_has_its_cases_scored(run, room_bag
     assert result["scan_surfaces"]["scans"] == 20
     lines = out.splitlines()
     assert any(line.startswith(f"cases told      {cases['accuracy']:.3f} of 1200 beams right, ") for line in lines)
-    assert any(line.startswith("  1 diffuse ") and line.endswith(f"{cases['f1'][1]:.3f}") for line in lines)
+    assert any(line.startswith("  1 first surface ") and line.endswith(f"{cases['f1'][1]:.3f}") for line in lines)
     assert any(
         line.startswith("scan_surfaces   - of 0 beams that passed or were mirrored at a pane cut within 0.15 m of it, ")
         for line in lines

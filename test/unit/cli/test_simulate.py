@@ -77,8 +77,8 @@ def test_a_bag_and_its_map_replay_as_they_are(run, tmp_path):
     assert code == 0, err
     assert {path.name for path in tmp_path.iterdir()} == {"hall", "run.bag", "run.map.yaml", "run.map.png"}
     said = re.fullmatch(
-        r"(\d+) scans, 2\.\d m, (\d+\.\d) s \(\d+ times real time\); beams: uncertain \d+\.\d %, "
-        r"diffuse \d+\.\d %, specular \d+\.\d %, first penetration \d+\.\d %, second penetration "
+        r"(\d+) scans, 2\.\d m, (\d+\.\d) s \(\d+ times real time\); beams: first surface \d+\.\d %, "
+        r"mirrored \d+\.\d %, behind one pane \d+\.\d %, behind two panes \d+\.\d %, uncertain "
         r"\d+\.\d %; written to run.bag and run.map.yaml\n",
         out,
     )

@@ -11,23 +11,14 @@ import pytest
 from made_buildings import CONTROL_S, T_MEETPOINT, T_R_M, Drive, glass_t, t_corridor, turned_to, walled
 
 from glass_nav.driving import edge_driver
-from glass_nav.driving.edge_driver import (
-    ARRIVED,
-    BLOCKED,
-    FAILED,
-    FOLLOWING,
-    HOMING,
-    IDLE,
-    NO_GRAPH,
-    SEEKING,
-    EdgeDriver,
-)
+from glass_nav.driving.edge_driver import EdgeDriver
 from glass_nav.geometry import se2
 from glass_nav.simulation import building_file, lidar, shipped_buildings
 from glass_nav.simulation.building import Building, Pane, Thing, box
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import twin
 from glass_nav.topology.observations import ObservationError
+from glass_nav.vocabulary import DriverPhase, Outcome
 
 LIMITS = edge_driver.EdgeDriverParams().limits
 OFFICE = "opaque_office"
@@ -109,7 +100,7 @@ def test_meetpoints_and_edges_of_an_office_are_those_of_its_atlas():
     drive = Drive(building, OFFICE_START)
     drive.driver.seek()
     arrival = drive.arrival()
-    assert arrival.traversal is None and drive.driver.progress.phase == ARRIVED
+    assert arrival.traversal is None and drive.driver.progress.phase == DriverPhase.ARRIVED
     dart = -1
     for turn in (1, 2):
         node, away_m = node_at(atlas, drive, arrival)
@@ -131,7 +122,7 @@ def test_meetpoints_and_edges_of_an_office_are_those_of_its_atlas():
         )
         dart = int(ring[turn])
         drive.driver.leave(turn)
-        assert drive.driver.progress.phase == FOLLOWING and drive.driver.progress.travelled_m == 0.0
+        assert drive.driver.progress.phase == DriverPhase.FOLLOWING and drive.driver.progress.travelled_m == 0.0
         arrival = drive.arrival()
         driven, edge = arrival.traversal, dart >> 1
         assert driven is not None and driven.rank == turn
@@ -180,7 +171,7 @@ def test_stop_brings_it_to_a_stand_within_its_limits_and_resume_goes_on():
     drive.driver.leave(rank_towards(arrival, drive, 0.0))
     drive.until(lambda: drive.driver.progress.travelled_m > 0.8 and drive.command[0] > 0.4)
     drive.driver.stop()
-    assert drive.driver.progress.phase == IDLE and drive.driver.progress.reason == "stopped"
+    assert drive.driver.progress.phase == DriverPhase.IDLE and drive.driver.progress.reason == "stopped"
     before = len(drive.commands)
     for _ in range(15):
         drive.scan()
@@ -190,7 +181,7 @@ def test_stop_brings_it_to_a_stand_within_its_limits_and_resume_goes_on():
     stood = drive.simulation.map_from_base
     assert drive.driver.progress.travelled_m > 0.8
     drive.driver.resume()
-    assert drive.driver.progress.phase == FOLLOWING
+    assert drive.driver.progress.phase == DriverPhase.FOLLOWING
     arrival = drive.arrival()
     driven = arrival.traversal
     assert stood[0] < 9.0 and driven is not None
@@ -205,25 +196,25 @@ def test_it_goes_back_to_the_meetpoint_that_it_left():
     drive.until(lambda: drive.driver.progress.travelled_m > 1.2)
     drive.driver.go_back()
     assert drive.driver.progress.reason == "back to the meetpoint that it left"
-    drive.until(lambda: drive.driver.progress.phase == ARRIVED)
+    drive.until(lambda: drive.driver.progress.phase == DriverPhase.ARRIVED)
     assert np.hypot(*(drive.simulation.map_from_base[:2] - T_MEETPOINT)) < 0.15
     assert drive.driver.take_arrival() is None  # nothing new is to report
     drive.driver.leave(2)  # its edges have the ranks they had
-    assert drive.driver.progress.phase == FOLLOWING and drive.driver.progress.travelled_m == 0.0
+    assert drive.driver.progress.phase == DriverPhase.FOLLOWING and drive.driver.progress.travelled_m == 0.0
 
 
 def test_a_search_that_was_stopped_goes_on():
     drive = Drive(t_corridor(), IN_T)
     drive.driver.seek()
-    assert drive.driver.progress.phase == SEEKING and drive.driver.progress.reason == "looking around"
+    assert drive.driver.progress.phase == DriverPhase.SEEKING and drive.driver.progress.reason == "looking around"
     drive.until(lambda: len(drive.driver.way_m) > 0)
     assert abs(sum(command[2] for command in drive.commands) * CONTROL_S) > 6.0  # it turned round first
     drive.driver.stop()
     for _ in range(10):
         drive.scan()
-    assert (drive.command == 0.0).all() and drive.driver.progress.phase == IDLE
+    assert (drive.command == 0.0).all() and drive.driver.progress.phase == DriverPhase.IDLE
     drive.driver.resume()
-    assert drive.driver.progress.phase in (SEEKING, HOMING)
+    assert drive.driver.progress.phase in (DriverPhase.SEEKING, DriverPhase.HOMING)
     assert drive.arrival().traversal is None
 
 
@@ -244,7 +235,7 @@ def test_what_it_cannot_do_it_says_and_changes_nothing():
             drive.driver.leave(rank)
     with pytest.raises(ValueError, match="^nothing was stopped that it could go on with: it is ARRIVED$"):
         drive.driver.resume()
-    assert drive.driver.progress.phase == ARRIVED
+    assert drive.driver.progress.phase == DriverPhase.ARRIVED
     drive.driver.leave(1)
     with pytest.raises(ValueError, match="it is FOLLOWING$"):
         drive.driver.leave(1)
@@ -255,12 +246,12 @@ def test_reset_forgets_all():
     assert drive.driver.local_grid is not None and drive.driver.local_graph is not None
     assert len(drive.driver.obstacles_m(drive.simulation.reading.odom_from_base)) > 0
     drive.driver.reset()
-    assert drive.driver.progress == edge_driver.Progress(IDLE, "nothing to do", 0.0)
+    assert drive.driver.progress == edge_driver.Progress(DriverPhase.IDLE, "nothing to do", 0.0)
     assert drive.driver.node is None and drive.driver.local_grid is None and drive.driver.local_graph is None
     with pytest.raises(ValueError):
         drive.driver.go_back()
     drive.driver.seek()
-    assert drive.driver.progress.phase == SEEKING
+    assert drive.driver.progress.phase == DriverPhase.SEEKING
 
 
 def test_where_it_stands_obstacles_are_those_of_the_building():
@@ -286,24 +277,24 @@ def test_what_bars_the_edge_ends_it_as_blocked_in_front_of_it_and_there_is_a_way
     began = drive.where(arrival)
     assert arrival.meetpoint.degree == 1 and began[0] < 1.0
     drive.driver.leave(0)
-    drive.until(lambda: drive.driver.progress.phase == FAILED)
+    drive.until(lambda: drive.driver.progress.phase == DriverPhase.FAILED)
     told = drive.driver.progress
-    assert told.failure == BLOCKED
+    assert told.failure == Outcome.BLOCKED
     assert told.reason.startswith("something stands in the way, ") and told.reason.endswith(
         " m before the end of what is seen of the edge"
     )
     assert 3.5 < drive.simulation.map_from_base[0] < 4.5 - 0.22 and drive.blocked == 0
     drive.driver.go_back()
-    drive.until(lambda: drive.driver.progress.phase == ARRIVED)
+    drive.until(lambda: drive.driver.progress.phase == DriverPhase.ARRIVED)
     assert np.hypot(*(drive.simulation.map_from_base[:2] - began)) < 0.15
 
 
 def test_where_there_is_no_way_it_looks_around_again_and_gives_up():
     drive = Drive(walled(np.array([[0.0, 0.0], [1.2, 0.0], [1.2, 1.2], [0.0, 1.2]])), (0.6, 0.6, 0.0))
     drive.driver.seek()
-    drive.until(lambda: drive.driver.progress.phase == FAILED)
+    drive.until(lambda: drive.driver.progress.phase == DriverPhase.FAILED)
     told = drive.driver.progress
-    assert told.failure == NO_GRAPH
+    assert told.failure == Outcome.NO_GRAPH
     assert told.reason == "no edge is near that can be reached straight on, also after looking around"
     turned_rad = sum(command[2] for command in drive.commands) * CONTROL_S
     assert turned_rad > 3.9 * math.pi and drive.blocked == 0
@@ -319,7 +310,7 @@ def test_a_side_corridor_that_turns_out_to_be_behind_a_pane_is_no_meetpoint():
 
     def done():
         reasons.add(drive.driver.progress.reason)
-        return drive.driver.progress.phase == ARRIVED
+        return drive.driver.progress.phase == DriverPhase.ARRIVED
 
     drive.until(done)
     assert "what looked like a meetpoint is none" in reasons

@@ -11,7 +11,7 @@ import pytest
 from glass_nav.driving.base_limits import BaseLimits
 from glass_nav.driving.edge_driver import EdgeDriver
 from glass_nav.driving.recovery import RecoveryParams
-from glass_nav.driving.tasks import SUCCEEDED, EdgeTask, Moment
+from glass_nav.driving.tasks import EdgeTask, Moment
 from glass_nav.geometry import angles
 from glass_nav.hypotheses.scan_explanation import ScanExplanation
 from glass_nav.simulation import building_map, lidar
@@ -20,7 +20,7 @@ from glass_nav.simulation.simulation import Simulation
 from glass_nav.topology.atlas import atlas_builder
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search.search_params import SearchParams
-from glass_nav.vocabulary import SearchState
+from glass_nav.vocabulary import Outcome, SearchState
 
 CONTROL_S = 0.05
 W, L = 1.0, 5.0  # half the width of the four arms of a cross, and how far they reach
@@ -62,8 +62,8 @@ def drive(simulation: Simulation, driver: EdgeDriver, task: EdgeTask) -> None:
             command = task.step(Moment(simulation.reading.odom_from_base, None, command, CONTROL_S))
             simulation.move(CONTROL_S, command)
             assert not simulation.blocked, "it ran into a wall"
-        if task.outcome is not None:
-            assert task.outcome.code == SUCCEEDED, task.outcome.reason
+        if task.ending is not None:
+            assert task.ending.outcome == Outcome.SUCCEEDED, task.ending.reason
             return
     raise AssertionError("it did not arrive within 150 s")
 

@@ -16,7 +16,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from glass_nav.driving import edge_driver, tasks
 from glass_nav.driving.base_limits import BaseLimits
 from glass_nav.driving.edge_driver import EdgeDriver
 from glass_nav.driving.recovery import RecoveryParams
@@ -32,6 +31,7 @@ from glass_nav.simulation.robot import RobotParams
 from glass_nav.simulation.simulation import Simulation
 from glass_nav.topology.atlas import atlas_builder
 from glass_nav.topology.observations import ObservationError
+from glass_nav.vocabulary import DriverPhase, Outcome
 
 LIMITS = BaseLimits()
 CONTROL_S = 0.05
@@ -79,27 +79,27 @@ class Drive:
         return Moment(reading.odom_from_base, self.simulation.map_from_base, self.last, CONTROL_S)
 
     def run(self, task, until=lambda: False, limit_s=240.0):
-        """Until the task has an outcome, or so long."""
+        """Until the task has ended, or so long."""
         for step in range(round(limit_s / CONTROL_S)):
             if step % 2 == 0:
                 frame = self.simulation.look()
                 self.driver.see(frame.scan, frame.odom_from_base)
             self.last = task.step(self.now())
             self.commands.append(self.last)
-            if task.outcome is not None or until():
-                return task.outcome
+            if task.ending is not None or until():
+                return task.ending
             x, _, yaw = self.simulation.map_from_base
             held = x > self.ledge_x and math.cos(yaw) * self.last[0] > 0.0
             self.simulation.move(CONTROL_S, self.last * [not held, 1.0, 1.0])
             self.touched = self.touched or self.simulation.blocked
-        raise AssertionError(f"no outcome in {limit_s} s: {task.state}, {task.reason}")
+        raise AssertionError(f"no end in {limit_s} s: {task.phase}, {task.reason}")
 
 
 def arrived(building, ledge_x=math.inf):
     """At the meetpoint B."""
     drive = Drive(building, ledge_x=ledge_x)
     task = EdgeTask(drive.driver, QUICK, LIMITS)
-    assert drive.run(task).code == tasks.SUCCEEDED
+    assert drive.run(task).outcome == Outcome.SUCCEEDED
     assert task.arrival.meetpoint.degree == 3 and task.arrival.traversal is None
     assert np.hypot(*(drive.simulation.map_from_base[:2] - [5.0, 1.0])) < 0.4
     return drive
@@ -117,8 +117,8 @@ def test_an_edge_is_followed_to_the_next_meetpoint_and_reported():
     drive = arrived(corridor())
     rank = rank_towards(drive, 0.0)
     task = EdgeTask(drive.driver, QUICK, LIMITS, rank)
-    outcome = drive.run(task)
-    assert outcome.code == tasks.SUCCEEDED and task.state == edge_driver.ARRIVED
+    ending = drive.run(task)
+    assert ending.outcome == Outcome.SUCCEEDED and task.phase == DriverPhase.ARRIVED
     assert (task.arrival.meetpoint.degree, task.arrival.traversal.rank) == (1, rank)
     assert task.arrival.traversal.length_m == pytest.approx(drive.simulation.map_from_base[0] - 5.0, abs=0.3)
     assert not drive.touched and math.isnan(task.remaining_m)
@@ -139,7 +139,7 @@ def test_called_off_it_asks_for_a_standstill_and_the_driver_for_nothing():
     task = EdgeTask(drive.driver, QUICK, LIMITS, rank_towards(drive, 0.0))
     drive.run(task, until=lambda: drive.last[0] > 0.3)
     task.cancel()
-    assert drive.driver.progress.phase == edge_driver.IDLE
+    assert drive.driver.progress.phase == DriverPhase.IDLE
 
 
 @pytest.fixture(scope="module")
@@ -161,8 +161,8 @@ def test_a_node_is_driven_to_along_the_edges(planner):
     task = going(drive, planner, node_near(planner, 5.0, 1.0))
     assert task.reason == "looks for a way" and math.isnan(task.remaining_m)
     drive.run(task, until=lambda: drive.last[0] > 0.4)
-    assert task.state == tasks.GOING and 0.0 < task.remaining_m < task.route.length_m
-    assert drive.run(task).code == tasks.SUCCEEDED
+    assert task.phase == DriverPhase.GOING and 0.0 < task.remaining_m < task.route.length_m
+    assert drive.run(task).outcome == Outcome.SUCCEEDED
     there = planner.atlas.nodes.position_m[node_near(planner, 5.0, 1.0)]
     assert np.hypot(*(drive.simulation.map_from_base[:2] - there)) < 0.1
     assert not drive.touched
@@ -170,26 +170,30 @@ def test_a_node_is_driven_to_along_the_edges(planner):
 
 def test_a_pose_is_driven_to_and_turned_to(planner):
     drive = Drive(corridor(), (1.5, 0.8, 2.0))
-    assert drive.run(going(drive, planner, np.array([5.2, 4.5]), -1.0)).code == tasks.SUCCEEDED
+    assert drive.run(going(drive, planner, np.array([5.2, 4.5]), -1.0)).outcome == Outcome.SUCCEEDED
     np.testing.assert_allclose(drive.simulation.map_from_base, [5.2, 4.5, -1.0], atol=0.12)
 
 
 @pytest.mark.long_run
 def test_a_cart_across_the_only_way_is_waited_for_looked_at_and_given_up(planner):
     drive = Drive(corridor(CART), (6.0, 1.0, 0.0))
-    states = set()
+    phases = set()
     task = going(drive, planner, node_near(planner, 11.5, 1.0))
-    outcome = drive.run(task, until=lambda: states.add((task.state, task.reason.split(":")[0])))
-    assert outcome.code == tasks.BLOCKED
-    assert outcome.reason.endswith("without the 1 that are blocked")
-    assert {reason for state, reason in states if state == tasks.RECOVERING} == {"waits", "backs off", "turns in place"}
+    ending = drive.run(task, until=lambda: phases.add((task.phase, task.reason.split(":")[0])))
+    assert ending.outcome == Outcome.BLOCKED
+    assert ending.reason.endswith("without the 1 that are blocked")
+    assert {reason for phase, reason in phases if phase == DriverPhase.RECOVERING} == {
+        "waits",
+        "backs off",
+        "turns in place",
+    }
     assert not drive.touched
 
 
 def test_a_place_without_a_way_is_told(planner):
     drive = Drive(corridor(), (1.5, 0.8, 2.0))
-    outcome = drive.run(going(drive, planner, np.array([30.0, 1.0])))
-    assert outcome.code == tasks.NO_WAY and outcome.reason.startswith("the goal at x 30.00 m")
+    ending = drive.run(going(drive, planner, np.array([30.0, 1.0])))
+    assert ending.outcome == Outcome.NO_WAY and ending.reason.startswith("the goal at x 30.00 m")
 
 
 def test_without_a_pose_in_the_map_it_stands(planner):
@@ -197,7 +201,7 @@ def test_without_a_pose_in_the_map_it_stands(planner):
     task = going(drive, planner, node_near(planner, 5.0, 1.0))
     assert task.step(replace(drive.now(), map_from_base=None)).tolist() == [0.0, 0.0, 0.0]
     task.cancel()
-    assert task.outcome is None
+    assert task.ending is None
 
 
 def test_a_robot_that_was_pushed_off_its_way_finds_another(planner):
@@ -218,8 +222,8 @@ def test_an_edge_that_cannot_be_driven_is_left_for_another_one_where_any_will_do
     first = rank_towards(drive, 0.0)
     reasons = set()
     task = EdgeTask(drive.driver, QUICK, LIMITS, first, may_choose=True)
-    outcome = drive.run(task, until=lambda: reasons.add(task.reason.split(":")[0]))
-    assert outcome.code == tasks.SUCCEEDED
+    ending = drive.run(task, until=lambda: reasons.add(task.reason.split(":")[0]))
+    assert ending.outcome == Outcome.SUCCEEDED
     assert task.arrival.traversal.rank not in (0, first)
     assert reasons >= {"waits", "backs off", "turns in place", "back to the meetpoint that it left"}
     assert not drive.touched
@@ -228,22 +232,22 @@ def test_an_edge_that_cannot_be_driven_is_left_for_another_one_where_any_will_do
 def test_an_edge_that_was_asked_for_and_cannot_be_driven_is_told_back_at_its_meetpoint():
     drive = arrived(corridor(), ledge_x=8.0)
     before = drive.simulation.map_from_base
-    outcome = drive.run(EdgeTask(drive.driver, QUICK, LIMITS, rank_towards(drive, 0.0)))
-    assert outcome.code == tasks.BLOCKED
-    assert outcome.reason.endswith("is blocked; it went back to the meetpoint")
+    ending = drive.run(EdgeTask(drive.driver, QUICK, LIMITS, rank_towards(drive, 0.0)))
+    assert ending.outcome == Outcome.BLOCKED
+    assert ending.reason.endswith("is blocked; it went back to the meetpoint")
     assert np.hypot(*(drive.simulation.map_from_base - before)[:2]) < 0.4
-    assert drive.driver.progress.phase == edge_driver.ARRIVED
+    assert drive.driver.progress.phase == DriverPhase.ARRIVED
 
 
 def test_a_search_that_is_held_everywhere_is_given_up():
     drive = Drive(corridor(), (5.0, 4.0, 0.0))
     drive.simulation.move = lambda dt_s, command, move=drive.simulation.move: move(dt_s, command * [0.0, 0.0, 1.0])
-    outcome = drive.run(EdgeTask(drive.driver, QUICK, LIMITS), limit_s=400.0)
-    assert outcome.code == tasks.BLOCKED and outcome.reason.startswith("gives up: the robot makes no way")
+    ending = drive.run(EdgeTask(drive.driver, QUICK, LIMITS), limit_s=400.0)
+    assert ending.outcome == Outcome.BLOCKED and ending.reason.startswith("gives up: the robot makes no way")
 
 
 def test_a_goal_behind_a_ledge_is_given_up(planner):
     drive = Drive(corridor(), (6.0, 1.0, 0.0), ledge_x=8.0)
-    outcome = drive.run(going(drive, planner, np.array([11.0, 1.0])))
-    assert outcome.code == tasks.BLOCKED and outcome.reason.startswith("gives up: the robot makes no way")
+    ending = drive.run(going(drive, planner, np.array([11.0, 1.0])))
+    assert ending.outcome == Outcome.BLOCKED and ending.reason.startswith("gives up: the robot makes no way")
     assert drive.simulation.map_from_base[0] < 8.3

@@ -13,6 +13,7 @@ from glass_nav.ros.driver import driver_displays, driver_node
 from glass_nav.ros.landmarks import landmarks_node
 from glass_nav.ros.localization import beam_displays, localization_node, wall_display
 from glass_nav.ros.topology import topology_displays
+from glass_nav.vocabulary import BeamCase
 
 REPO = Path(__file__).parents[3]
 CONFIG = yaml.safe_load((REPO / "rviz" / "glass_nav.rviz").read_text(encoding="utf-8"))
@@ -47,7 +48,7 @@ def test_what_is_called_value_is_what_is_enabled():
 
 
 def test_every_case_and_the_status_have_a_checkbox():
-    names = [*beam_displays.CASE_NAMES, beam_displays.STATUS_NAMESPACE]
+    names = [*(case.label for case in BeamCase), beam_displays.STATUS_NAMESPACE]
     assert named("Beams by case")["Namespaces"] == dict.fromkeys(names, True)
     assert named("Glass map")["Namespaces"] == dict.fromkeys(wall_display.WALL_NAMES, True)
 

@@ -11,8 +11,9 @@ from typing import Any, Dict, Optional
 
 import numpy as np
 
-CASES = 5
-CASE_NAMES = ("uncertain", "diffuse", "specular", "first penetration", "second penetration")
+from glass_nav.vocabulary import BeamCase
+
+CASES = len(BeamCase)
 MIN_SHARE = 0.01  # of all beams; a case that is rarer counts in no macro F1
 NEAR_M = 0.15  # a beam cut that near the pane shows a costmap where it is
 

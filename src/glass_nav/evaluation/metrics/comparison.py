@@ -20,6 +20,7 @@ from glass_nav.evaluation.metrics.pose_errors import PoseErrors
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.evaluation.metrics.thresholds import Threshold
 from glass_nav.geometry.trajectory import Trajectory
+from glass_nav.vocabulary import LocalizationState
 
 
 @dataclass(frozen=True)
@@ -216,7 +217,7 @@ def _values(run: Run, stamps_ns: np.ndarray, first: Sequence[Run]) -> Dict[str, 
     apart = [_apart_m(run, each, stamps_ns) for each in first if (run.seed, each.seed) in pairs]
     is_first = any(each is run for each in first)
     found["apart_mean_m"] = math.nan if is_first or not apart else float(np.mean(apart))
-    found["localized_share"] = math.nan if states is None else float((states == "LOCALIZED").mean())
+    found["localized_share"] = math.nan if states is None else float((states == LocalizationState.LOCALIZED).mean())
     found["case_accuracy"] = math.nan if run.case_accuracy is None else run.case_accuracy
     found["cpu_ms_per_scan"] = math.nan if run.cpu_ms is None else float(run.cpu_ms[used].mean())
     return {figure.name: found[figure.name] for figure in FIGURES}

@@ -20,8 +20,9 @@ from glass_nav.evaluation.metrics import pose_errors
 from glass_nav.evaluation.metrics.case_scores import CaseScores, SurfaceScores
 from glass_nav.evaluation.metrics.pose_errors import PoseErrors
 from glass_nav.geometry.trajectory import Trajectory
+from glass_nav.vocabulary import BeamCase
 
-CASES = (0, 1, 2, 3, 4)  # 0 uncertain, 1 diffuse, 2 specular, 3 first penetration, 4 second
+CASES = tuple(case.value for case in BeamCase)
 NO_BEAM = 255  # fills the rows of scans with fewer beams than the widest
 
 

@@ -12,9 +12,10 @@ import numpy as np
 
 from glass_nav.evaluation.metrics.pose_errors import LOST_M, PoseErrors
 from glass_nav.evaluation.metrics.replay_result import NO_BEAM, ReplayResult
+from glass_nav.vocabulary import BeamCase, LocalizationState
 
 RIGHT_M, RIGHT_RAD = 0.7, np.radians(20.0)  # as test/benchmark/reliability.py has it
-SEARCHING = ("GLOBAL_SEARCH", "UNKNOWN")  # states without a pose to rely on
+SEARCHING = (LocalizationState.GLOBAL_SEARCH, LocalizationState.UNKNOWN)  # states without a pose to rely on
 GOOD, FAIR, BAD = "good", "fair", "bad"
 _MANY, _FEW = 0.95, 0.01  # shares of the scans
 
@@ -95,7 +96,7 @@ def seconds_of(result: ReplayResult) -> np.ndarray:
 
 def first_localized(result: ReplayResult) -> Optional[int]:
     """The first scan whose pose is said to be known; None: there is none."""
-    return result.states.index("LOCALIZED") if "LOCALIZED" in result.states else None
+    return result.states.index(LocalizationState.LOCALIZED) if LocalizationState.LOCALIZED in result.states else None
 
 
 def driven_m(result: ReplayResult) -> np.ndarray:
@@ -156,7 +157,7 @@ def _scope(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -> np
 
 def _wrong_share(result: ReplayResult, errors: PoseErrors) -> float:
     """Of the scans said to be LOCALIZED, those that were somewhere else."""
-    said = (np.array(result.states) == "LOCALIZED") & errors.matched
+    said = (np.array(result.states) == LocalizationState.LOCALIZED) & errors.matched
     return float(np.mean(~right(errors)[said])) if said.any() else 0.0
 
 
@@ -164,16 +165,16 @@ def _verdict(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -> 
     if found is None:
         return BAD, "The robot never said that it knew where it was"
     states = np.array(result.states[found:])
-    said = float(np.mean(states == "LOCALIZED"))
+    said = float(np.mean(states == LocalizationState.LOCALIZED))
     if not errors.matched.any():
-        if states[-1] == "LOCALIZED" and said >= _MANY:
+        if states[-1] == LocalizationState.LOCALIZED and said >= _MANY:
             return GOOD, "The robot said that it knew where it was, and its scans did not contradict"
-        grade = BAD if states[-1] == "LOST" or said < 0.5 else FAIR
+        grade = BAD if states[-1] == LocalizationState.LOST or said < 0.5 else FAIR
         return grade, f"The robot said that it knew where it was for {percent(said)} of the run"
     wrong = _wrong_share(result, errors)
     if wrong > _FEW:
         return BAD, f"The robot was sure of a wrong place for {percent(wrong)} of the scans that it said LOCALIZED at"
-    if said < 0.5 or states[-1] == "LOST":
+    if said < 0.5 or states[-1] == LocalizationState.LOST:
         return BAD, "The robot did not know where it was for most of the run"
     off = float(np.mean(errors.position_m[_scope(result, errors, found)] > LOST_M))
     if said >= _MANY and off == 0.0 and wrong == 0.0:
@@ -189,7 +190,7 @@ def _drive(result: ReplayResult) -> str:
 
 
 def _beginning(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -> List[str]:
-    if "GLOBAL_SEARCH" not in result.states[:1]:
+    if LocalizationState.GLOBAL_SEARCH not in result.states[:1]:
         return []
     most = int(result.places.max())
     if found is None:
@@ -225,9 +226,9 @@ def _accuracy(result: ReplayResult, errors: PoseErrors, found: Optional[int]) ->
 def _doubts(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -> List[str]:
     if found is None:
         return []
-    doubted = [each for each in episodes(result) if each.first > found and each.state != "LOCALIZED"]
+    doubted = [each for each in episodes(result) if each.first > found and each.state != LocalizationState.LOCALIZED]
     if not doubted:
-        return ["It never doubted its pose."] if "LOCALIZED" in result.states[-1:] else []
+        return ["It never doubted its pose."] if LocalizationState.LOCALIZED in result.states[-1:] else []
     total = sum(each.duration_s for each in doubted)
     text = f"It doubted its pose {len(doubted)} time{'s' if len(doubted) > 1 else ''}, {duration(total)} in all"
     if errors.matched.any():
@@ -261,7 +262,7 @@ def _figures(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -> 
                 f"no ground truth; the filter claims {metres(float(np.median(claimed)))}, median",
             )
         ]
-    share = float(np.mean(np.array(result.states) == "LOCALIZED"))
+    share = float(np.mean(np.array(result.states) == LocalizationState.LOCALIZED))
     figures.append(
         Figure(
             "Said LOCALIZED",
@@ -273,7 +274,7 @@ def _figures(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -> 
     explained = explained_share(result)
     if explained is not None:
         counted = result.cases[result.cases != NO_BEAM]
-        glass = float(np.mean(counted >= 2)) if len(counted) else 0.0
+        glass = float(np.mean(counted >= BeamCase.SPECULAR)) if len(counted) else 0.0
         figures.append(
             Figure(
                 "Beams explained",

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, Callable, Dict, Mapping, Optional, Sequence
 
+from glass_nav.vocabulary import BeamCase, LocalizationState
+
 COMPARISONS: "Dict[str, Callable[[float, float], bool]]" = {
     ">=": operator.ge,
     "<=": operator.le,
     ">": operator.gt,
     "<": operator.lt,
 }
-STATES = ("UNKNOWN", "GLOBAL_SEARCH", "LOCALIZED", "UNCERTAIN", "LOST")
 ERRORS = (
     "position_mean_m",
     "position_median_m",
@@ -39,8 +40,8 @@ KNOWN = (
     "log_duration_s",
     "wall_s",
     "times_real_time",
-    *(f"state_share.{state}" for state in STATES),
-    *(f"case_share.{case}" for case in range(5)),
+    *(f"state_share.{state}" for state in LocalizationState),
+    *(f"case_share.{case.value}" for case in BeamCase),
     "cases.accuracy",
     "cases.accuracy_answered",
     "cases.macro_f1",

@@ -11,7 +11,7 @@ from glass_nav.evaluation.metrics.comparison import Comparison
 from glass_nav.evaluation.metrics.confidence import Interval
 from glass_nav.evaluation.pages import comparison_table, report_page
 from glass_nav.evaluation.plots import comparison_pictures
-from glass_nav.evaluation.plots.report_pictures import Picture
+from glass_nav.evaluation.plots.canvas import Picture
 
 
 def write(path: Path, compared: Comparison, drawn: Sequence[Picture], about: Mapping[str, Any]) -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Dict, List, Optional
 
-from glass_nav.evaluation.metrics.case_scores import CASE_NAMES, NEAR_M
+from glass_nav.evaluation.metrics.case_scores import NEAR_M
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
+from glass_nav.vocabulary import CASES_IN_ORDER
 
 
 def run_lines(result: ReplayResult) -> List[str]:
@@ -32,7 +33,7 @@ def run_lines(result: ReplayResult) -> List[str]:
         )
     lines.append(
         "beam cases      "
-        + "  ".join(f"{name} {100 * figures['case_share'][str(case)]:.1f} %" for case, name in enumerate(CASE_NAMES))
+        + "  ".join(f"{case.words} {100 * figures['case_share'][str(case.value)]:.1f} %" for case in CASES_IN_ORDER)
     )
     return lines + _case_lines(figures["cases"]) + _surface_lines(figures["scan_surfaces"])
 
@@ -46,10 +47,10 @@ def _case_lines(scores: Optional[Dict[str, Any]]) -> List[str]:
         f"{_figure(scores['used_share'])} used",
         f"  {'':22s}{'true':>9s}{'told':>9s}{'precision':>11s}{'recall':>8s}{'F1':>8s}",
     ]
-    for case, name in enumerate(CASE_NAMES):
+    for case in CASES_IN_ORDER:
         share, told = (100 * (scores[key][case] or 0.0) for key in ("true_share", "told_share"))
         precision, recall, f1 = (_figure(scores[key][case]) for key in ("precision", "recall", "f1"))
-        lines.append(f"  {case} {name:20s}{share:7.1f} %{told:7.1f} %{precision:>11s}{recall:>8s}{f1:>8s}")
+        lines.append(f"  {case.label:22s}{share:7.1f} %{told:7.1f} %{precision:>11s}{recall:>8s}{f1:>8s}")
     return lines
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, Iterable, List, Mapping, Sequence
 
 from glass_nav.evaluation.metrics.run_story import Episode, Story, duration
-from glass_nav.evaluation.plots.report_pictures import Picture
-from glass_nav.evaluation.plots.run_pictures import CASE_COLOURS, CASE_NAMES, STATE_COLOURS
+from glass_nav.evaluation.plots.canvas import Picture
+from glass_nav.vocabulary import CASES_IN_ORDER, state_colour
 
 _SHOWN = 5  # episodes on the first screen; the longest of more
 _MOMENTS = 4  # of the worst scans there
@@ -215,7 +215,7 @@ def _moments(worst: Sequence[Picture]) -> str:
 
 
 def _colour(episode: Episode) -> str:
-    return STATE_COLOURS.get(episode.state, "#000000")
+    return state_colour(episode.state)
 
 
 def _contents(worst: bool) -> str:
@@ -233,8 +233,8 @@ def _contents(worst: bool) -> str:
 
 def _legend() -> str:
     return ", ".join(
-        f'<span style="border-left:.8rem solid {colour};padding-left:.3rem">{escape(name[2:])}</span>'
-        for name, colour in zip(CASE_NAMES, CASE_COLOURS)
+        f'<span style="border-left:.8rem solid {case.colour};padding-left:.3rem">{escape(case.label)}</span>'
+        for case in CASES_IN_ORDER
     )
 
 

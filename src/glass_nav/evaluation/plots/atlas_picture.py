@@ -8,7 +8,9 @@ from typing import Any, Optional, Sequence
 
 import numpy as np
 
-from glass_nav.evaluation.plots.run_pictures import UNKNOWN_GREY, MapImage, draw_map
+from glass_nav.evaluation.plots.canvas import frame, new_figure
+from glass_nav.evaluation.plots.map_layer import UNKNOWN_GREY, draw_map
+from glass_nav.world.grid_map import GridMap
 
 MARGIN_M = 1.0
 MAX_NUMBERS = 250  # nodes; more numbers than these nobody can read
@@ -30,7 +32,7 @@ class AtlasDrawing:
     seen_back_m: Sequence[np.ndarray]  # (E) arrays (k, 4): and on the way back
 
 
-def draw_atlas(path: Path, grid: Optional[MapImage], atlas: AtlasDrawing, title: str) -> None:
+def draw_atlas(path: Path, grid: Optional[GridMap], atlas: AtlasDrawing, title: str) -> None:
     """One above the other: nodes and edges with their numbers; the segments seen on each edge there; and back."""
     low, high = _bounds(atlas, range(len(atlas.lines_m)))
     figure, panels = _panels(low, high, 3)
@@ -45,7 +47,7 @@ def draw_atlas(path: Path, grid: Optional[MapImage], atlas: AtlasDrawing, title:
     figure.savefig(path)
 
 
-def draw_edge(path: Path, grid: Optional[MapImage], atlas: AtlasDrawing, edge: int, title: str) -> None:
+def draw_edge(path: Path, grid: Optional[GridMap], atlas: AtlasDrawing, edge: int, title: str) -> None:
     """One edge with the segments seen on it, there and back."""
     low, high = _bounds(atlas, [edge])
     figure, panels = _panels(low, high, 2)
@@ -64,25 +66,14 @@ def draw_edge(path: Path, grid: Optional[MapImage], atlas: AtlasDrawing, edge: i
 
 def _panels(low: np.ndarray, high: np.ndarray, count: int) -> Any:
     """A figure and its axes, in a column for a floor that is wide, else in a row."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     width, height = high - low
     column = width > 1.4 * height
     side = 13.0 if column else 8.0
     size = (side, side * float(np.clip(height / width, 0.1, 3.0)) + 0.4)
-    figure = Figure(
-        figsize=(size[0], count * size[1] + 0.8) if column else (count * size[0], size[1] + 0.8),
-        dpi=110,
-        constrained_layout=True,
-    )
-    FigureCanvasAgg(figure)
+    figure = new_figure(*(size[0], count * size[1] + 0.8) if column else (count * size[0], size[1] + 0.8))
     axes = figure.subplots(count, 1) if column else figure.subplots(1, count)
     for each in axes:
-        each.set_xlim(low[0], high[0])
-        each.set_ylim(low[1], high[1])
-        each.set_aspect("equal")
-        each.tick_params(labelsize=7)
+        frame(each, low, high)
     return figure, axes
 
 
@@ -94,7 +85,7 @@ def _bounds(atlas: AtlasDrawing, edges: Sequence[int]) -> "tuple[np.ndarray, np.
     return points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
 
 
-def _draw_ground(axes: Any, grid: Optional[MapImage], low: np.ndarray, high: np.ndarray) -> None:
+def _draw_ground(axes: Any, grid: Optional[GridMap], low: np.ndarray, high: np.ndarray) -> None:
     if grid is not None:
         draw_map(axes, grid, low, high)
     else:

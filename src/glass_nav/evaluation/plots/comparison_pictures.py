@@ -10,8 +10,10 @@ import numpy as np
 
 from glass_nav.evaluation.metrics import comparison
 from glass_nav.evaluation.metrics.comparison import Comparison, Figure, Run
-from glass_nav.evaluation.plots.report_pictures import TRUTH_COLOUR, Picture, bounds_of, frame, new_figure, save
-from glass_nav.evaluation.plots.run_pictures import MapImage, draw_map
+from glass_nav.evaluation.plots.canvas import Picture, frame, new_figure, save
+from glass_nav.evaluation.plots.map_layer import draw_map
+from glass_nav.evaluation.plots.report.driven_path import TRUTH_COLOUR, bounds_of
+from glass_nav.world.grid_map import GridMap
 
 MAX_LOGS = 6  # have pictures of their own; a sweep over hundreds is told by its figures
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")  # Okabe and Ito's
@@ -21,7 +23,7 @@ _WIDE = 20.0  # times between the least and the largest value: then on a logarit
 _SPREAD = 0.22  # of the dots of one contestant, in rows
 
 
-def draw_all(folder: Path, compared: Comparison, grids: Mapping[str, MapImage]) -> List[Picture]:
+def draw_all(folder: Path, compared: Comparison, grids: Mapping[str, GridMap]) -> List[Picture]:
     """The figures of all logs first, then each of the first MAX_LOGS logs; ways where its map is there."""
     found = [_figures(folder, compared)]
     for number, log in enumerate(compared.logs[:MAX_LOGS], 1):
@@ -147,7 +149,7 @@ def _by_scan(runs: List[Run]) -> "tuple[np.ndarray, np.ndarray]":
     return stamps_ns, np.array(errors).reshape(len(runs), -1)
 
 
-def _ways(folder: Path, compared: Comparison, log: str, number: int, grid: MapImage) -> Picture:
+def _ways(folder: Path, compared: Comparison, log: str, number: int, grid: GridMap) -> Picture:
     runs: Dict[str, Run] = {}
     for run in compared.runs:
         if run.log == log:

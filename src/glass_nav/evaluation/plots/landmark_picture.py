@@ -8,7 +8,9 @@ from typing import Any, Tuple
 
 import numpy as np
 
-from glass_nav.evaluation.plots.run_pictures import MapImage, draw_map
+from glass_nav.evaluation.plots.canvas import new_figure
+from glass_nav.evaluation.plots.map_layer import draw_map
+from glass_nav.world.grid_map import GridMap
 
 MARGIN_M = 1.0
 LARGEST_M = 0.5  # of the colour scale; the seed document asks for 0.3 m
@@ -35,17 +37,13 @@ class Panel:
     sigma_m: np.ndarray  # (M,) expected standard deviation, inf: no position
 
 
-def draw(path: Path, grid: MapImage, points_m: np.ndarray, spacing_m: float, panels: "list[Panel]", title: str) -> None:
+def draw(path: Path, grid: GridMap, points_m: np.ndarray, spacing_m: float, panels: "list[Panel]", title: str) -> None:
     """Points (M, 2) coloured by expected error, one panel below the other."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     shown = np.concatenate([points_m, *(part.positions_m for panel in panels for part in (panel.tags, panel.new))])
     low, high = shown.min(axis=0) - MARGIN_M, shown.max(axis=0) + MARGIN_M
     width, height = high - low
     tall = float(np.clip(12.0 * height / width, 2.5, 11.0))
-    figure = Figure(figsize=(13.5, 0.6 + len(panels) * (tall + 0.7)), dpi=100, constrained_layout=True)
-    FigureCanvasAgg(figure)
+    figure = new_figure(13.5, 0.6 + len(panels) * (tall + 0.7), dpi=100)
     all_axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
     for axes, panel in zip(all_axes, panels):
         drawn = _draw_panel(axes, grid, points_m, spacing_m, panel, low, high)
@@ -56,7 +54,7 @@ def draw(path: Path, grid: MapImage, points_m: np.ndarray, spacing_m: float, pan
 
 
 def _draw_panel(
-    axes: Any, grid: MapImage, points_m: np.ndarray, spacing_m: float, panel: Panel, low: np.ndarray, high: np.ndarray
+    axes: Any, grid: GridMap, points_m: np.ndarray, spacing_m: float, panel: Panel, low: np.ndarray, high: np.ndarray
 ) -> Any:
     from matplotlib.collections import PolyCollection
     from matplotlib.patheffects import withStroke

@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from glass_nav.evaluation.plots.run_pictures import CASE_COLOURS, CASE_NAMES, MapImage, draw_map
+from glass_nav.evaluation.plots.canvas import frame, new_figure
+from glass_nav.evaluation.plots.map_layer import draw_map
 from glass_nav.geometry import se2
+from glass_nav.vocabulary import CASES_IN_ORDER, BeamCase
+from glass_nav.world.grid_map import GridMap
 
 MARGIN_M = 1.0
 ARROW_SHARE = 0.05  # of the picture's width
@@ -27,10 +30,8 @@ class LocatedScan:
     corrected: np.ndarray  # (3,)
 
 
-def draw(path: Path, grid: MapImage, scan: LocatedScan, title: str, before: str, after: str) -> None:
+def draw(path: Path, grid: GridMap, scan: LocatedScan, title: str, before: str, after: str) -> None:
     """Beside each other: the scan where it was said to be, and where it belongs, each with a line about it."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
     shown = np.concatenate(
@@ -38,16 +39,14 @@ def draw(path: Path, grid: MapImage, scan: LocatedScan, title: str, before: str,
     )
     low, high = shown.min(axis=0) - MARGIN_M, shown.max(axis=0) + MARGIN_M
     height = float(np.clip(5.2 * (high[1] - low[1]) / (high[0] - low[0]), 2.6, 8.0))
-    figure = Figure(figsize=(11.0, height + 0.9), dpi=85, constrained_layout=True)
-    FigureCanvasAgg(figure)
+    figure = new_figure(11.0, height + 0.9, dpi=85)
     figure.suptitle(title, fontsize=11)
     for axes, pose, text in zip(figure.subplots(1, 2), (scan.rough, scan.corrected), (before, after)):
         _draw_scan(axes, grid, scan, pose, low, high)
         axes.set_title(text, fontsize=9)
-    cases = [case for case in range(len(CASE_NAMES)) if np.any(scan.case[_answered(scan)] == case)]
+    cases = [case for case in CASES_IN_ORDER if np.any(scan.case[_answered(scan)] == case)]
     handles = [
-        Line2D([], [], color=CASE_COLOURS[case], marker="o", markersize=4, linestyle="", label=CASE_NAMES[case])
-        for case in cases
+        Line2D([], [], color=case.colour, marker="o", markersize=4, linestyle="", label=case.label) for case in cases
     ] + [Line2D([], [], color=SEGMENT_COLOUR, label="segments")]
     figure.axes[1].legend(handles=handles, loc="best", fontsize=7, framealpha=0.9)
     figure.savefig(path)
@@ -62,14 +61,16 @@ def _ends(scan: LocatedScan, pose: np.ndarray) -> np.ndarray:
 
 
 def _draw_scan(
-    axes: Any, grid: MapImage, scan: LocatedScan, pose: np.ndarray, low: np.ndarray, high: np.ndarray
+    axes: Any, grid: GridMap, scan: LocatedScan, pose: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> None:
     from matplotlib.collections import LineCollection
 
     draw_map(axes, grid, low, high)
     axes.add_collection(LineCollection(scan.segments_m.reshape(-1, 2, 2), colors=SEGMENT_COLOUR, linewidths=1.2))
     ends = _ends(scan, pose)
-    axes.scatter(ends[:, 0], ends[:, 1], c=np.array(CASE_COLOURS)[scan.case[_answered(scan)]], s=5, zorder=3)
+    axes.scatter(
+        ends[:, 0], ends[:, 1], c=[BeamCase(each).colour for each in scan.case[_answered(scan)]], s=5, zorder=3
+    )
     ahead = ARROW_SHARE * (high[0] - low[0]) * np.array([np.cos(pose[2]), np.sin(pose[2])])
     axes.annotate(
         "",
@@ -79,8 +80,5 @@ def _draw_scan(
         arrowprops={"arrowstyle": "-|>", "color": ROBOT_COLOUR, "linewidth": 2.0, "shrinkA": 0.0},
     )
     axes.plot(*pose[:2], "o", color=ROBOT_COLOUR, markersize=5, zorder=4)
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    axes.set_aspect("equal")
-    axes.tick_params(labelsize=7)
+    frame(axes, low, high)
     axes.set_xlabel("x [m]", fontsize=8)

@@ -8,7 +8,9 @@ from typing import Any, Sequence
 import numpy as np
 
 from glass_nav.evaluation.metrics.passed_nodes import INVENTED, MISSED, SEEN, TopologyScore
-from glass_nav.evaluation.plots.run_pictures import MapImage, draw_map
+from glass_nav.evaluation.plots.canvas import new_figure
+from glass_nav.evaluation.plots.map_layer import draw_map
+from glass_nav.world.grid_map import GridMap
 
 MARGIN_M = 2.0
 COLOURS = {SEEN: "#2ca02c", MISSED: "#d62728", INVENTED: "#ff8c00"}
@@ -18,7 +20,7 @@ _WAY_COLOUR, _EDGE_COLOUR, _NODE_COLOUR = "#1f77b4", "#b9b9b9", "#8a8a8a"
 
 
 def draw(
-    path: Path, grid: MapImage, lines_m: Sequence[np.ndarray], way_m: np.ndarray, score: TopologyScore, title: str
+    path: Path, grid: GridMap, lines_m: Sequence[np.ndarray], way_m: np.ndarray, score: TopologyScore, title: str
 ) -> None:
     """One map.
 
@@ -30,9 +32,7 @@ def draw(
         score: what it saw.
         title: first line above it.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import LineCollection
-    from matplotlib.figure import Figure
 
     known_way = way_m[np.isfinite(way_m).all(axis=1)]
     shown = known_way if len(known_way) else score.known.position_m
@@ -40,8 +40,7 @@ def draw(
     size = np.maximum(high - low, 0.7 * float((high - low).max()))  # a corridor is not to become a ribbon
     low, high = 0.5 * (low + high - size), 0.5 * (low + high + size)
     width, height = 12.0 * size / size.max()
-    figure = Figure(figsize=(width, height + 1.0), dpi=110, constrained_layout=True)
-    FigureCanvasAgg(figure)
+    figure = new_figure(width, height + 1.0)
     axes = figure.subplots()
     draw_map(axes, grid, low, high)
     axes.add_collection(LineCollection(list(lines_m), colors=_EDGE_COLOUR, linewidths=0.8, zorder=2))

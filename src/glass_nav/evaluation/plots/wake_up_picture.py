@@ -12,7 +12,9 @@ from typing import Any, List, Optional
 
 import numpy as np
 
-from glass_nav.evaluation.plots.run_pictures import MapImage, draw_map
+from glass_nav.evaluation.plots.canvas import frame, new_figure
+from glass_nav.evaluation.plots.map_layer import draw_map
+from glass_nav.world.grid_map import GridMap
 
 MARGIN_M = 1.5
 MAX_PANELS = 8  # of depths; the first and the last ones
@@ -41,18 +43,14 @@ class WakeUpStory:
     truth: Optional[np.ndarray] = None  # (3,) true pose then
 
 
-def draw(path: Path, grid: MapImage, story: WakeUpStory, title: str) -> None:
+def draw(path: Path, grid: GridMap, story: WakeUpStory, title: str) -> None:
     """Above the whole way, below a small map for each depth."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     low, high = _bounds(grid, story)
     shown = _shown(len(story.depths))
     rows = math.ceil(len(shown) / COLUMNS)
     shape = float(np.clip((high[1] - low[1]) / (high[0] - low[0]), 0.2, 1.5))
     heights = [11.0 * shape, *[11.0 * shape / COLUMNS] * rows]
-    figure = Figure(figsize=(11.5, sum(heights) + 0.9 + 0.35 * rows), dpi=110, constrained_layout=True)
-    FigureCanvasAgg(figure)
+    figure = new_figure(11.5, sum(heights) + 0.9 + 0.35 * rows)
     layout = figure.add_gridspec(1 + rows, COLUMNS, height_ratios=heights)
     above = figure.add_subplot(layout[0, :])
     _draw_way(above, grid, story, low, high)
@@ -70,7 +68,7 @@ def _shown(count: int) -> List[int]:
     return [*range(MAX_PANELS // 2), *range(count - MAX_PANELS // 2, count)]
 
 
-def _bounds(grid: MapImage, story: WakeUpStory) -> "tuple[np.ndarray, np.ndarray]":
+def _bounds(grid: GridMap, story: WakeUpStory) -> "tuple[np.ndarray, np.ndarray]":
     """All that is drawn, and at least the way."""
     parts = [story.search_m, story.tour_m, *(depth.candidates[:, :2] for depth in story.depths)]
     points = np.concatenate([part.reshape(-1, 2) for part in parts])
@@ -82,15 +80,12 @@ def _bounds(grid: MapImage, story: WakeUpStory) -> "tuple[np.ndarray, np.ndarray
     return middle - half, middle + half
 
 
-def _ground(axes: Any, grid: MapImage, low: np.ndarray, high: np.ndarray) -> None:
+def _ground(axes: Any, grid: GridMap, low: np.ndarray, high: np.ndarray) -> None:
     draw_map(axes, grid, low, high)
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    axes.set_aspect("equal")
-    axes.tick_params(labelsize=7)
+    frame(axes, low, high)
 
 
-def _draw_way(axes: Any, grid: MapImage, story: WakeUpStory, low: np.ndarray, high: np.ndarray) -> None:
+def _draw_way(axes: Any, grid: GridMap, story: WakeUpStory, low: np.ndarray, high: np.ndarray) -> None:
     _ground(axes, grid, low, high)
     for way, colour, width, label in (
         (story.tour_m, TOUR_COLOUR, 3.2, "true way of the tour"),
@@ -120,7 +115,7 @@ def _draw_way(axes: Any, grid: MapImage, story: WakeUpStory, low: np.ndarray, hi
     axes.legend(loc="best", fontsize=8, framealpha=0.9)
 
 
-def _draw_depth(axes: Any, grid: MapImage, depth: Depth, number: int, low: np.ndarray, high: np.ndarray) -> None:
+def _draw_depth(axes: Any, grid: GridMap, depth: Depth, number: int, low: np.ndarray, high: np.ndarray) -> None:
     _ground(axes, grid, low, high)
     if len(depth.candidates):
         _arrows(axes, depth.candidates, CANDIDATE_COLOUR, "")

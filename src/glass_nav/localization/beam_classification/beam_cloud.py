@@ -8,14 +8,11 @@ import numpy as np
 
 from glass_nav.localization.beam_classification.case_votes import BeamCases
 from glass_nav.sensing.scan import Scan
+from glass_nav.vocabulary import BeamCase
 
 FIELDS = ("x", "y", "z", "rgb", "case", "range", "expected", "residual", "weight")
 
-# (5, 3) red, green, blue of cases 0 to 4: grey, green, magenta, light blue, dark blue. The hues of Okabe
-# and Ito, which stay apart for colour-blind eyes; blues are beams that went through.
-CASE_COLOURS = np.array(
-    [[150, 150, 150], [0, 158, 115], [204, 121, 167], [86, 180, 233], [0, 114, 178]], dtype=np.uint32
-)
+CASE_COLOURS = np.array([case.rgb for case in BeamCase], dtype=np.uint32)  # (5, 3) by the number of the case
 
 
 def points(scan: Scan, cases: BeamCases, height_m: float = 0.0) -> np.ndarray:

@@ -1,22 +1,23 @@
-"""What the driver reports and is told <-> messages."""
+"""What the driver reports, and is asked for <-> messages."""
 
 from __future__ import annotations
 
 import math
-import re
 from typing import Optional
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, Twist
 
+from glass_nav.driving.decisions import DriveStatus, GoalEnd
 from glass_nav.driving.edge_driver import Arrival
-from glass_nav.msg import DriverStatus
+from glass_nav.driving.place_goals import PlaceGoal
+from glass_nav.msg import DriverStatus, GotoNodeGoal, GotoNodeResult, TopologyStatus, TraverseEdgeResult
 from glass_nav.msg import EdgeTraversal as EdgeTraversalMsg
 from glass_nav.msg import Meetpoint as MeetpointMsg
 from glass_nav.ros import conversions
-from glass_nav.topology.observations import FORWARD, LEFT, RIGHT, U_TURN, ObservationError, refuse_rank
+from glass_nav.vocabulary import SearchState
 
-_RANK = re.compile(r"(?:RANK_)?(\d+)$")
+_SEARCH_STATES = {getattr(TopologyStatus, state.name): state for state in SearchState}
 
 
 def meetpoint_msg(arrival: Arrival, frame: str) -> MeetpointMsg:
@@ -58,49 +59,59 @@ def traversal_msg(arrival: Arrival, frame: str) -> Optional[EdgeTraversalMsg]:
     )
 
 
-def rank_from_words(edge: str, degree: int) -> int:
-    """The rank of LEFT, RIGHT, U_TURN, FORWARD, RANK_2 or 2 at a meetpoint of that degree.
-
-    Raises:
-        ObservationError: none of these, or no such edge.
-    """
-    word = edge.strip().upper()
-    numbered = _RANK.match(word)
-    if numbered:
-        rank = int(numbered.group(1))
-    elif word == U_TURN:
-        rank = 0
-    elif word in (LEFT, RIGHT):
-        if degree == 1:
-            raise ObservationError(f"edge {word}: from a dead end only {U_TURN} leads away")
-        rank = 1 if word == LEFT else degree - 1
-    elif word == FORWARD:
-        if degree != 2:
-            raise ObservationError(
-                f"edge {FORWARD}: the meetpoint has degree {degree}, {FORWARD} is the only way on of degree 2"
-            )
-        rank = 1
-    else:
-        raise ObservationError(
-            f"edge must be {LEFT}, {RIGHT}, {U_TURN}, {FORWARD}, or a rank such as RANK_2 or 2, got {edge!r}"
-        )
-    refuse_rank(rank, degree)
-    return rank
-
-
-def status_msg(
-    state: str, reason: str, task: str, travelled_m: float, remaining_m: float, stamp_ns: int, frame: str
-) -> DriverStatus:
-    """By the name of a state."""
+def status_msg(status: DriveStatus, frame: str) -> DriverStatus:
+    """With the constant of its phase."""
     return DriverStatus(
-        header=conversions.header(stamp_ns, frame),
-        state=getattr(DriverStatus, state),
-        state_name=state,
-        reason=reason,
-        task=task,
-        travelled=travelled_m,
-        remaining=remaining_m,
+        header=conversions.header(status.stamp_ns, frame),
+        state=getattr(DriverStatus, status.phase.name),
+        state_name=status.phase.name,
+        reason=status.reason,
+        task=status.task,
+        travelled=status.travelled_m,
+        remaining=status.remaining_m,
     )
+
+
+def edge_result(end: GoalEnd, frame: str) -> TraverseEdgeResult:
+    """How a goal of traverse_edge ended."""
+    result = TraverseEdgeResult(
+        code=getattr(TraverseEdgeResult, end.ending.outcome.name),
+        reason=end.ending.reason,
+        travelled=end.travelled_m,
+    )
+    if end.arrival is not None:
+        result.meetpoint = meetpoint_msg(end.arrival, frame)
+        traversal = traversal_msg(end.arrival, frame)
+        if traversal is not None:
+            result.has_traversal, result.traversal = True, traversal
+    return result
+
+
+def place_result(end: GoalEnd, map_frame: str) -> GotoNodeResult:
+    """How a goal of goto_node ended."""
+    return GotoNodeResult(
+        code=getattr(GotoNodeResult, end.ending.outcome.name),
+        reason=end.ending.reason,
+        pose=pose_stamped(end.map_from_base, end.stamp_ns, map_frame),
+        travelled=end.travelled_m,
+    )
+
+
+def place_goal(msg: GotoNodeGoal) -> PlaceGoal:
+    """A goal of goto_node; a pose that is none goes with its fault."""
+    frame = conversions.frame_id(msg.pose.header.frame_id)
+    try:
+        pose = conversions.planar_from_pose(msg.pose.pose)
+    except ValueError as err:
+        return PlaceGoal(msg.node, None, frame, msg.with_heading, str(err))
+    return PlaceGoal(msg.node, pose, frame, msg.with_heading)
+
+
+def search_state(msg: TopologyStatus) -> SearchState:
+    """Raises ValueError if there is no such state."""
+    if msg.state not in _SEARCH_STATES:
+        raise ValueError(f"topology_status: state must be 0 to {len(SearchState) - 1}, got {msg.state}")
+    return _SEARCH_STATES[msg.state]
 
 
 def twist_msg(velocity: np.ndarray) -> Twist:

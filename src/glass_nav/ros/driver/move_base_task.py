@@ -12,10 +12,9 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 
-from glass_nav.driving.tasks import GOING, NO_WAY, SUCCEEDED, Moment, Outcome
+from glass_nav.driving.tasks import Ending, Moment
 from glass_nav.ros import conversions
-
-NO_MOVE_BASE = "NO_MOVE_BASE"
+from glass_nav.vocabulary import DriverPhase, Outcome
 
 
 class MoveBase:
@@ -42,7 +41,7 @@ class MoveBase:
 
 
 class MoveBaseTask:
-    """Sends one goal once move_base is there, and says how that ends."""
+    """Sends one goal once move_base is there, and reports how that ends."""
 
     needs_pose, steers = True, False
 
@@ -56,17 +55,17 @@ class MoveBaseTask:
         self._move_base, self._goal, self._frame = move_base, map_from_goal, frame
         self._wait_s, self._began_s = wait_s, time.monotonic()
         self._sent = False
-        self._ended: Optional[Outcome] = None  # written by the thread of the client
+        self._ended: Optional[Ending] = None  # written by the thread of the client
         self.remaining_m = math.nan
-        self.outcome: Optional[Outcome] = None
+        self.ending: Optional[Ending] = None
 
     @property
-    def state(self) -> str:
-        return GOING
+    def phase(self) -> DriverPhase:
+        return DriverPhase.GOING
 
     @property
     def reason(self) -> str:
-        return f"{self._move_base.name} drives" if self._sent else f"waits for {self._move_base.name}"
+        return f"{self._move_base.name} drives" if self._sent else f"waiting for {self._move_base.name}"
 
     def step(self, now: Moment) -> np.ndarray:
         """Zero: it does not steer."""
@@ -76,13 +75,13 @@ class MoveBaseTask:
             self._sent = True
             self._move_base.send(self._goal, self._frame, self._done)
         elif not self._sent and time.monotonic() - self._began_s > self._wait_s:
-            self.outcome = Outcome(
-                NO_MOVE_BASE,
+            self.ending = Ending(
+                Outcome.NO_MOVE_BASE,
                 f"no action server {self._move_base.name} within {self._wait_s:g} s: "
                 "start move_base, or set ~backend to internal",
             )
         if self._ended is not None:
-            self.outcome = self._ended
+            self.ending = self._ended
         return np.zeros(3)
 
     def cancel(self) -> None:
@@ -90,28 +89,16 @@ class MoveBaseTask:
             self._move_base.cancel()
 
     def _done(self, status: int, text: str) -> None:
-        words = _STATUS.get(status, str(status))
+        outcome, words = _ENDINGS.get(status, (Outcome.NO_MOVE_BASE, f"ended the goal with status {status}"))
         said = f": {text}" if text else ""
-        if status == GoalStatus.SUCCEEDED:
-            self._ended = Outcome(SUCCEEDED, f"{self._move_base.name} is at the goal{said}")
-        elif status in (GoalStatus.ABORTED, GoalStatus.REJECTED):
-            self._ended = Outcome(NO_WAY, f"{self._move_base.name} {words.lower()} the goal{said}")
-        else:
-            self._ended = Outcome(NO_MOVE_BASE, f"{self._move_base.name} ended the goal, {words.lower()}{said}")
+        self._ended = Ending(outcome, f"{self._move_base.name} {words}{said}")
 
 
-_STATUS = {
-    getattr(GoalStatus, name): name
-    for name in (
-        "PENDING",
-        "ACTIVE",
-        "PREEMPTED",
-        "SUCCEEDED",
-        "ABORTED",
-        "REJECTED",
-        "PREEMPTING",
-        "RECALLING",
-        "RECALLED",
-        "LOST",
-    )
+_ENDINGS = {  # of move_base's action; SimpleActionClient calls back with no other
+    GoalStatus.SUCCEEDED: (Outcome.SUCCEEDED, "is at the goal"),
+    GoalStatus.ABORTED: (Outcome.NO_WAY, "aborted the goal"),
+    GoalStatus.REJECTED: (Outcome.NO_WAY, "rejected the goal"),
+    GoalStatus.PREEMPTED: (Outcome.NO_MOVE_BASE, "ended the goal, preempted"),
+    GoalStatus.RECALLED: (Outcome.NO_MOVE_BASE, "ended the goal, recalled"),
+    GoalStatus.LOST: (Outcome.NO_MOVE_BASE, "ended the goal, lost"),
 }

@@ -44,6 +44,7 @@ from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
 from glass_nav.sensing import bearings
 from glass_nav.sensing.bearings import LandmarkBearing, LandmarkBearings, OdometryDrift
+from glass_nav.vocabulary import LocalizationState
 from glass_nav.world import landmark_file
 from glass_nav.world.landmark_map import LandmarkMap
 
@@ -83,9 +84,9 @@ class NodeParams:
         ):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise ValueError(f"~{name} must be >= 0 and finite, got {getattr(self, name)}")
-        unknown = [state for state in self.rescue_states.split() if state not in conversions.STATES]
+        unknown = [state for state in self.rescue_states.split() if state not in LocalizationState.__members__]
         if unknown:
-            raise ValueError(f"~rescue_states must be words of {', '.join(conversions.STATES)}, got {unknown[0]!r}")
+            raise ValueError(f"~rescue_states must be words of {', '.join(LocalizationState)}, got {unknown[0]!r}")
         for name in ("odom_frame_id", "base_frame_id", "global_frame_id"):
             frame = conversions.frame_id(getattr(self, name))
             object.__setattr__(self, name, frame)

@@ -11,22 +11,19 @@ from sensor_msgs.msg import PointCloud2, PointField
 from visualization_msgs.msg import Marker, MarkerArray
 
 from glass_nav.localization.beam_classification import beam_cloud as beam_points
-from glass_nav.localization.beam_classification.beam_cloud import CASE_COLOURS
 from glass_nav.localization.beam_classification.case_votes import BeamCases
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
 from glass_nav.ros import conversions
 from glass_nav.ros.packed_markers import PackedMarkerArray, colour, points_marker
 from glass_nav.sensing.scan import Scan
-
-# Names of cases 0 to 4: the namespaces of the markers, and so the words beside rviz' checkboxes.
-CASE_NAMES = ("0 uncertain", "1 diffuse", "2 mirrored", "3 behind one pane", "4 behind two panes")
+from glass_nav.vocabulary import CASES_IN_ORDER, LocalizationState
 
 STATE_COLOURS = {
-    "LOCALIZED": (0, 60, 35),
-    "UNCERTAIN": (130, 60, 0),
-    "LOST": (150, 0, 0),
-    "GLOBAL_SEARCH": (70, 20, 110),
-    "UNKNOWN": (40, 40, 40),
+    LocalizationState.LOCALIZED: (0, 60, 35),
+    LocalizationState.UNCERTAIN: (130, 60, 0),
+    LocalizationState.LOST: (150, 0, 0),
+    LocalizationState.GLOBAL_SEARCH: (70, 20, 110),
+    LocalizationState.UNKNOWN: (40, 40, 40),
 }  # dark on free and unknown cells alike
 STATUS_NAMESPACE = "status"
 
@@ -59,7 +56,7 @@ def beam_cloud(scan: Scan, cases: BeamCases, height_m: float, base_frame: str) -
 
 
 def beam_markers(scan: Scan, cases: BeamCases, surface: SurfaceScan, height_m: float, base_frame: str) -> MarkerArray:
-    """A namespace per case: squares where its beams end, and lines there from the surface they met first.
+    """A namespace per case, which names it beside rviz' checkbox: squares where its beams end, and lines there from the surface they met first.
 
     For publishing only: `points` stay empty. A case without beams has one line of no length, so that rviz
     knows its namespace and shows its checkbox from the first scan on.
@@ -76,13 +73,14 @@ def beam_markers(scan: Scan, cases: BeamCases, surface: SurfaceScan, height_m: f
     cut = surface.cut & scan.answered
     starts = replace(scan, ranges_m=np.where(cut, surface.ranges_m, np.nan)).points_in_base()
     markers: List[Marker] = []
-    for case, name in enumerate(CASE_NAMES):
+    for case in CASES_IN_ORDER:
+        name = case.label
         in_case = (cases.case == case) & scan.answered
         lines = in_case & cut
         pairs = np.stack([starts[lines], ends[lines]], axis=1).reshape(-1, 2)
         if not lines.any():
             pairs = np.zeros((2, 2)) + scan.base_from_laser[:2]
-        rgb = CASE_COLOURS[case]
+        rgb = np.array(case.rgb)
         markers.append(
             points_marker(head, name, 0, Marker.LINE_LIST, pairs, height_m, _LINE_M, colour(rgb, _LINE_ALPHA))
         )
@@ -103,7 +101,7 @@ def status_marker(
     """
     x, y, _ = np.zeros(3) if map_from_base is None else map_from_base
     text = state if np.isnan(used_share) else f"{state}, {100.0 * used_share:.0f} % of the beams explained"
-    if state != "LOCALIZED":
+    if state != LocalizationState.LOCALIZED:
         text += "\n" + _wrapped(reason)
     pose = Pose(orientation=Quaternion(w=1.0))
     pose.position.x, pose.position.y, pose.position.z = float(x), float(y) + _TEXT_ABOVE_M, _TEXT_ABOVE_M

@@ -10,21 +10,15 @@ from PIL import Image, ImageDraw, ImageFont
 from sensor_msgs.msg import Image as ImageMsg
 
 from glass_nav.ros import conversions
-from glass_nav.ros.localization import beam_displays, wall_display
+from glass_nav.ros.localization import wall_display
+from glass_nav.vocabulary import CASES_IN_ORDER, BeamCase
 
 BACKGROUND, INK, FAINT_INK = (250, 250, 250), (20, 20, 20), (95, 95, 95)
 ZOOM = 2  # the font's letters are 6 x 11 pixels
 WIDTH, ROW = 240, 15  # before the zoom
 MARGIN, PATCH = 6, 22
 
-# In the order of the rows: as far as a beam gets.
-CASE_WORDS = {
-    1: "1 diffuse: ended at first surface",
-    3: "3 behind one pane",
-    4: "4 behind two panes",
-    2: "2 mirrored at first surface",
-    0: "0 uncertain: nothing explains it",
-}
+CASE_NOTES = {BeamCase.SPECULAR: " at first surface", BeamCase.UNCERTAIN: ": nothing explains it"}
 WALL_WORDS = {2: "glass: chance of 75 % and more", 1: "undecided", 0: "solid: chance of glass below 25 %"}
 
 
@@ -45,7 +39,7 @@ def image_msg(map_frame: str) -> ImageMsg:
 
 def draw() -> np.ndarray:
     """(H, W, 3) uint8: a row per case, then one per kind of wall."""
-    beams = [(beam_displays.CASE_COLOURS[case], words) for case, words in CASE_WORDS.items()]
+    beams = [(case.rgb, case.label + CASE_NOTES.get(case, "")) for case in CASES_IN_ORDER]
     walls = [(wall_display.WALL_COLOURS[kind], words) for kind, words in WALL_WORDS.items()]
     height = 2 * MARGIN + ROW * (len(beams) + len(walls) + 2) + ROW // 2
     picture = Image.new("RGB", (WIDTH, height), BACKGROUND)

@@ -1,8 +1,8 @@
-"""The atlas, the candidates and their forest for rviz: native markers, one namespace for each thing to tick off.
+"""The atlas, the candidates and their forest for rviz: native markers, a namespace for each that can be hidden.
 
 Namespaces: `atlas` (edges) and `nodes`; candidates as arrows in `searching`, `tentative`, `confirmed` or `ambiguous`,
 by the state of the search; `ruled_out`, crosses where candidates of the last row were left without a successor;
-`forest`, the ways by which the candidates came; `text`. Colours are of the Okabe-Ito set.
+`forest`, the paths of the candidates; `text`. Colours are of the Okabe-Ito set.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from glass_nav.topology.observations import UNKNOWN, Meetpoint, ObservationError
 from glass_nav.topology.search.search_estimate import TurnChoice
 from glass_nav.topology.search_session import SearchStatus, Turn
 
-AS_TOLD = -1  # rank of a traversal: as the last turn_choice said
+AS_CHOSEN = -1  # rank of a traversal: that of the last turn_choice
 
 
 def meetpoint_from_msg(msg: MeetpointMsg) -> Meetpoint:
@@ -34,18 +34,18 @@ def meetpoint_from_msg(msg: MeetpointMsg) -> Meetpoint:
     )
 
 
-def traversal_from_msg(msg: EdgeTraversalMsg, told: Optional[TurnChoice]) -> Traversal:
+def traversal_from_msg(msg: EdgeTraversalMsg, choice: Optional[TurnChoice]) -> Traversal:
     """Checked; raises ObservationError.
 
     Args:
         msg: of the driver, or from a terminal.
-        told: the last turn_choice.
+        choice: the last turn_choice.
     """
     rank = msg.rank
-    if rank == AS_TOLD:
-        if told is None:
+    if rank == AS_CHOSEN:
+        if choice is None:
             raise ObservationError("edge traversal: rank -1 means the last turn_choice, but there was none")
-        rank = told.rank
+        rank = choice.rank
     if len(msg.segments) % 4:
         raise ObservationError(f"edge traversal: segments need 4 numbers each, got {len(msg.segments)} numbers")
     bearing, turn = (msg.chord_bearing, msg.turn) if msg.has_directions else (UNKNOWN, UNKNOWN)
@@ -101,7 +101,7 @@ def candidates_msg(status: SearchStatus, atlas: Optional[Atlas], frame: str) -> 
 def pose_msg(
     pose: np.ndarray, sigma_m: float, sigma_rad: float, stamp_ns: int, frame: str
 ) -> PoseWithCovarianceStamped:
-    """A start for the localization."""
+    """An initial pose for the localization."""
     msg = PoseWithCovarianceStamped(header=conversions.header(stamp_ns, frame))
     msg.pose.pose = conversions.pose_from_planar(pose)
     covariance = np.zeros((6, 6))

@@ -20,7 +20,6 @@ Parameters: TopologyParams, read once; explained in config/topology.yaml.
 
 from __future__ import annotations
 
-import logging
 import threading
 from dataclasses import replace
 from typing import Any, Callable, List, Optional, Tuple
@@ -34,6 +33,7 @@ from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 from visualization_msgs.msg import Marker, MarkerArray
 
 from glass_nav import params
+from glass_nav.log_line import LogLine
 from glass_nav.msg import (
     EdgeTraversal,
     LocalizeGloballyAction,
@@ -56,10 +56,10 @@ from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.topology.observations import ObservationError
 from glass_nav.topology.search_session import Decision, GoalOutcome, SearchSession, SearchStatus
+from glass_nav.vocabulary import SearchState
 
 SERVICE_TIMEOUT_S = 30.0
-LOG_PERIOD_S = 5.0  # of lines that may come with every report
-LOGGERS = {logging.INFO: rospy.loginfo, logging.WARNING: rospy.logwarn, logging.ERROR: rospy.logerr}
+LAST_WORDS_S = 2.0  # by the wall clock, for others to hear the status
 
 
 class TopologyNode:
@@ -90,7 +90,7 @@ class TopologyNode:
             search_session.Turn: self._publish_turn,
             search_session.InitialPose: self._publish_pose,
             search_session.GoalEnd: self._end_goal,
-            search_session.LogLine: self._log_line,
+            LogLine: self._log.write,
         }
         self._carry_out(self._session.start())
         rospy.Service("~restart", Trigger, self._service(self._restart))
@@ -112,7 +112,11 @@ class TopologyNode:
             )
 
     def run(self, ending: threading.Event) -> None:
-        """The only thread that touches the session; returns when ROS shuts down or ending is set."""
+        """The only thread that touches the session; returns when ROS shuts down or ending is set.
+
+        Raises:
+            AtlasError: the atlas is refused, and ~end_without_atlas.
+        """
         while not (rospy.is_shutdown() or ending.is_set()):
             mail = self._inbox.take(timeout_s=0.1)
             jump = self._clock.tick()
@@ -120,6 +124,10 @@ class TopologyNode:
                 self._carry_out(self._session.time_jumped_back(jump))
             for work in [*mail["commands"], *mail["reports"]]:
                 work()
+            status = self._session.status
+            if self._p.end_without_atlas and status.state == SearchState.NO_ATLAS:
+                ending.wait(LAST_WORDS_S)
+                raise AtlasError(status.reason)
 
     # -- events
 
@@ -171,7 +179,7 @@ class TopologyNode:
             self._carry_out(self._session.preempt())
 
     def _service(self, work: Callable[[], str]) -> Callable[[TriggerRequest], TriggerResponse]:
-        """A service that has the run loop do something and gives back what it says."""
+        """A service that lets the run loop do the work and returns its message."""
 
         def serve(_request: TriggerRequest) -> TriggerResponse:
             try:
@@ -255,13 +263,9 @@ class TopologyNode:
     def _atlas(self) -> Optional[Atlas]:
         return None if self._session.localizer is None else self._session.localizer.atlas
 
-    def _log_line(self, line: search_session.LogLine) -> None:
-        if not line.often or self._log.is_due(line.text, LOG_PERIOD_S):
-            LOGGERS[line.level](line.text)
-
 
 def main() -> None:
-    """Start the node; exit code 2 if a parameter cannot be used, 3 if the atlas cannot."""
+    """Start the node; exit code 2 if a parameter cannot be used, 3 if the atlas cannot, see ~end_without_atlas too."""
     shutdown.run_node(
         "topology",
         lambda given: TopologyNode(params.load(TopologyParams, given, rospy.get_name())),

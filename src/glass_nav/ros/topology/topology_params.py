@@ -17,6 +17,7 @@ class TopologyNodeParams:
     global_frame_id: str = "map"
     initial_pose_sigma_m: float = 0.25  # of initialpose
     initial_pose_sigma_rad: float = 0.17  # [rad] 10 degrees
+    end_without_atlas: bool = False  # when the atlas is refused, rather than wait for its map
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "global_frame_id", self.global_frame_id.lstrip("/"))

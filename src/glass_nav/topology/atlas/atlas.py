@@ -1,9 +1,9 @@
 """The hierarchical atlas: a rotation system of meetpoints, edges and darts, in arrays.
 
-Every edge has two darts: dart 2e leaves its first node, dart 2e + 1 its second one, so that dart ^ 1 is the same edge
-the other way. At each node the darts are kept in clockwise order, seen from above. Nothing is looked up by the names of
-two nodes: an edge may come back to the node that it left, and two nodes may share several edges. Whoever arrives at a
-node is at a dart, the one that would lead back. N nodes, E edges, D = 2E darts, components of up to millions of each.
+Every edge has two darts: dart 2e leaves its first node, dart 2e + 1 its second one, so dart ^ 1 is the same edge in
+the other direction. At each node the darts are kept in clockwise order, seen from above. Edges are not identified by
+their nodes: an edge may return to the node that it left, and two nodes may share several edges. A robot that arrives at
+a node is at a dart, the one that leads back. N nodes, E edges, D = 2E darts, up to millions of each.
 
 Seed document: global_localization_procedure.txt, "Uniqueness in the Hierarchical Atlas": average of the equidistant
 distances per meetpoint, straight-line and travelled distance and two directional feature maps per edge. The edge
@@ -24,11 +24,11 @@ from glass_nav.world.grid_map import GridMap
 MEETPOINT, DEAD_END, RING_MARKER = 0, 1, 2
 KINDS = ("meetpoint", "dead_end", "ring_marker")  # a ring without a meetpoint has one node, somewhere on it
 
-BEARING_AT_M = 0.5  # a dart's bearing is that from its node to the point so far along the edge, or to its end
-ORDER_SLACK_RAD = 1e-3  # by so much may rounding turn two darts of one node past each other
-CHORD_SLACK_M = 1e-3  # by so much may rounding make a straight edge shorter than its chord
+BEARING_AT_M = 0.5  # a dart's bearing is measured from its node to the point this far along the edge, or to its end
+ORDER_SLACK_RAD = 1e-3  # rounding may turn two darts of one node past each other by this angle
+CHORD_SLACK_M = 1e-3  # rounding may make a straight edge shorter than its chord by this length
 MAX_DIFFERING_SHARE = 1e-3  # of the free cells: another drawing of the same map, not another map
-POLYLINE_SLACK_M = 0.5  # by so much may an edge's line end off its node: meetpoints lie between cells
+POLYLINE_SLACK_M = 0.5  # the line of an edge may end this far from its node: meetpoints lie between cells
 
 
 class AtlasError(ValueError):
@@ -37,7 +37,7 @@ class AtlasError(ValueError):
 
 @dataclass(frozen=True)
 class Ragged:
-    """Rows of different lengths, one after the other in one array."""
+    """Rows of different lengths, concatenated in one array."""
 
     values: np.ndarray  # (V, ...)
     offsets: np.ndarray  # (rows + 1,) int64: row i is values[offsets[i]:offsets[i + 1]]
@@ -51,7 +51,7 @@ class Ragged:
 
     @classmethod
     def empty(cls, rows: int, width: int) -> "Ragged":
-        """So many rows with nothing in them."""
+        """That number of empty rows."""
         return cls(np.zeros((0, width)), np.zeros(rows + 1, np.int64))
 
     def __len__(self) -> int:
@@ -61,7 +61,7 @@ class Ragged:
         return self.values[self.offsets[row] : self.offsets[row + 1]]
 
     def refuse_bad_offsets(self, what: str, rows: int) -> None:
-        """Raises AtlasError unless there are so many rows and they fill the values."""
+        """Raises AtlasError unless there is that number of rows and they cover the values."""
         if self.offsets.shape != (rows + 1,):
             raise AtlasError(f"{what} need {rows} rows, got {len(self.offsets) - 1}")
         if self.offsets[0] != 0 or self.offsets[-1] != len(self.values) or np.any(np.diff(self.offsets) < 0):
@@ -74,7 +74,7 @@ class Nodes:
 
     position_m: np.ndarray  # (N, 2) in the frame map
     r_m: np.ndarray  # (N,) equidistance: mean distance of the nearest obstacles
-    sigma_r_m: np.ndarray  # (N,) how well the map gives it
+    sigma_r_m: np.ndarray  # (N,) uncertainty of r in the map
     kind: np.ndarray  # (N,) int8: MEETPOINT, DEAD_END, RING_MARKER
 
     def __len__(self) -> int:
@@ -83,11 +83,11 @@ class Nodes:
 
 @dataclass(frozen=True)
 class Edges:
-    """Ways equidistant from two obstacles."""
+    """Paths equidistant from two obstacles."""
 
     length_m: np.ndarray  # (E,) travelled
     chord_m: np.ndarray  # (E,) in a straight line
-    sigma_m: np.ndarray  # (E,) how well the map gives either
+    sigma_m: np.ndarray  # (E,) uncertainty of both in the map
     clearance_m: np.ndarray  # (E,) distance of the obstacles where it is narrowest
     polyline_m: Ragged  # (E) rows of (n, 2) points in the frame map, as dart 2e runs; may be empty
 
@@ -97,7 +97,7 @@ class Edges:
 
 @dataclass(frozen=True)
 class Darts:
-    """The two ways of each edge. The two feature maps of the document are here, one for each way."""
+    """The two directions of each edge, each with one of the two feature maps of the document."""
 
     node: np.ndarray  # (D,) int: where it leaves
     bearing_rad: np.ndarray  # (D,) direction in which it leaves, in the frame map; see BEARING_AT_M
@@ -112,13 +112,13 @@ class MapReference:
     """The map that an atlas was made from."""
 
     name: str
-    sha256: str  # GridMap.fingerprint; empty: not known, fits every map
-    free_space: Optional[FreeSpace] = None  # of the map; None: not known, only the very same map fits
+    sha256: str  # GridMap.fingerprint; empty: not known, every map is accepted
+    free_space: Optional[FreeSpace] = None  # of the map; None: not known, only the very same map is accepted
 
 
 @dataclass(frozen=True)
 class Visits:
-    """What robots met so far: Welford's running count, mean and sum of squared deviations."""
+    """Measurements of robots so far: Welford's running count, mean and sum of squared deviations."""
 
     node_count: np.ndarray  # (N,) int
     node_r_mean_m: np.ndarray  # (N,) 0 without a visit
@@ -139,16 +139,16 @@ class Visits:
         )
 
     def add_nodes(self, node: np.ndarray, r_m: np.ndarray) -> None:
-        """Take in equidistances measured at nodes (K,), in this order; NaN counts as a visit without a measurement."""
+        """Add equidistances measured at nodes (K,), in this order; NaN counts as a visit without a measurement."""
         _welford(self.node_count, self.node_r_mean_m, self.node_r_m2, node, r_m)
 
     def add_edges(self, edge: np.ndarray, length_m: np.ndarray) -> None:
-        """Take in lengths travelled along edges (K,), in this order."""
+        """Add lengths travelled along edges (K,), in this order."""
         _welford(self.edge_count, self.edge_length_mean_m, self.edge_length_m2, edge, length_m)
 
 
 def _welford(count: np.ndarray, mean: np.ndarray, m2: np.ndarray, index: np.ndarray, value: np.ndarray) -> None:
-    for at, given in zip(index.tolist(), value.tolist()):  # the few of one run; one place may come twice
+    for at, given in zip(index.tolist(), value.tolist()):  # few per run; one index may occur twice
         count[at] += 1
         off = given - mean[at]
         mean[at] += off / count[at]
@@ -159,7 +159,7 @@ def _welford(count: np.ndarray, mean: np.ndarray, m2: np.ndarray, index: np.ndar
 class Atlas:
     """Nodes, edges and darts of one floor, or of several components that do not touch.
 
-    Checked when made; whoever holds an Atlas may rely on its rules.
+    Checked when it is made: an Atlas keeps all rules.
     """
 
     name: str
@@ -194,7 +194,7 @@ class Atlas:
         return self._rank  # type: ignore[attr-defined, no-any-return]
 
     def clockwise(self, dart: np.ndarray, steps: np.ndarray) -> np.ndarray:
-        """(...) darts so many places clockwise of darts (...) of the same node."""
+        """(...) darts that number of steps clockwise of darts (...) at the same node."""
         node = self.darts.node[dart]
         start = self.rings.offsets[node]
         degree = self.rings.offsets[node + 1] - start
@@ -237,7 +237,7 @@ class Atlas:
 
 
 def twin(dart: np.ndarray) -> np.ndarray:
-    """(...) the same edges the other way."""
+    """(...) the darts of the same edges in the other direction."""
     return dart ^ 1
 
 
@@ -258,7 +258,7 @@ def rings_clockwise(dart_node: np.ndarray, bearing_rad: np.ndarray, node_count: 
 
 
 def _first(bad: np.ndarray) -> int:
-    """Index of the first True, -1 without one."""
+    """Index of the first True, -1 if there is none."""
     return int(np.argmax(bad)) if bad.any() else -1
 
 
@@ -305,7 +305,7 @@ def _refuse_bad_edges(edges: Edges) -> None:
     at = _first(edges.chord_m > edges.length_m + CHORD_SLACK_M)
     if at >= 0:
         raise AtlasError(
-            f"edge {at}: the chord may not be longer than the way, got chord {edges.chord_m[at]:g} m "
+            f"edge {at}: the chord must not be longer than the edge, got chord {edges.chord_m[at]:g} m "
             f"and length {edges.length_m[at]:g} m"
         )
 

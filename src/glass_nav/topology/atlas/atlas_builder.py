@@ -1,8 +1,8 @@
 """GridMap -> Atlas: the generalized Voronoi graph of a map, measured as a robot would.
 
 Seed document: global_localization_procedure.txt, "Uniqueness in the Hierarchical Atlas". The standard deviations say
-how far the same building may be from its map: a node may lie elsewhere by about a cell, by as far as the meetpoints
-lay apart that were made one, and by as much as its obstacles are in doubt.
+how far the building may differ from its map: a node may be off by about a cell, by the spread of the meetpoints that
+were merged into it, and by the doubt about its obstacles.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from glass_nav.world.grid_map import GridMap
 
 R_SIGMA_CELLS = 1.0  # measured on rough walls: up to 0.9 less than on smooth ones
 POSITION_SIGMA_CELLS = 1.0  # of a meetpoint
-DEAD_END_SIGMA_SHARE = 0.1  # of r: where a way ends depends on the corners there
+DEAD_END_SIGMA_SHARE = 0.1  # of r: where an edge ends depends on the corners there
 LINE_TOLERANCE_M = 0.02  # of the line of an edge in the file
 
 
@@ -50,7 +50,9 @@ class BuildParams:
     view: ViewParams = ViewParams()
 
 
-Watch = Callable[[str, int], ContextManager[Callable[[], None]]]  # what is done in how many steps -> one step is done
+Watch = Callable[
+    [str, int], ContextManager[Callable[[], None]]
+]  # what is done, number of steps -> to be called after each step
 
 
 @contextmanager
@@ -69,10 +71,10 @@ def build(
         name: of the atlas.
         map_name: what the map is called there.
         params: of the graph and of the lidar.
-        watch: sees how far it is, for a progress bar.
+        watch: follows the progress.
 
     Raises:
-        AtlasError: no way in the map is wide and long enough for a robot.
+        AtlasError: no free space in the map is wide and long enough for a robot.
     """
     with watch("graph", voronoi_graph.STEPS) as step:
         graph = voronoi_graph.build(grid_map, params.graph, step)

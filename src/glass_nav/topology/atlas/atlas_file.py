@@ -1,7 +1,7 @@
 """Files -> Atlas and back: atlas/NAME/atlas.json for people and editors, atlas.npz for atlases of many nodes.
 
 atlas/atlas.schema.json is the JSON Schema of the former; the checks here are those of the schema and, in Atlas itself,
-of the rules that a schema cannot say. JSON keeps millimetres and hundredths of a milliradian; npz every bit.
+of the rules that a schema cannot express. JSON keeps millimetres and hundredths of a milliradian, npz every bit.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ AnyPath = Union[str, "os.PathLike[str]"]
 
 
 def find(path: AnyPath) -> Path:
-    """The file that is meant: itself, or the atlas.json or atlas.npz of a folder.
+    """The file itself, or the atlas.json or atlas.npz of a folder.
 
     Raises:
         AtlasError: there is none.
@@ -68,7 +68,7 @@ def load(path: AnyPath) -> Atlas:
 
 
 def save(atlas: Atlas, path: AnyPath) -> None:
-    """Write a .json or a .npz, whole or not at all: what was there stays until the new file is complete."""
+    """Write a .json or a .npz atomically: the old file stays until the new one is complete."""
     path = Path(path)
     if path.suffix not in (".json", ".npz"):
         raise AtlasError(f"{path}: an atlas is saved as .json or .npz")
@@ -295,7 +295,7 @@ def _from_json(path: Path) -> Atlas:
     except OSError as err:
         raise AtlasError(f"cannot be read: {err.strerror}") from err
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as err:
-        raise AtlasError(f"is no JSON: {err}") from err
+        raise AtlasError(f"is not JSON: {err}") from err
     if not isinstance(data, dict):
         raise AtlasError(f"must be an object with {', '.join(_TOP)}, got {_short(data)}")
     _refuse_keys("the atlas", data, _TOP, ("$schema",))

@@ -1,8 +1,8 @@
-"""GridMap, ways through it -> the line segments of walls that a robot sees on each way, in each direction.
+"""GridMap, lines through it -> the line segments of walls that a robot sees along each line, in each direction.
 
 These are the two directional feature maps per edge of the seed document global_localization_procedure.txt. A robot is
-put along the way at equal distances, looking along it; rays tell which segments are seen and from where to where. A
-segment has free space to its left, so one that runs with the robot is a wall to its right.
+put at equal distances along the line, looking along it; rays find the segments that are seen, and their visible parts.
+A segment has free space to its left, so one that runs with the robot is a wall to its right.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class ViewParams:
 
     view_range_m: float = 8.0
     field_of_view_deg: float = 270.0  # around straight ahead
-    view_step_m: float = 0.5  # along the way
+    view_step_m: float = 0.5  # along the line
     ray_step_deg: float = 1.0
 
     def __post_init__(self) -> None:
@@ -50,7 +50,7 @@ class EdgeViews:
         self._angles_rad = np.radians(np.arange(0.0, 360.0, params.ray_step_deg))
 
     def of(self, line_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Segments seen along a line (n, 2) of the frame map, and those seen on the way back.
+        """Segments seen along a line (n, 2) of the frame map, and those seen in the other direction.
 
         Returns:
             two arrays (k, 4) of x1 y1 x2 y2 [m] in the frame map, cut to what is seen, with free space to the left.
@@ -88,13 +88,13 @@ class EdgeViews:
         low, high = np.minimum.reduceat(along[order], first), np.maximum.reduceat(along[order], first)
         kept = (count >= MIN_RAYS) & (high - low >= wall_segments.MIN_LENGTH_M)
         rows = self.walls.segments_m[which[kept]]
-        way = rows[:, 2:] - rows[:, :2]
-        way /= np.hypot(*way.T)[:, None]
-        return np.column_stack([rows[:, :2] + low[kept, None] * way, rows[:, :2] + high[kept, None] * way])
+        step = rows[:, 2:] - rows[:, :2]
+        step /= np.hypot(*step.T)[:, None]
+        return np.column_stack([rows[:, :2] + low[kept, None] * step, rows[:, :2] + high[kept, None] * step])
 
 
 def poses_along(line_m: np.ndarray, step_m: float) -> np.ndarray:
-    """(P, 3) poses along a line (n, 2), looking along it; at both ends and between them no further apart than that."""
+    """(P, 3) poses along a line (n, 2), looking along it: at both ends, and between them at most one step apart."""
     pieces = np.diff(line_m, axis=0)
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*pieces.T))])
     at = np.linspace(0.0, along[-1], int(np.ceil(along[-1] / step_m)) + 1)

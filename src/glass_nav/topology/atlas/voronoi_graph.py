@@ -1,18 +1,18 @@
-"""GridMap -> the generalized Voronoi graph of its free space: meetpoints, and the ways between them.
+"""GridMap -> the generalized Voronoi graph of its free space: meetpoints, and the edges between them.
 
 The graph is that of the cells that bound free space: Delaunay triangles of their centres, whose circumcentres are
-equidistant from three of them, joined where two triangles share a side. What two neighbouring cells of one wall give
-is left out, what a robot of that radius cannot reach is left out, twigs are pruned and meetpoints that no lidar can
-tell apart are made one. It works on a map of a building and on the few metres around a robot alike, so that the
-atlas and the robot see the same graph.
+equidistant from three of them, joined where two triangles share a side. Ridges between neighbouring cells of one wall
+and what a robot of that radius cannot reach are left out, twigs are pruned, and meetpoints that no lidar can tell apart
+are merged. The map of a building and the few metres around a robot are treated alike, so the atlas and the robot see
+the same graph.
 
 What is an obstacle:
 - Occupied cells are walls, glass or not.
 - Unknown cells cannot be driven through, so they bound the graph like walls. But no lidar sees that boundary: the real
-  wall is somewhere beyond. So each node tells how far from any wall its obstacles are (doubt_m): 0 at walls, some cells
-  where a wall has gaps, up to r at the frontier of what is known.
-- Things smaller than smallest_obstacle_m that the robot can pass on all sides make no meetpoints; the clearance of an
-  edge knows them. Unknown specks of that size with no wall in them are free.
+  wall is somewhere beyond. So each node has the distance of its obstacles from the nearest wall (doubt_m): 0 at walls,
+  some cells where a wall has gaps, up to r at the frontier of what is known.
+- Things smaller than smallest_obstacle_m that the robot can pass on all sides make no meetpoints; they count in the
+  clearance of an edge. Unknown specks of that size with no wall in them are free.
 
 The stages are in voronoi/, a file each; coordinates inside are cells, x along columns, y along rows.
 """
@@ -44,7 +44,7 @@ class VoronoiParams:
     leaf_share_of_r: float = 0.6  # or less than this times r at its junction
     merge_m: float = 0.3  # meetpoints closer along their edge are one, and those where a robot at
     equidistance_m: float = 0.15  # either sees the obstacles of the other nearer than r and this
-    smallest_component_m: float = 2.0  # a part of the graph with less way in it is left out
+    smallest_component_m: float = 2.0  # a part of the graph with a smaller total length is left out
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -57,12 +57,12 @@ class VoronoiParams:
 def build(
     grid_map: GridMap, params: VoronoiParams = VoronoiParams(), step: Callable[[], None] = lambda: None
 ) -> VoronoiGraph:
-    """The graph of all free space that the robot can stand in; without any, a graph of no nodes.
+    """The graph of all free space that the robot can stand in; without any, a graph without nodes.
 
     Args:
         grid_map: any grid, large or small.
         params: of the robot and of its lidar.
-        step: called STEPS times on the way.
+        step: called STEPS times.
     """
     cell_m = grid_map.resolution_m
     clearance = max((params.robot_radius_m + params.passage_margin_m) / cell_m, SEPARATION_CELLS / 2.0)

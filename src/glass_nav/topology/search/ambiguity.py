@@ -1,13 +1,14 @@
 """Candidates -> proof that no turn can tell them apart, or the turns that do.
 
-Two darts are indistinguishable if robots at them, told the same turns for ever, see the same: a search over pairs of
-darts. It begins at the pairs in question and follows every turn; when all pairs that it meets are alike, the pairs it
-began with are proved indistinguishable; the first pair that is not alike gives the shortest turns that tell one of them
-apart. What is alike is what a robot that measures without error would not rule out (Matcher.alike_along).
+Two darts are indistinguishable if robots that take the same turns from them see the same for ever. The search runs over
+pairs of darts. It begins with the pairs in question and follows every turn. If all pairs that it reaches are alike, the
+first ones are proved indistinguishable; the first pair that is not alike gives the shortest sequence of turns that
+tells them apart. Two darts are alike if a robot that measures without error would not rule out one at the other
+(Matcher.alike_along).
 
-If a and b, and b and c are proved indistinguishable, a and c are taken to be so too; where a and c are then not alike
-after all, a turn splits the candidates, and nobody asks for a proof. So a symmetric floor of n darts costs some n pairs
-and not n^2. C candidates, P pairs.
+If a and b, and b and c are proved indistinguishable, so are a and c by assumption; if a and c differ after all, a turn
+splits the candidates and no proof is needed. So a symmetric floor of n darts costs about n pairs and not n^2.
+C candidates, P pairs.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ class Proof:
     """What the search over pairs found."""
 
     indistinguishable: bool  # all candidates are
-    ranks: Optional[List[int]]  # turns that tell two of them apart; None: proved, or the search was broken off
+    ranks: Optional[List[int]]  # turns that tell two of them apart; None: proved, or the search was stopped
     pairs: int  # searched
 
 
@@ -37,7 +38,7 @@ def prove(matcher: Matcher, dart: np.ndarray, max_pairs: int = MAX_PAIRS) -> Pro
     Args:
         matcher: of the atlas.
         dart: (C,) candidates at meetpoints that are alike.
-        max_pairs: the search is broken off behind so many.
+        max_pairs: the search stops after this number.
     """
     group = np.arange(len(dart))
     searched, known = 0, np.zeros((0, 2), np.int64)
@@ -64,7 +65,7 @@ def _groups(pairs: np.ndarray, dart: np.ndarray) -> np.ndarray:
 
 
 def _search(matcher: Matcher, first: int, second: int, max_pairs: int) -> Tuple[np.ndarray, Optional[List[int]]]:
-    """The pairs (P, 2) that turns lead to from one pair, level by level, and the turns to the first that is unlike."""
+    """The pairs (P, 2) that turns lead to from one pair, level by level, and the turns to the first that differs."""
     count = len(matcher.atlas.darts)
     start = np.array([_key(np.array([first]), np.array([second]), count)[0]])
     levels: List[Tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # keys, index in the level before, rank

@@ -30,7 +30,7 @@ _AGREE_M, _AGREE_RAD = 0.7, np.radians(20.0)  # a pose of the graph and a follow
 
 
 class AtlasLocalizer:
-    """One search at a time; start() and update() with what the robot reports, drive as the estimate says."""
+    """One search at a time: start() and update() with what the robot reports, then drive as the estimate says."""
 
     def __init__(
         self,
@@ -90,7 +90,7 @@ class AtlasLocalizer:
 
     @property
     def standing(self) -> Optional[Standing]:
-        """What the scans say of the poses that are followed; None: nothing yet, or none is followed."""
+        """How the best followed pose compares; None: no evidence yet, or no pose is followed."""
         return None if self._followed is None else self._followed.standing
 
     def start(self, meetpoint: Meetpoint) -> SearchEstimate:
@@ -108,33 +108,33 @@ class AtlasLocalizer:
             ObservationError: the meetpoint it left has no such edge; nothing is changed.
         """
         self._forest.step(traversal, meetpoint)
-        self._passed.way(traversal.rank, meetpoint, traversal.length_m)
+        self._passed.add(traversal.rank, meetpoint, traversal.length_m)
         if self._followed is not None:
             self._followed.follow(meetpoint, traversal.length_m)
         return self._judged()
 
     def map_from_base(self, dart: np.ndarray) -> np.ndarray:
-        """(C, 3) poses of the robot at the last meetpoint if it came along darts (C,): as it reported where it stood
-        there, or else at the meetpoint with the edge behind it.
+        """(C, 3) poses of the robot at the last meetpoint if it came along darts (C,): where it reported to stand there, or
+        else at the meetpoint with the edge behind it.
         """
         return poses_at(self._atlas, dart, self._forest.meetpoints[-1])
 
     def poses(self, estimate: SearchEstimate, most: Optional[int] = None) -> np.ndarray:
-        """(C, 3) map_from_base at the last meetpoint, of the first so many candidates of the last estimate; if scans
-        confirmed one, where it fits them.
+        """(C, 3) map_from_base at the last meetpoint, of the first candidates of the last estimate; if scans confirmed a
+        pose, that one.
         """
         if estimate.map_from_base is not None:
             return estimate.map_from_base[None]
         return self.map_from_base(estimate.dart[:most])
 
     def path(self, dart: int) -> np.ndarray:
-        """Darts (K,) by which a candidate came there, reference dart of the beginning first."""
+        """Darts (K,) along the path of a candidate, the reference dart of the first meetpoint first."""
         return np.array([found for _, found, _ in self._forest.path(dart)], np.int64)
 
     def count_visits(self, visits: Visits) -> None:
-        """What was measured on the way of the confirmed candidate, into the statistics of the atlas.
+        """Add what was measured on the path of the confirmed candidate to the statistics of the atlas.
 
-        Edges and meetpoints that the detector erred about are left out; nothing is counted where only scans found it.
+        Edges and meetpoints with detection errors are left out; nothing is counted if only scans found the place.
         """
         assert self._estimate is not None
         if not len(self._estimate.dart):
@@ -183,7 +183,7 @@ class AtlasLocalizer:
         return replace(begun, reason=f"{which}: {begun.reason}")
 
     def _least_passed(self, by_graph: TurnChoice) -> TurnChoice:
-        """Where the graph was wrong once, its candidates do not know which turn tells most: to what is new."""
+        """Where the graph was wrong once, its vote is not trusted: the edge that was passed least often instead."""
         times = self._passed.times(self._forest.meetpoints[-1])
         if times is None or times[by_graph.rank] == times.min():
             return by_graph
@@ -191,10 +191,10 @@ class AtlasLocalizer:
         return TurnChoice(int(least[-1]), by_graph.degree)  # back only if there is no other
 
     def _with_followed(self, by_graph: SearchEstimate, standing: Standing) -> SearchEstimate:
-        """What the graph and the followed poses say together."""
+        """The estimate by the graph, with the evidence of the followed poses."""
         least, lead = self._params.least_explained, self._params.follow_lead
         if standing.share >= least and standing.places > self._seen_places:
-            self._seen_places, self._search = standing.places, 1  # it gets on: searches count from here
+            self._seen_places, self._search = standing.places, 1  # there is progress: searches count from here
         found = (
             standing.places >= self._params.follow_places
             and standing.share >= least

@@ -1,7 +1,7 @@
-"""What cannot be told apart in an atlas, and how many edges a robot needs until it knows where it is.
+"""Which places of an atlas cannot be told apart, and how many edges a robot needs to find its place.
 
-A robot without errors wakes up at every dart in turn and is sent through the search. Where that ends in several places,
-they are indistinguishable (ambiguity.py has the proof), and so are the places where robots began that end there.
+A robot without errors wakes up at every dart in turn and searches. If the search ends with several places, these are
+indistinguishable (ambiguity.py has the proof), and so are the places where such robots woke up.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ class Distinguishability:
 
     starts: np.ndarray  # (S,) darts
     edges: np.ndarray  # (S,) driven until the search ended; those that confirm included
-    confirmed: np.ndarray  # (S,) bool: in one place
-    alike: List[FrozenSet[int]]  # sets of darts, two or more each: a robot that begins at one may be at any
+    confirmed: np.ndarray  # (S,) bool: it ended CONFIRMED
+    alike: List[FrozenSet[int]]  # sets of two or more darts: a robot that begins at one of them may be at any
     unresolved: np.ndarray  # darts (U,) from which the search did not end
 
 

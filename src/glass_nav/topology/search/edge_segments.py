@@ -1,15 +1,15 @@
-"""Wall segments seen along an edge, those that the atlas has for a way -> do they contradict each other?
+"""Wall segments seen along an edge, those of the atlas along a path -> do they contradict each other?
 
-The feature maps of the seed document global_localization_procedure.txt as one more test of a candidate; how to compare
-them it leaves open, and the formulation is ours. Glass forbids to ask for equal maps: where beams pass a pane, it is
-missing from what was seen, and the walls behind it are there. What glass cannot do is let a wall be seen where the
-atlas has free space in front of its walls. So what was seen is laid over what the atlas has; of every piece it is asked
-whether it lies on a wall, and if not, whether the line of sight goes on behind it to a wall of the atlas.
-Contradiction is the share of the latter; what lies behind the atlas' walls, or where it has none, counts for neither.
+The feature maps of the seed document global_localization_procedure.txt are one more test of a candidate. The document
+does not define how to compare them; the formulation is ours. In glass the maps need not be equal: where beams pass a
+pane, the pane is not seen, and the walls behind it are. But glass never shows a wall where the atlas has free space in
+front of its walls. So the segments seen are laid over those of the atlas. Each piece either lies on a wall, or it
+stands in free space if the line of sight continues beyond it to a wall of the atlas. The contradiction is the share of
+the latter; pieces beyond the walls of the atlas, or where it has none, do not count.
 
-How exactly the two lie over each other is not known: from several headings the segments are fitted (as in the seed
-document segment_localization.txt, with a shrinking neighbourhood), within what the tolerances allow, and the least
-contradiction of all fits, and of none, counts. K fits, P pieces, S segments of the atlas, W points of the way.
+The exact alignment is not known. The segments are aligned from several headings (as in the seed document
+segment_localization.txt, with a shrinking neighbourhood), within the tolerances, and the least contradiction of all
+alignments, and of none, counts. K alignments, P pieces, S segments of the atlas, W points of the path.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ _PIECE_M, _MAX_PIECES = 0.2, 200
 _HEADINGS, _STEPS = 5, 6
 _FIRST_M = 1.0  # of the neighbourhood
 _PARALLEL = 0.4  # sine of the angle between a piece and the wall that it may lie on
-_PRIOR = np.array([0.5, 0.5, 2.0])  # stiffness of the fit towards no shift: metres of wall
+_PRIOR = np.array([0.5, 0.5, 2.0])  # stiffness of the alignment towards no shift: metres of wall
 _CELL_SIGMA_M = 0.06  # of a wall, in both maps
-_DRIFT = 0.5  # of dead reckoning's error is left between a piece and its fit
-_DOUBT_M = 0.5  # of wall that speak for a candidate without being seen
-_MIN_M = 1.0  # of wall in free space, else it is furniture
+_DRIFT = 0.5  # share of the dead reckoning error that is left after the alignment
+_DOUBT_M = 0.5  # of wall in favour of a candidate, without being seen
+_MIN_M = 1.0  # of wall in free space; less is furniture
 
 
 @dataclass(frozen=True)
@@ -44,22 +44,22 @@ class SegmentTest:
 
 @dataclass(frozen=True)
 class Reach:
-    """How far what was seen may be off."""
+    """Errors of what was seen."""
 
-    shift_m: float  # at the beginning of the way
+    shift_m: float  # at the start of the edge
     turn_rad: float  # there
-    sigmas: float  # standard deviations that a wall may be off after the fit
+    sigmas: float  # standard deviations that a wall may be off after the alignment
     drift_share: float  # of dead reckoning, per metre
 
 
-def contradiction(seen_m: np.ndarray, atlas_m: np.ndarray, way_m: np.ndarray, reach: Reach) -> Tuple[float, float]:
-    """How much of the walls seen stands in the free space of a candidate.
+def contradiction(seen_m: np.ndarray, atlas_m: np.ndarray, path_m: np.ndarray, reach: Reach) -> Tuple[float, float]:
+    """Share and length of the walls seen that stand in the free space of a candidate.
 
     Args:
         seen_m: (n, 4) segments seen, in the frame at the start, x along the edge.
         atlas_m: (S, 4) of the candidate, in the same frame as if the candidate were right.
-        way_m: (W, 2) points of its way there, from which it was looked.
-        reach: what may be off.
+        path_m: (W, 2) viewpoints along the candidate.
+        reach: errors of what was seen.
 
     Returns:
         share 0..1 of the walls that are compared, and metres of wall that stand in free space.
@@ -75,7 +75,7 @@ def contradiction(seen_m: np.ndarray, atlas_m: np.ndarray, way_m: np.ndarray, re
     away, _, _ = walls.nearest(placed, directions)
     allowed = reach.sigmas * np.hypot(_CELL_SIGMA_M, _DRIFT * reach.drift_share * np.hypot(*pieces.middle_m.T))
     on_wall = away <= allowed
-    in_free_space = ~on_wall & (walls.behind(placed, way_m) > allowed)
+    in_free_space = ~on_wall & (walls.beyond(placed, path_m) > allowed)
     supports, contradicts = (np.sum(pieces.length_m * which, axis=1) for which in (on_wall, in_free_space))
     share = contradicts / (supports + contradicts + _DOUBT_M)
     best = int(np.argmin(share))
@@ -117,7 +117,7 @@ class _Walls:
         self.normal = np.column_stack([-self._unit[:, 1], self._unit[:, 0]])
 
     def nearest(self, points: np.ndarray, directions: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Distance (K, P) to the nearest segment that runs about as the piece, which one, and how far left of it."""
+        """Distance (K, P) to the nearest segment about parallel to the piece, which one, and how far left of it."""
         x, y = (points[..., None, each] - self._start[:, each] for each in (0, 1))
         unit_x, unit_y = self._unit.T
         along, across = x * unit_x + y * unit_y, y * unit_x - x * unit_y
@@ -131,12 +131,12 @@ class _Walls:
             np.take_along_axis(across, best, -1)[..., 0],
         )
 
-    def behind(self, points: np.ndarray, way_m: np.ndarray) -> np.ndarray:
-        """(K, P) metres that the line of sight from the nearest point of the way goes on to the first segment; less
-        than 0: one is in between, -inf: there is none.
+    def beyond(self, points: np.ndarray, path_m: np.ndarray) -> np.ndarray:
+        """(K, P) metres from a piece to the first segment on the line of sight from the nearest viewpoint; negative: the
+        segment is in front of the piece, -inf: there is none.
         """
-        near = np.argmin(np.sum((points[..., None, :] - way_m) ** 2, axis=-1), axis=-1)
-        eye = way_m[near]
+        near = np.argmin(np.sum((points[..., None, :] - path_m) ** 2, axis=-1), axis=-1)
+        eye = path_m[near]
         sight = points - eye
         offset_x, offset_y = (self._start[:, each] - eye[..., None, each] for each in (0, 1))
         along_x, along_y = self._along.T
@@ -169,6 +169,6 @@ def _fitted(pieces: _Pieces, walls: _Walls, reach: Reach) -> np.ndarray:
     return poses
 
 
-def fits(share: float, contradicting_m: float, test: SegmentTest) -> bool:
+def matches(share: float, contradicting_m: float, test: SegmentTest) -> bool:
     """Whether a candidate may be the edge that was driven."""
     return contradicting_m < _MIN_M or share <= test.segments_max_contradiction

@@ -1,10 +1,10 @@
-"""Does this node, this edge of the atlas fit what was seen?
+"""Does a node or an edge of the atlas match what was seen?
 
-Each test is on one number: the difference between atlas and observation, against z times its standard deviation. z
-comes from a budget of risk over a whole run: a chance that is small for one test is not for a hundred. C candidates; a
-candidate at a meetpoint is the dart that fits its reference edge.
+Each test compares one number: the difference between atlas and observation with z times its standard deviation. z
+follows from a risk budget for a whole run, because a probability that is small for one test is not small for a hundred.
+C candidates; a candidate at a meetpoint is the dart that matches its reference edge.
 
-Seed document global_localization_procedure.txt, "Updating the Search Forest"; it leaves open when two values match.
+Seed document global_localization_procedure.txt, "Updating the Search Forest", which does not define when values match.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from glass_nav.topology.observations import Meetpoint, Traversal
 from glass_nav.topology.search import edge_segments
 from glass_nav.topology.search.edge_segments import Reach, SegmentTest
 
-_MAX_JUDGED = 2000  # candidates by a scan: a tenth of a millisecond each
-_MAX_COMPARED = 100  # candidates by their walls: some milliseconds each
-_LOOKED_FROM_M = 0.5  # between points of a way
+_MAX_JUDGED = 2000  # candidates that a scan judges: 0.1 ms each
+_MAX_COMPARED = 100  # candidates whose walls are compared: some milliseconds each
+_VIEW_STEP_M = 0.5  # between viewpoints along an edge
 _REMEMBERED = 64  # traversals whose comparisons are kept
 _TESTS_PER_EDGE = 7  # length, chord, its direction, turn; then r and two angles between edges of the node
 
 
 @dataclass(frozen=True)
 class Tolerances:
-    """How well a robot measures, where it does not say so itself, and how much risk there may be."""
+    """Measurement errors of the robot, where its reports do not state them, and the risk that is accepted."""
 
-    risk: float = 0.001  # chance to eliminate the truth in a run by errors of normal distribution
-    risk_edges: int = 30  # of a run of so many edges
+    risk: float = 0.001  # probability of ruling out the truth in a run by normally distributed errors
+    risk_edges: int = 30  # edges of such a run
     r_sigma_m: float = 0.05  # of an equidistance
-    length_sigma_m: float = 0.1  # of a way: where its ends are ...
+    length_sigma_m: float = 0.1  # of a length: constant part, ...
     length_sigma_share: float = 0.02  # ... and per metre
     bearing_sigma_rad: float = 0.1  # of the direction of an edge
     turn_sigma_rad: float = 0.1  # of dead reckoning's heading over an edge
@@ -55,13 +55,13 @@ class Tolerances:
 
     @property
     def z(self) -> float:
-        """Standard deviations that a difference may have: two-sided, the risk shared by all tests of the run."""
+        """Largest difference, in standard deviations: two-sided, the risk shared by all tests of the run."""
         from scipy.special import ndtri  # slow to import
 
         return float(-ndtri(self.risk / (2.0 * _TESTS_PER_EDGE * self.risk_edges)))
 
     def sigma_length_m(self, length_m: np.ndarray) -> np.ndarray:
-        """(...) of ways travelled."""
+        """(...) of lengths travelled."""
         return self.length_sigma_m + self.length_sigma_share * length_m
 
 
@@ -69,7 +69,7 @@ Explained = Callable[[Scan, np.ndarray], np.ndarray]  # scan, map_from_base (C, 
 
 
 class Matcher:
-    """An atlas with what the tests need of it, by dart."""
+    """The tests of one atlas, with what they need of it by dart."""
 
     def __init__(
         self,
@@ -83,10 +83,10 @@ class Matcher:
         """Args:
         atlas: with the segments of its darts, if these are to be compared.
         tolerances: of the tests on numbers.
-        use_angles: directions of edges are evidence.
-        segments: the test on the walls seen along an edge; None: they are no evidence.
-        explained: of scans at meetpoints; None: they are no evidence.
-        least_explained: share of a scan that the map must explain from where a candidate is.
+        use_angles: whether directions of edges are evidence.
+        segments: the test of walls seen along an edge; None: they are not evidence.
+        explained: judges scans at meetpoints; None: they are not evidence.
+        least_explained: share of a scan that the map must explain from a candidate's pose.
         """
         self._explained = explained
         self._least_explained = least_explained
@@ -112,9 +112,9 @@ class Matcher:
         self._degree_sorted = self._degree[self._by_degree_r]
 
     def departures(self, dart: np.ndarray, rank: int) -> np.ndarray:
-        """(C,) darts by which a robot leaves that turns to this rank at reference darts (C,).
+        """(C,) darts by which a robot leaves if it takes this rank at reference darts (C,).
 
-        All of them must have the degree of one meetpoint, above the rank.
+        All nodes must have the degree of one meetpoint, above the rank.
         """
         if not len(dart):
             return dart
@@ -125,7 +125,7 @@ class Matcher:
         return dart.astype(np.int64)
 
     def others(self, dart: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """All other darts (K,) of the nodes of darts (C,), and for each the index (K,) of the one it is beside."""
+        """All other darts (K,) at the nodes of darts (C,), and for each the index (K,) of the given dart at its node."""
         beside = np.arange(len(dart))
         found, of = [], []
         step = self._next[dart]
@@ -140,7 +140,7 @@ class Matcher:
     # -- nodes
 
     def all_at(self, meetpoint: Meetpoint) -> np.ndarray:
-        """(C,) all darts of the atlas that fit the reference edge of a meetpoint."""
+        """(C,) all darts of the atlas that match the reference edge of a meetpoint."""
         window = self.z * math.hypot(self.sigma_r_m(meetpoint), self._max_sigma_r)
         first, last = np.searchsorted(self._degree_sorted, [meetpoint.degree, meetpoint.degree + 1])
         r = self._r_sorted[first:last]
@@ -153,7 +153,7 @@ class Matcher:
         return dart[self._scan_fits(dart, meetpoint)]
 
     def at(self, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
-        """(C,) bool: darts (C,) fit the reference edge of the meetpoint."""
+        """(C,) bool: darts (C,) match the reference edge of the meetpoint."""
         node = self.atlas.darts.node[dart]
         fits = self._degree[node] == meetpoint.degree
         fits[fits] = self._r_fits(node[fits], meetpoint)
@@ -167,8 +167,8 @@ class Matcher:
         return self._explained is not None
 
     def _scan_fits(self, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
-        """(C,) bool: enough of the scan is explained if darts (C,) are the reference edge; of too many nothing is
-        asked.
+        """(C,) bool: the map explains enough of the scan if darts (C,) are the reference edge; all True if there are too
+        many of them.
         """
         if self._explained is None or meetpoint.scan is None or not 0 < len(dart) <= _MAX_JUDGED:
             return np.ones(len(dart), bool)
@@ -178,12 +178,12 @@ class Matcher:
         new = [each for each in dart.tolist() if each not in known]
         if new:
             shares = self._explained(meetpoint.scan, poses_at(self.atlas, np.array(new, np.int64), meetpoint))
-            shares = np.where(np.isnan(shares), 1.0, shares)  # a scan that says nothing rules out none
+            shares = np.where(np.isnan(shares), 1.0, shares)  # a scan without evidence rules out nothing
             known.update(zip(new, (shares >= self._least_explained).tolist()))
         return np.array([known[each] for each in dart.tolist()], bool)
 
     def sigma_r_m(self, meetpoint: Optional[Meetpoint] = None) -> float:
-        """Of an equidistance measured, the atlas' part not included."""
+        """Of a measured equidistance, without the uncertainty of the atlas."""
         return (meetpoint.sigma_r_m if meetpoint else 0.0) or self.tolerances.r_sigma_m
 
     def _r_fits(self, node: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
@@ -203,31 +203,31 @@ class Matcher:
             fits &= np.abs(angles.wrap(bearing[dart] - bearing[other] - gap)) <= allowed
         return fits
 
-    # -- ways: one edge, or several that a missed meetpoint joins
+    # -- paths: one edge, or several that a missed meetpoint joins
 
     def sigma_length_m(self, traversal: Traversal) -> float:
-        """Of a length measured, the atlas' part not included."""
+        """Of a measured length, without the uncertainty of the atlas."""
         return traversal.sigma_length_m or float(self.tolerances.sigma_length_m(np.array(traversal.length_m)))
 
     def sigma_chord_m(self, traversal: Traversal) -> float:
-        """Of a chord measured, the atlas' part not included."""
+        """Of a measured chord, without the uncertainty of the atlas."""
         return traversal.sigma_chord_m or float(self.tolerances.sigma_length_m(np.array(traversal.length_m)))
 
     def longest_m(self, traversal: Traversal, edges: int = 1) -> float:
-        """No way of so many edges that fits is longer."""
+        """Upper bound of the length of a path of that number of edges that matches."""
         sigma = math.hypot(self.sigma_length_m(traversal), math.sqrt(edges) * float(self.atlas.edges.sigma_m.max()))
         return traversal.length_m + self.z * sigma
 
     def may_contain(self, dart: np.ndarray, traversal: Traversal) -> np.ndarray:
-        """(C,) bool: the edges of darts (C,) are at least as long as what was travelled, within tolerance."""
+        """(C,) bool: the edges of darts (C,) are at least as long as the distance travelled, within tolerance."""
         edge = dart >> 1
         sigma = np.hypot(self.sigma_length_m(traversal), self.atlas.edges.sigma_m[edge])
         return self.atlas.edges.length_m[edge] >= traversal.length_m - self.z * sigma
 
     def edges_along(self, departure: np.ndarray, traversal: Traversal) -> np.ndarray:
-        """(K,) which of the darts (C,) lead along an edge that fits."""
+        """(K,) the darts (C,) that lead along an edge that matches."""
         edges = self.atlas.edges
-        longest = self.longest_m(traversal)  # first the coarse window, on little memory
+        longest = self.longest_m(traversal)  # a coarse window first, which reads little memory
         length = self.length_m[departure >> 1]
         kept = np.flatnonzero((length <= longest + 1e-3) & (length >= 2.0 * traversal.length_m - longest - 1e-3))
         departure = departure[kept]
@@ -244,7 +244,7 @@ class Matcher:
         return kept[fits]
 
     def _segments_fit(self, departure: np.ndarray, traversal: Traversal) -> np.ndarray:
-        """(C,) bool: the walls seen do not contradict those of the atlas along darts; of too many nothing is asked."""
+        """(C,) bool: the walls seen do not contradict those of the atlas along darts; all True if there are too many."""
         if self._segments is None or not len(traversal.segments_m) or len(departure) > _MAX_COMPARED:
             return np.ones(len(departure), bool)
         if id(traversal) not in self._compared and len(self._compared) >= _REMEMBERED:
@@ -252,17 +252,17 @@ class Matcher:
         _, known = self._compared.setdefault(id(traversal), (traversal, {}))
         for dart in departure.tolist():
             if dart not in known:
-                known[dart] = edge_segments.fits(*self.contradiction(dart, traversal), self._segments)
+                known[dart] = edge_segments.matches(*self.contradiction(dart, traversal), self._segments)
         return np.array([known[dart] for dart in departure.tolist()], bool)
 
     def contradiction(self, dart: int, traversal: Traversal) -> Tuple[float, float]:
-        """Share of the walls seen that stand in free space if the edge was that of a dart, and metres of them."""
+        """Share and metres of the walls seen that stand in free space if a dart's edge was driven."""
         seen = self.atlas.darts.segments_m[dart]
         dart_from_map = se2.inverse(self.atlas.map_from_dart(np.array(dart)))
         line = self.atlas.edges.polyline_m[dart >> 1]
         if len(line) < 2:
             line = self.atlas.nodes.position_m[self.atlas.darts.node[[dart & ~1, dart | 1]]]
-        way = poses_along(line, _LOOKED_FROM_M)[:, :2]
+        path = poses_along(line, _VIEW_STEP_M)[:, :2]
         limits = self.tolerances
         reach = Reach(
             self.z * math.hypot(limits.length_sigma_m, limits.r_sigma_m),
@@ -273,11 +273,11 @@ class Matcher:
         return edge_segments.contradiction(
             traversal.segments_m,
             se2.transform_points(dart_from_map, seen.reshape(-1, 2)).reshape(-1, 4),
-            se2.transform_points(dart_from_map, way),
+            se2.transform_points(dart_from_map, path),
             reach,
         )
 
-    def ways_along(
+    def paths_along(
         self,
         departure: np.ndarray,
         arrival: np.ndarray,
@@ -285,11 +285,11 @@ class Matcher:
         sigma_m: np.ndarray,
         traversal: Traversal,
     ) -> np.ndarray:
-        """(C,) bool: ways of several edges fit.
+        """(C,) bool: paths of several edges match.
 
         Args:
             departure: (C,) first darts.
-            arrival: (C,) darts that lead back, at their ends.
+            arrival: (C,) darts at their ends, which lead back.
             length_m: (C,) of all edges together.
             sigma_m: (C,) of the atlas, for all edges together.
             traversal: what was travelled.
@@ -324,15 +324,17 @@ class Matcher:
             chord = np.linalg.norm(step, axis=-1)
             ahead = np.arctan2(step[:, 1], step[:, 0]) - bearing[departure]
             off_m = self.z * np.hypot(self.sigma_chord_m(traversal), sigma_m)
-            across = np.arcsin(np.minimum(off_m / np.maximum(chord, 1e-9), 1.0))  # near the start: any direction
+            across = np.arcsin(
+                np.minimum(off_m / np.maximum(chord, 1e-9), 1.0)
+            )  # close to the start every direction is possible
             allowed_each = self.z * math.hypot(limits.bearing_sigma_rad, limits.turn_sigma_rad) + across
             fits &= (off_m >= chord) | (np.abs(angles.wrap(ahead - traversal.chord_bearing_rad)) <= allowed_each)
         return fits
 
-    # -- what a turn would show: which candidates would it leave?
+    # -- what a turn would show: which candidates would remain?
 
     def alike_at(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """(...) bool: a robot at the first darts (...), which measures without error, would not rule out the second."""
+        """(...) bool: a robot at the first darts (...) that measures without error would not rule out the second."""
         nodes, node = self.atlas.nodes, self.atlas.darts.node
         a, b = node[first], node[second]
         alike = (self._degree[a] == self._degree[b]) & (
@@ -355,8 +357,8 @@ class Matcher:
         return alike
 
     def alike_along(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """(...) bool: a robot that leaves by the first darts (...), and measures without error, would at the next
-        meetpoint not rule out that it left by the second.
+        """(...) bool: a robot that leaves by the first darts (...) and measures without error would not rule out at the
+        next meetpoint that it left by the second.
         """
         edges, limits = self.atlas.edges, self.tolerances
         a, b = first >> 1, second >> 1
@@ -386,6 +388,6 @@ class Matcher:
 
 def poses_at(atlas: Atlas, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
     """(C, 3) poses in the frame map of a robot whose reference edges are darts (C,)."""
-    behind = float(meetpoint.bearings_rad[0]) if len(meetpoint.bearings_rad) else np.pi
-    base_from_dart = np.array([*meetpoint.centre_m, behind])
+    back = float(meetpoint.bearings_rad[0]) if len(meetpoint.bearings_rad) else np.pi
+    base_from_dart = np.array([*meetpoint.centre_m, back])
     return se2.compose(atlas.map_from_dart(dart), se2.inverse(base_from_dart))

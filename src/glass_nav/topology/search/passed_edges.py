@@ -1,8 +1,8 @@
-"""Odometry at meetpoints -> how often the robot went along each of their edges: so it gets everywhere, with no atlas.
+"""Odometry at meetpoints -> how often the robot passed each of their edges: the way to get everywhere without an atlas.
 
-Whoever always leaves by the edge that was passed least comes along every edge of a building, however it is made: the
-rule of Tremaux for mazes (Lucas, Recreations mathematiques, 1882). Edges are known again by where they leave and in
-which direction.
+A robot that always leaves by the edge that it passed least often covers every edge of any building: the rule of
+Tremaux for mazes (Lucas, Recreations mathematiques, 1882). Edges are recognized by where they leave and in which
+direction.
 """
 
 from __future__ import annotations
@@ -14,43 +14,45 @@ import numpy as np
 from glass_nav.geometry import angles, se2
 from glass_nav.topology.observations import Meetpoint
 
-_SAME_M, _SAME_SHARE = 0.7, 0.02  # meetpoints nearer than that are one; odometry drifts by some share of the way
+_SAME_M, _SAME_SHARE = 0.7, 0.02  # meetpoints nearer than that are one; odometry drifts by this share of the distance
 _SAME_RAD = 0.5
 
 
 class PassedEdges:
-    """begin() with a meetpoint, then each way() to the next."""
+    """begin() with a meetpoint, then add() each edge to the next."""
 
     def __init__(self) -> None:
         self._forget()
 
     def _forget(self) -> None:
-        self._ends: List[np.ndarray] = []  # (4,) x, y, direction in odom of an end that was passed, way driven then
+        self._ends: List[
+            np.ndarray
+        ] = []  # (4,) x, y, direction in odom of an end that was passed, distance driven then
         self._last: Optional[Meetpoint] = None
-        self._way_m = 0.0
+        self._driven_m = 0.0
 
     def begin(self, meetpoint: Meetpoint) -> None:
         """Nothing was passed yet."""
         self._forget()
         self._last = meetpoint
 
-    def way(self, rank: int, meetpoint: Meetpoint, way_m: float) -> None:
-        """It left the last meetpoint by an edge of that rank, and came behind so many metres to the next one."""
+    def add(self, rank: int, meetpoint: Meetpoint, length_m: float) -> None:
+        """The robot left the last meetpoint by an edge of that rank, and came to this one after that distance."""
         if self._last is not None:
             self._mark(self._last, rank)
-        self._way_m += way_m
+        self._driven_m += length_m
         self._mark(meetpoint, 0)
         self._last = meetpoint
 
     def times(self, meetpoint: Meetpoint) -> Optional[np.ndarray]:
-        """(degree,) how often each edge of the last meetpoint was passed, to or fro; None if that is not known."""
+        """(degree,) how often each edge of the last meetpoint was passed, in either direction; None if that is not known."""
         if meetpoint.odom_from_base is None or not len(meetpoint.bearings_rad):
             return None
         centre, bearing = _in_odom(meetpoint)
         times = np.zeros(meetpoint.degree, np.int64)
-        for x, y, direction, way_m in self._ends:
+        for x, y, direction, driven_m in self._ends:
             off = np.abs(angles.wrap(bearing - direction))
-            near_m = _SAME_M + _SAME_SHARE * (self._way_m - way_m)
+            near_m = _SAME_M + _SAME_SHARE * (self._driven_m - driven_m)
             if float(np.hypot(x - centre[0], y - centre[1])) < near_m and off.min() < _SAME_RAD:
                 times[int(off.argmin())] += 1
         return times
@@ -58,7 +60,7 @@ class PassedEdges:
     def _mark(self, meetpoint: Meetpoint, rank: int) -> None:
         if meetpoint.odom_from_base is not None and len(meetpoint.bearings_rad):
             centre, bearing = _in_odom(meetpoint)
-            self._ends.append(np.array([centre[0], centre[1], bearing[rank], self._way_m]))
+            self._ends.append(np.array([centre[0], centre[1], bearing[rank], self._driven_m]))
 
 
 def _in_odom(meetpoint: Meetpoint) -> "tuple[np.ndarray, np.ndarray]":

@@ -30,9 +30,9 @@ class SearchEstimate:
     state: SearchState
     reason: str  # why, in one sentence
     depth: int  # edges driven so far
-    dart: np.ndarray  # (C,) candidates: where the edge that the robot came along leads back
-    errors: np.ndarray  # (C,) errors of the detector that each takes
-    choice: Optional[TurnChoice]  # None: nothing more to find out
+    dart: np.ndarray  # (C,) candidates: the dart back along the edge on which the robot came
+    errors: np.ndarray  # (C,) detection errors of each
+    choice: Optional[TurnChoice]  # None: nothing is left to find out
     map_from_base: Optional[np.ndarray] = None  # (3,) CONFIRMED by the scans: the pose; dart is empty where the graph
     # does not have it
 

@@ -1,22 +1,23 @@
 """Observations -> candidates: which darts are still possible?
 
 The document's forest has a row of search nodes for each depth; a search node is a node of the atlas with the search
-edge that leads there. Here a candidate is that edge's dart at the node, the arrival dart: it says both. A turn maps
-darts one to one, so a row never has more candidates than the atlas has darts, and no dart twice. Rows keep what is
-active; how a candidate came about, and what was ruled out beside it, can be worked out from the row before (explain.py
-draws it). In the row of depth 0 there is no arrival dart: any dart of a node that matches may be the reference edge.
+edge that leads there. Here a candidate is that edge's dart at the node, the arrival dart, which identifies both. A
+turn maps darts one to one, so a row never has more candidates than the atlas has darts, and no dart twice. Rows keep
+active candidates only; the parents of a candidate, and what was ruled out, follow from the row before
+(forest_explanation.py prints them). In the row of depth 0 there is no arrival dart: any dart of a node that matches may
+be the reference edge.
 
-Beyond the document: a detector errs. It may miss a meetpoint, which joins two edges to one, or see one where there is
-none, which splits an edge. Rows are kept for each number of such errors, and those with errors are worked out only
-once nothing is left without. Rules for the row of depth d with e errors:
+Beyond the document, the detector may fail: it misses a meetpoint, which joins two edges to one, or reports a spurious
+one, which splits an edge. A row is kept for each number of detection errors, and rows with errors are computed only when
+no candidate without errors is left. Rules for the row of depth d with e errors:
 
 * an edge from the row of d - 1 with e;
 * two edges joined from the row of d - 1 with e - 1, three from that with e - 2;
-* an edge from the row of d - 2 with e - 1, along the way of both traversals, if the meetpoint of d - 1 was none; from
-  the row of d - 3 with e - 2 if there were two such;
-* where it came from, if it turned round at such a meetpoint (a dead end that was none);
-* anywhere, if no meetpoint before this one was one: e = d, behind an edge at least as long as what was travelled; with
-  an error more a meetpoint may have been missed on it.
+* an edge from the row of d - 2 with e - 1, as long as both traversals, if the meetpoint of d - 1 was spurious; from
+  the row of d - 3 with e - 2 if two were spurious;
+* the node it came from, if it turned round at a spurious meetpoint (a spurious dead end);
+* anywhere, if all meetpoints before this one were spurious: e = d, after an edge at least as long as the distance
+  travelled; with one more error a meetpoint may have been missed on it.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ NO_PARENT = -1
 
 @dataclass(frozen=True)
 class Row:
-    """Active candidates of one depth with one number of errors, by ascending dart. Parents may be rows further back."""
+    """Active candidates of one depth with one number of errors, by ascending dart. Parents may be in earlier rows."""
 
     dart: np.ndarray  # (C,) arrival darts; at depth 0 reference darts
     parent: np.ndarray  # (C,) index in the parent's row, NO_PARENT where a search begins
@@ -61,7 +62,7 @@ class _Found:
         self.origins.append((depth, errors))
 
     def row(self, ruled_out: List[Row]) -> Row:
-        """Each dart once, by its first parent; those that other rows have already are left out."""
+        """Each dart once, with its first parent; darts that other rows already have are left out."""
         sizes = [len(part) for part in self.darts]
         depth = np.repeat([origin[0] for origin in self.origins], sizes)
         errors = np.repeat([origin[1] for origin in self.origins], sizes)
@@ -74,11 +75,11 @@ class _Found:
 
 @dataclass(frozen=True)
 class _Course:
-    """Traversals one after the other along one edge, or along edges that a missed meetpoint joins."""
+    """Consecutive traversals along one edge, or along edges that a missed meetpoint joins."""
 
-    traversal: Traversal  # as one; in length what is between the ends
-    farthest: Traversal  # as far as it went
-    onward: bool  # it ended on the way away from where it began
+    traversal: Traversal  # all as one; its length is that between the ends
+    farthest: Traversal  # the same, to the farthest point
+    onward: bool  # it ended heading away from where it began
     turned_round: bool  # in between
 
 
@@ -100,7 +101,7 @@ class SearchForest:
 
     @property
     def errors(self) -> int:
-        """Up to so many errors of the detector are considered by now."""
+        """Number of detection errors that are considered by now."""
         return self._errors
 
     @property
@@ -130,7 +131,7 @@ class SearchForest:
         self._work_out_last_row()
 
     def candidates(self) -> Tuple[np.ndarray, np.ndarray]:
-        """(C,) active darts of the current depth, and (C,) how many errors each takes; fewest errors first."""
+        """(C,) active darts of the current depth, and (C,) the detection errors of each; fewest errors first."""
         rows = [self.row(self.depth, errors) for errors in range(self._errors + 1)]
         return (
             np.concatenate([row.dart for row in rows]),
@@ -138,18 +139,18 @@ class SearchForest:
         )
 
     def row(self, depth: int, errors: int = 0) -> Row:
-        """Active candidates of a depth that take exactly so many errors."""
+        """Active candidates of a depth with exactly this number of errors."""
         return self._rows[depth, errors]
 
     def between_meetpoints(self) -> bool:
-        """Whether the robot may be on an edge, at what it took for a meetpoint."""
+        """Whether the robot may be on an edge, at a spurious meetpoint."""
         return self._between_meetpoints(self._errors)
 
     def path(self, dart: int) -> List[Tuple[int, int, bool]]:
-        """How a candidate of the current depth came there, from its beginning.
+        """The path of a candidate of the current depth.
 
         Returns:
-            For each row it passed: depth, dart, and whether one edge without an error led there; the first is False.
+            For each row on the path: depth, dart, and whether one edge without an error led there; the first is False.
         """
         errors = next(e for e in range(self._errors + 1) if dart in self.row(self.depth, e).dart)
         depth, index = self.depth, int(np.searchsorted(self.row(self.depth, errors).dart, dart))
@@ -165,7 +166,7 @@ class SearchForest:
             (depth, errors), index = before, parent
 
     def has_rival(self, dart: int) -> bool:
-        """Whether a candidate of the current depth came by an edge where one with a meetpoint missed fits as well: to
+        """Whether the last traversal of a candidate of the current depth also matches a path with a missed meetpoint, to
         the next meetpoint, if that is near.
         """
         came = self.path(dart)
@@ -191,14 +192,14 @@ class SearchForest:
         )
 
     def _between_meetpoints(self, errors: int) -> bool:
-        for back in range(1, min(errors, self.depth) + 1):  # so many of the last meetpoints were none
+        for back in range(1, min(errors, self.depth) + 1):  # this number of the last meetpoints were spurious
             farthest = self._course(self.depth - back, self.depth).farthest
             for spent in range(errors - back + 1):
                 row = self.row(self.depth - back, spent)
                 departure = self._departures(row.dart, self.depth - back)
                 if self._matcher.may_contain(departure, farthest).any():
                     return True
-        return errors > self.depth  # none of the meetpoints was one
+        return errors > self.depth  # all meetpoints were spurious
 
     def _worked_out(self, depth: int, errors: int) -> Row:
         found = _Found()
@@ -207,7 +208,7 @@ class SearchForest:
             found.add(dart, np.full(len(dart), NO_PARENT), 0, 0)
         for spurious in range(min(errors, depth - 1) + 1 if depth else 0):
             for missed in range(errors - spurious + 1):
-                self._add_ways(found, depth, errors, spurious, missed)
+                self._add_paths(found, depth, errors, spurious, missed)
         for spurious in range(1, min(errors, depth - 1) + 1):
             self._add_returns(found, depth, errors, spurious)
         if 1 <= depth <= errors:
@@ -220,8 +221,8 @@ class SearchForest:
     def _departures(self, dart: np.ndarray, depth: int) -> np.ndarray:
         return self._matcher.departures(dart, self._traversals[depth].rank)
 
-    def _add_ways(self, found: _Found, depth: int, errors: int, spurious: int, missed: int) -> None:
-        """Ways that take up so many traversals more than one, over so many edges more than one."""
+    def _add_paths(self, found: _Found, depth: int, errors: int, spurious: int, missed: int) -> None:
+        """Paths of 1 + spurious traversals over 1 + missed edges."""
         origin = depth - 1 - spurious, errors - spurious - missed
         course = self._course(origin[0], depth)
         if not course.onward or (missed and course.turned_round):
@@ -237,9 +238,9 @@ class SearchForest:
         found.add(arrival[here], parent[here], *origin)
 
     def _course(self, first: int, last: int) -> _Course:
-        """The traversals between two depths; rank 0 at a meetpoint in between is a turn round.
+        """The traversals between two depths; rank 0 at a meetpoint in between means that the robot turned round.
 
-        Of the chord only what the triangle leaves of it is known, which is next to nothing: it is not matched.
+        The triangle inequality bounds the chord too loosely to be of use: it is not matched.
         """
         parts = self._traversals[first:last]
         if len(parts) == 1:
@@ -256,7 +257,7 @@ class SearchForest:
     def _joined_edges(
         self, departure: np.ndarray, traversal: Traversal, missed: int
     ) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Ways over so many missed meetpoints that fit: departures, arrivals, indices of the departures."""
+        """Paths over this number of missed meetpoints that match: departures, arrivals, indices of the departures."""
         edges, matcher = self._matcher.atlas.edges, self._matcher
         longest = matcher.longest_m(traversal, missed + 1)
         parent, last, length = np.arange(len(departure)), departure, matcher.length_m[departure >> 1]
@@ -270,11 +271,11 @@ class SearchForest:
             variance = variance[beside] + edges.sigma_m[onward >> 1] ** 2
         near = np.flatnonzero((length <= longest) & (length >= 2.0 * traversal.length_m - longest))
         parent, last, length, variance = parent[near], last[near], length[near], variance[near]
-        fits = matcher.ways_along(departure[parent], twin(last), length, np.sqrt(variance), traversal)
+        fits = matcher.paths_along(departure[parent], twin(last), length, np.sqrt(variance), traversal)
         return departure[parent[fits]], twin(last[fits]), parent[fits]
 
     def _add_returns(self, found: _Found, depth: int, errors: int, spurious: int) -> None:
-        """The robot turned round on an edge, at what it took for a meetpoint, and is back where that edge began."""
+        """The robot turned round on an edge, at a spurious meetpoint, and is back where that edge began."""
         origin = depth - 1 - spurious, errors - spurious
         course = self._course(origin[0], depth)
         if course.onward or course.traversal.length_m > self._matcher.z * course.traversal.sigma_length_m:
@@ -285,7 +286,7 @@ class SearchForest:
         found.add(departure[fits], np.flatnonzero(fits), *origin)
 
     def _add_beginnings(self, found: _Found, depth: int, errors: int) -> None:
-        """No meetpoint before this one was one: the search begins here, behind an edge at least so long."""
+        """All meetpoints before this one were spurious: the search begins here, after an edge at least that long."""
         arrival = self._matcher.all_at(self._meetpoints[depth])
         course = self._course(0, depth)
         if not course.turned_round and errors == depth:

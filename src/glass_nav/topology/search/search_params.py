@@ -15,16 +15,16 @@ VOTE_MODES = ("best", "seed")
 class SearchParams:
     """How the search is done."""
 
-    vote_mode: str = "best"  # best: what tells most; seed: the document's procedure
+    vote_mode: str = "best"  # best: fewest expected survivors; seed: the document's procedure
     confirm_edges: int = 2  # edges that must match after one candidate is left
-    max_detection_errors: int = 2  # meetpoints missed or seen where there are none; not with vote_mode seed
+    max_detection_errors: int = 2  # missed or spurious meetpoints; not with vote_mode seed
     use_edge_angles: bool = True  # as evidence; not with vote_mode seed
     tolerances: Tolerances = field(default_factory=Tolerances)
     segments: SegmentTest = field(default_factory=SegmentTest)
     least_explained: float = 0.6  # share of a scan that the map must explain from a candidate; where scans are judged
-    searches: int = 6  # begun anew where nothing fits any more, before LOST; where scans are judged
-    follow_places: int = 4  # where scans were made, that a followed pose must explain; 0: none is followed
-    follow_lead: float = 0.15  # share of the scans by which all other poses must be behind, in the mean
+    searches: int = 6  # before LOST: another one begins where nothing matches any more; where scans are judged
+    follow_places: int = 4  # places whose scans a followed pose must explain; 0: no pose is followed
+    follow_lead: float = 0.15  # by which the best followed pose must lead, in the mean share of the scans
 
     def __post_init__(self) -> None:
         if self.vote_mode not in VOTE_MODES:

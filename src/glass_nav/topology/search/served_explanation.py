@@ -1,4 +1,4 @@
-"""How the map would be seen that is served; there may be none yet, or another one later."""
+"""Explains scans by the map that is served: there may be none yet, and another one later."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from glass_nav.world.grid_map import GridMap
 
 
 class ServedExplanation:
-    """As ScanExplanation; without a map scans tell nothing."""
+    """As ScanExplanation; without a map scans are no evidence."""
 
     def __init__(self) -> None:
         self._explanation: Optional[ScanExplanation] = None
 
     def take(self, grid_map: GridMap) -> None:
-        """The map from now on."""
+        """Use this map from now on."""
         self._explanation = ScanExplanation(grid_map)
 
     @property
@@ -35,11 +35,11 @@ class ServedExplanation:
     def fitted(
         self, scan: Scan, map_from_base: np.ndarray, most_m: float, most_rad: float
     ) -> Tuple[np.ndarray, np.ndarray]:
-        """(C, 3) poses slid to where the scan fits best, and (C,) shares; as given and NaN without a map."""
+        """(C, 3) poses moved to where the scan fits best, and (C,) shares; as given and NaN without a map."""
         if self._explanation is None:
             return np.array(map_from_base, float), np.full(len(map_from_base), np.nan)
         return self._explanation.fitted(scan, map_from_base, most_m, most_rad)
 
     def places(self, scan: Scan, most: int) -> np.ndarray:
-        """(K, 3) poses where the scan may have been made; none without a map."""
+        """(K, 3) poses where the scan may have been taken; none without a map."""
         return np.zeros((0, 3)) if self._explanation is None else self._explanation.places(scan, most)

@@ -1,8 +1,8 @@
 """Candidates -> the turn to take.
 
-Seed document global_localization_procedure.txt, "Traversing the match edge": a vote taken from the current candidate
-list, for right or left. What a candidate votes for it does not say. Here (vote_mode seed) each votes for the side on
-which fewer of the others expect the same as it does; the majority wins, a tie goes right as in the document's example.
+Seed document global_localization_procedure.txt, "Traversing the match edge": the current candidates vote for right or
+left. The document does not say what a candidate votes for. Here (vote_mode seed) each votes for the side on which fewer
+of the others expect the same as it does; the majority wins, and a tie goes right as in the document's example.
 
 The default (vote_mode best) is the turn with the fewest expected survivors: each candidate may be the truth, and a turn
 leaves those that expect what the truth shows. C candidates, R ranks.
@@ -17,23 +17,23 @@ import numpy as np
 
 from glass_nav.topology.search.matching import Matcher
 
-_POLLED = 100  # candidates whose expectations are compared, each with each: 2 ms of a step
+_POLLED = 100  # candidates whose expectations are compared pairwise: 2 ms of a step
 _EQUAL = 1e-9  # survivors by which two turns differ only by rounding
 
 
 @dataclass(frozen=True)
 class Vote:
-    """What the candidates think of each turn."""
+    """The candidates' expectations of each turn."""
 
     ranks: np.ndarray  # (R,)
     survivors: np.ndarray  # (R,) expected number of candidates left
-    length_m: np.ndarray  # (R,) mean of the ways
+    length_m: np.ndarray  # (R,) mean length of the edges
     rank: int  # of the turn that won
     splits: bool  # some turn leaves fewer candidates than there are
 
 
 def best(matcher: Matcher, dart: np.ndarray) -> Vote:
-    """The turn with the fewest expected survivors, of those the shortest; back only where nothing else splits.
+    """The turn with the fewest expected survivors, and the shortest of several; back only if no other turn splits.
 
     Args:
         matcher: of the atlas.
@@ -57,7 +57,7 @@ def best(matcher: Matcher, dart: np.ndarray) -> Vote:
 
 
 def seed(matcher: Matcher, dart: np.ndarray) -> int:
-    """The document's majority for left (rank 1) or right (the last rank); 0 where the only way is back."""
+    """The document's majority for left (rank 1) or right (the last rank); 0 where the robot can only turn back."""
     degree = int(matcher.atlas.degree[matcher.atlas.darts.node[dart[0]]])
     if degree <= 2:
         return degree - 1

@@ -1,8 +1,8 @@
-"""Trials without a robot: a simulated one wakes up somewhere in an atlas, reports and drives as it is told.
+"""Trials without a building: a simulated robot wakes up somewhere in an atlas, reports, and drives as the search says.
 
-It knows no coordinates. It lives in what its sensors would show of the atlas (lengths, chords, equidistances, angles),
-and adds them up by dead reckoning, with errors of normal distribution; a detector that errs joins and splits edges. For
-a robot that is not in the atlas its parts are put together otherwise.
+It has no coordinates. It measures what its sensors would show of the atlas (lengths, chords, equidistances, angles) by
+dead reckoning, with normally distributed errors; a detector that fails joins and splits edges. For a robot outside the
+atlas, the parts of the atlas are shuffled.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.vocabulary import SearchState
 
 WRONG, UNDECIDED = "WRONG", "UNDECIDED"
-_SPURIOUS_DEAD_ENDS = 0.2  # of the meetpoints that are none: something stood in the way
+_SPURIOUS_DEAD_ENDS = 0.2  # share of the spurious meetpoints: something stood in the way
 
 
 @dataclass(frozen=True)
 class TrialParams:
     """A robot and its errors."""
 
-    noise: Tolerances = field(default_factory=Tolerances)  # standard deviations of what it measures
+    noise: Tolerances = field(default_factory=Tolerances)  # standard deviations of its measurements
     noise_gain: float = 1.0  # times that
-    noise_limit: float = math.inf  # standard deviations that an error has at most
-    missed: float = 0.0  # chance to drive past a meetpoint
-    spurious: float = 0.0  # chance of an edge to show a meetpoint where there is none
+    noise_limit: float = math.inf  # largest error, in standard deviations
+    missed: float = 0.0  # probability of driving past a meetpoint
+    spurious: float = 0.0  # probability of a spurious meetpoint on an edge
     angles: bool = True  # it measures directions, too
     max_edges: int = 100  # then it gives up
 
@@ -52,9 +52,9 @@ class TrialParams:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What there is to see; nodes, edges and darts as in the atlas."""
+    """What can be measured; nodes, edges and darts as in the atlas."""
 
-    atlas: Atlas  # for how things hang together
+    atlas: Atlas  # for its topology
     r_m: np.ndarray  # (N,)
     length_m: np.ndarray  # (E,)
     chord_m: np.ndarray  # (E,)
@@ -74,8 +74,8 @@ class Surroundings:
         gap = np.mod(darts.bearing_rad[first] - darts.bearing_rad, 2.0 * np.pi)
         return cls(atlas, atlas.nodes.r_m, atlas.edges.length_m, atlas.edges.chord_m, ahead, turn, gap)
 
-    def put_together_otherwise(self, rng: np.random.Generator) -> "Surroundings":
-        """The same nodes and edges, each in the place of another one, of the same degree."""
+    def shuffled(self, rng: np.random.Generator) -> "Surroundings":
+        """The same nodes and edges shuffled: each takes the place of another one, nodes of the same degree."""
         degree = self.atlas.degree
         node = np.arange(len(degree))
         for same in np.unique(degree):
@@ -98,12 +98,12 @@ class Surroundings:
 
 
 class AtlasRobot:
-    """A robot that follows edges; where it truly is: at the node of `dart`, which it came along, or on an edge."""
+    """A robot that follows edges; its true place is at the node of `dart`, along which it came, or on an edge."""
 
     def __init__(self, world: Surroundings, p: TrialParams, rng: np.random.Generator) -> None:
         self._world, self._p, self._rng = world, p, rng
         self.dart = 0  # reference dart at a node; on an edge the dart of the edge, as it was driven
-        self.on_edge = 0.0  # share of the edge behind it, 0 at a node
+        self.on_edge = 0.0  # share of the edge that it has driven, 0 at a node
         self.detection_errors = 0  # so far
 
     def wake_up(self, dart: Optional[int] = None) -> Meetpoint:
@@ -115,8 +115,8 @@ class AtlasRobot:
     def drive(self, rank: int) -> Tuple[Traversal, Meetpoint]:
         """Leave by an edge and follow it to what looks like the next meetpoint."""
         world = self._world
-        here, length = np.zeros(3), 0.0  # pose where it left, x along the way
-        if self.on_edge:  # every edge that is none leads on
+        here, length = np.zeros(3), 0.0  # pose where it left, x along the edge
+        if self.on_edge:  # at a spurious meetpoint every edge but the one back leads on
             along, begun = self.dart, self.on_edge
             if rank == 0:
                 along, begun = self.dart ^ 1, 1.0 - self.on_edge
@@ -181,7 +181,7 @@ class AtlasRobot:
         return self._reported(degree, float(self._world.r_m[node]), gap)
 
     def _nothing_there(self) -> Meetpoint:
-        """What it takes for a meetpoint: the way on, and something to the left or to the right of it."""
+        """A spurious meetpoint: the edge ahead, and a branch to the left or to the right."""
         r = float(self._rng.choice(self._world.r_m))
         if self._rng.random() < _SPURIOUS_DEAD_ENDS:
             return self._reported(1, r, np.zeros(1))
@@ -203,7 +203,7 @@ class Trial:
     outcome: str  # CONFIRMED, AMBIGUOUS, LOST, WRONG or UNDECIDED
     edges: int  # driven
     detection_errors: int  # that the robot's detector made
-    truth_lost_at: Optional[int]  # depth at which the true dart was no candidate any more; None: never, or no truth
+    truth_lost_at: Optional[int]  # depth from which on the true dart was no candidate; None: never, or no truth
     step_ms: List[float]  # CPU time of each step
     estimate: SearchEstimate  # the last
 
@@ -248,7 +248,7 @@ def _search(
 def trials(
     atlas: Atlas, params: SearchParams, p: TrialParams, count: int, seed: int, elsewhere: bool = False
 ) -> Iterator[Trial]:
-    """So many robots, each with random numbers of its own: trial k is the same whatever the others do.
+    """A number of robots, each with its own random numbers: trial k does not depend on the others.
 
     Args:
         atlas: that they are given.
@@ -256,12 +256,12 @@ def trials(
         p: of the robots.
         count: of trials.
         seed: of the random numbers.
-        elsewhere: the robots are not in the atlas, but in other surroundings of the same kind, each in its own.
+        elsewhere: the robots are not in the atlas, but each in a shuffled one.
     """
     localizer, world = AtlasLocalizer(atlas, params), Surroundings.of(atlas)
     for number in range(count):
         rng = np.random.default_rng([seed, number])
-        yield run(localizer, world.put_together_otherwise(rng) if elsewhere else world, p, rng, not elsewhere)
+        yield run(localizer, world.shuffled(rng) if elsewhere else world, p, rng, not elsewhere)
 
 
 def metrics(done: List[Trial]) -> Dict[str, float]:

@@ -22,7 +22,7 @@ from glass_nav.evaluation.metrics.passed_nodes import (
     TopologyScore,
 )
 from glass_nav.evaluation.plots import passed_nodes_picture
-from glass_nav.evaluation.plots.run_pictures import MapImage
+from glass_nav.world.grid_map import GridMap
 
 PASSING = Passing(lambda r_m: np.full(np.shape(r_m), 0.5), 1.0, lambda from_m, to_m: True)
 KNOWN = KnownNodes(
@@ -173,7 +173,7 @@ def test_the_picture_shows_each_verdict_in_its_colour(tmp_path):
     from matplotlib import image
 
     path = tmp_path / "topology.png"
-    grid = MapImage(np.zeros((40, 160), np.int8), 0.1, np.array([-3.0, -2.0, 0.0]))
+    grid = GridMap(np.zeros((40, 160), np.int8), 0.1, np.array([-3.0, -2.0, 0.0]))
     passed_nodes_picture.draw(
         path, grid, [KNOWN.position_m[[0, 1]]], along(WAY_M)[:, :2], score([seen(0.3, degree=4), seen(7.5)]), "a drive"
     )
@@ -187,7 +187,7 @@ def test_a_drive_without_poses_is_drawn_over_the_whole_atlas(tmp_path):
     nowhere = np.full((3, 2), math.nan)
     passed_nodes_picture.draw(
         tmp_path / "topology.png",
-        MapImage(np.zeros((40, 160), np.int8), 0.1, np.array([-3.0, -2.0, 0.0])),
+        GridMap(np.zeros((40, 160), np.int8), 0.1, np.array([-3.0, -2.0, 0.0])),
         [],
         nowhere,
         TopologyScore(KNOWN, [], [], []),

@@ -10,7 +10,8 @@ from made_results import GRID, a_result
 from glass_nav.evaluation.metrics import case_scores, replay_result
 from glass_nav.evaluation.metrics.replay_result import NO_BEAM, BeamExample, ReplayResult
 from glass_nav.evaluation.plots import run_pictures
-from glass_nav.evaluation.plots.run_pictures import MapImage
+from glass_nav.vocabulary import BeamCase
+from glass_nav.world.grid_map import GridMap
 
 
 def test_the_metrics_have_the_promised_names_and_values():
@@ -117,7 +118,7 @@ def test_the_wall_in_the_picture_is_where_the_map_has_it(tmp_path):
 
     occupancy = np.zeros((100, 100), np.int8)
     occupancy[70:73, :] = 100  # y = 2.0 .. 2.3 m
-    flat = MapImage(occupancy, 0.1, np.array([-5.0, -5.0, 0.0]))
+    flat = GridMap(occupancy, 0.1, np.array([-5.0, -5.0, 0.0]))
     way = np.array([[x, 0.0, 0.0] for x in (-3.0, -1.0, 1.0, 3.0)])
     run_pictures.draw_trajectory(tmp_path / "way.png", flat, a_result(map_from_base=way, reference=None), "a log")
     with Image.open(tmp_path / "way.png") as image:
@@ -163,7 +164,7 @@ def test_beams_have_the_colours_of_their_true_and_of_their_told_cases(tmp_path):
         wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
         return np.nonzero((np.abs(pixels - wanted).max(axis=2) < 3).any(axis=1))[0]
 
-    true, told = rows_of(run_pictures.CASE_COLOURS[4]), rows_of(run_pictures.CASE_COLOURS[2])
+    true, told = rows_of(BeamCase(4).colour), rows_of(BeamCase(2).colour)
     assert len(true)
     assert len(told)
     assert true.max() < told.min()  # the truth above

@@ -11,8 +11,10 @@ from glass_nav.evaluation.metrics import replay_result, run_story
 from glass_nav.evaluation.metrics.replay_result import NO_BEAM, KeptScan
 from glass_nav.evaluation.pages import report_page
 from glass_nav.evaluation.plots import report_pictures
-from glass_nav.evaluation.plots.report_pictures import Ground
-from glass_nav.evaluation.plots.run_pictures import CASE_COLOURS, MapImage
+from glass_nav.evaluation.plots.report import cases_over_time, driven_path, reliability
+from glass_nav.evaluation.plots.report.ground import Ground
+from glass_nav.vocabulary import BeamCase
+from glass_nav.world.grid_map import GridMap
 
 KEPT = [
     KeptScan(1, np.array([0.1, 0.0, 0.0]), np.array([[2.0, 0.0], [np.nan, np.nan]])),
@@ -75,7 +77,7 @@ def test_one_scan_is_a_run_too(tmp_path):
 
 
 def test_the_ribbon_holds_the_share_of_each_case_at_each_time():
-    edges, share = report_pictures.case_shares(a_result())
+    edges, share = cases_over_time.case_shares(a_result())
     np.testing.assert_allclose(edges[:4], [0.0, 1.0, 2.0, 3.0])
     np.testing.assert_allclose(share, [[0, 1, 0, 0, 0], [0.5, 0, 0, 0.5, 0], [0, 0.5, 0.5, 0, 0], [0, 1, 0, 0, 0]])
 
@@ -86,7 +88,7 @@ def test_a_long_run_has_pieces_that_hold_all_of_its_beams():
     result = a_result()
     cases = rng.integers(0, 5, (scans, 7)).astype(np.uint8)
     long = replace(result, stamps_ns=10**9 * np.arange(scans), cases=cases)
-    edges, share = report_pictures.case_shares(long)
+    edges, share = cases_over_time.case_shares(long)
     assert len(edges) == len(share) + 1 == 401
     assert (np.diff(edges) > 0).all()
     seconds = np.arange(scans)
@@ -97,7 +99,7 @@ def test_a_long_run_has_pieces_that_hold_all_of_its_beams():
 def test_a_class_of_reliability_tells_how_often_it_was_right():
     told = np.array([0.05, 0.95, 0.96, 0.99, 1.0, 0.55, 0.51])
     right = np.array([False, True, True, True, False, True, False])
-    middle, share, counts = report_pictures.calibration(told, right)
+    middle, share, counts = reliability.calibration(told, right)
     np.testing.assert_allclose(middle, [0.05, 0.55, 0.95])
     np.testing.assert_allclose(share, [0.0, 0.5, 0.75])
     np.testing.assert_array_equal(counts, [1, 2, 4])
@@ -106,14 +108,14 @@ def test_a_class_of_reliability_tells_how_often_it_was_right():
 def test_places_that_were_only_candidates_do_not_widen_the_picture():
     poses = np.array([[900.0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]])
     result = a_result(map_from_base=poses, reference=None, states=["GLOBAL_SEARCH"] + ["LOCALIZED"] * 3)
-    low, high = report_pictures.bounds(result)
+    low, high = driven_path.bounds(result)
     assert (low <= [1 - 3.0, -3.0]).all() and (high >= [3 + 3.0, 3.0]).all()
     assert high[0] < 20.0
 
 
 def test_a_bad_scan_is_shown_where_it_was_thought_to_be_and_where_it_was(tmp_path):
     """A beam of case 4 that ends 2 m ahead: left at the estimate, right at the truth, a metre lower in the map."""
-    empty = MapImage(np.zeros((100, 100), np.int8), 0.1, np.array([-5.0, -5.0, 0.0]))
+    empty = GridMap(np.zeros((100, 100), np.int8), 0.1, np.array([-5.0, -5.0, 0.0]))
     result = a_result(
         cases=np.full((4, 1), 4, np.uint8),
         worst=[KeptScan(1, np.zeros(3), np.array([[2.0, 0.0]]))],
@@ -123,7 +125,7 @@ def test_a_bad_scan_is_shown_where_it_was_thought_to_be_and_where_it_was(tmp_pat
     assert "2 m" not in picture.title and picture.title.startswith("1. At 1.0 s: 1.00 m and 0.0° off")
     with Image.open(picture.path) as image:
         pixels = np.asarray(image.convert("RGB")).astype(int)
-    wanted = [int(CASE_COLOURS[4][i : i + 2], 16) for i in (1, 3, 5)]
+    wanted = [int(BeamCase(4).colour[i : i + 2], 16) for i in (1, 3, 5)]
     rows, columns = np.nonzero(np.abs(pixels - wanted).max(axis=2) < 3)
     left = columns < pixels.shape[1] / 2
     assert left.any() and (~left).any()

@@ -5,14 +5,14 @@ import pytest
 from PIL import Image
 
 from glass_nav.evaluation.plots import wake_up_picture
-from glass_nav.evaluation.plots.run_pictures import MapImage
 from glass_nav.evaluation.plots.wake_up_picture import CANDIDATE_COLOUR, SEARCH_COLOUR, TOUR_COLOUR, Depth, WakeUpStory
+from glass_nav.world.grid_map import GridMap
 
 
 def grid():
     cells = np.zeros((100, 240), np.int8)
     cells[[0, -1]] = cells[:, [0, -1]] = 100
-    return MapImage(cells, 0.05, np.zeros(3))
+    return GridMap(cells, 0.05, np.zeros(3))
 
 
 def story(depths):

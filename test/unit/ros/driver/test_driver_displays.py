@@ -56,7 +56,7 @@ def test_graph_and_meetpoint_are_shown_where_they_are_and_the_route_in_the_map()
             frame = simulation.look()
             driver.see(frame.scan, frame.odom_from_base)
         last = task.step(Moment(simulation.reading.odom_from_base, None, last, 0.05))
-        if task.outcome is not None:
+        if task.ending is not None:
             break
         simulation.move(0.05, last)
     here = simulation.reading.odom_from_base

@@ -5,12 +5,15 @@ import math
 import numpy as np
 import pytest
 
+from glass_nav.driving.decisions import Action, DriveStatus, GoalEnd
 from glass_nav.driving.edge_driver import Arrival
-from glass_nav.msg import DriverStatus
+from glass_nav.driving.tasks import Ending
+from glass_nav.msg import DriverStatus, GotoNodeGoal, TopologyStatus
 from glass_nav.msg import Meetpoint as MeetpointMsg
 from glass_nav.ros.driver import driver_messages
 from glass_nav.ros.topology import topology_messages
-from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
+from glass_nav.topology.observations import Meetpoint, Traversal
+from glass_nav.vocabulary import DriverPhase, Outcome, SearchState
 
 MEETPOINT = Meetpoint(3, 1.5, 0.04, np.array([3.0, 1.5, -1.5]), np.array([0.05, -0.02]), 7_000_000_001)
 TRAVERSAL = Traversal(2, 4.2, 4.0, 0.1, 0.2, 0.3, -0.4, np.array([[0.0, 1.0, 2.0, 1.0]]))
@@ -51,50 +54,55 @@ def test_directions_that_were_not_measured_are_not_told():
     assert driver_messages.traversal_msg(arrival(None), "base_link") is None
 
 
-@pytest.mark.parametrize(
-    "words, degree, rank",
-    [
-        ("LEFT", 3, 1),
-        ("RIGHT", 3, 2),
-        ("RIGHT", 5, 4),
-        ("U_TURN", 3, 0),
-        ("U_TURN", 1, 0),
-        ("FORWARD", 2, 1),
-        ("LEFT", 2, 1),
-        ("RIGHT", 2, 1),
-        ("RANK_2", 4, 2),
-        ("3", 4, 3),
-        (" left ", 3, 1),
-        ("0", 1, 0),
-    ],
-)
-def test_an_edge_is_called_by_its_name_or_rank(words, degree, rank):
-    assert driver_messages.rank_from_words(words, degree) == rank
-
-
-@pytest.mark.parametrize(
-    "words, degree, text",
-    [
-        ("AHEAD", 3, "edge must be LEFT, RIGHT, U_TURN, FORWARD, or a rank such as RANK_2 or 2, got 'AHEAD'"),
-        ("FORWARD", 3, "edge FORWARD: the meetpoint has degree 3, FORWARD is the only way on of degree 2"),
-        ("LEFT", 1, "edge LEFT: from a dead end only U_TURN leads away"),
-        ("-1", 3, "edge must be LEFT, RIGHT, U_TURN, FORWARD, or a rank such as RANK_2 or 2, got '-1'"),
-        ("RANK_3", 3, "turn of rank 3: the meetpoint it left has degree 3, allowed 0 to 2"),
-    ],
-)
-def test_what_names_no_edge_is_refused(words, degree, text):
-    with pytest.raises(ObservationError, match=f"^{text}$"):
-        driver_messages.rank_from_words(words, degree)
-
-
-def test_a_state_is_told_by_its_name():
-    msg = driver_messages.status_msg("RECOVERING", "waits", "goto_node 3", 1.5, math.nan, 5, "base_link")
+def test_a_status_has_the_constant_of_its_phase():
+    status = DriveStatus(DriverPhase.RECOVERING, "waits", "goto_node 3", 1.5, math.nan, 5)
+    msg = driver_messages.status_msg(status, "base_link")
     assert (msg.state, msg.state_name, msg.task, msg.travelled) == (
         DriverStatus.RECOVERING,
         "RECOVERING",
         "goto_node 3",
         1.5,
     )
+
+
+@pytest.mark.parametrize("phase", list(DriverPhase))
+def test_the_message_has_a_constant_for_every_phase(phase):
+    assert driver_messages.status_msg(DriveStatus(phase, ""), "base_link").state == phase.code
+
+
+@pytest.mark.parametrize("outcome", list(Outcome))
+def test_both_actions_have_a_code_for_every_outcome(outcome):
+    end = GoalEnd(Action.GOTO_NODE, Ending(outcome, "why"), 2.0, arrival(), np.array([1.0, 2.0, 0.0]), 5)
+    place, edge = driver_messages.place_result(end, "map"), driver_messages.edge_result(end, "base_link")
+    assert place.code == edge.code == outcome.code
+    assert place.reason == edge.reason == "why" and place.travelled == edge.travelled == 2.0
+    assert place.pose.pose.position.y == 2.0 and place.pose.header.frame_id == "map"
+    assert edge.has_traversal and edge.traversal.rank == 2 and edge.meetpoint.degree == 3
+
+
+def test_a_result_says_where_no_edge_led_there():
+    sought = GoalEnd(Action.TRAVERSE_EDGE, Ending(Outcome.SUCCEEDED, ""), arrival=arrival(None))
+    result = driver_messages.edge_result(sought, "base_link")
+    assert result.meetpoint.degree == 3 and not result.has_traversal
+
+
+def test_a_goal_without_a_pose_goes_with_its_fault():
+    goal = driver_messages.place_goal(GotoNodeGoal(node=4))
+    assert goal.node == 4 and goal.pose is None and "quaternion" in goal.pose_fault
+    msg = GotoNodeGoal(node=-1, pose=driver_messages.pose_stamped(np.array([1.0, 2.0, 0.5]), 5, "map"))
+    goal = driver_messages.place_goal(msg)
+    np.testing.assert_allclose(goal.pose, [1.0, 2.0, 0.5])
+    assert goal.frame == "map" and not goal.with_heading
+
+
+@pytest.mark.parametrize("state", list(SearchState))
+def test_a_search_state_is_that_of_the_constant(state):
+    assert driver_messages.search_state(TopologyStatus(state=getattr(TopologyStatus, state.name))) == state
+
+
+def test_a_search_state_that_there_is_not_is_rejected():
+    with pytest.raises(ValueError, match="^topology_status: state must be 0 to 7, got 9$"):
+        driver_messages.search_state(TopologyStatus(state=9))
 
 
 def test_a_pose_that_is_not_known_is_an_empty_one():

@@ -20,7 +20,12 @@ def test_the_file_of_parameters_names_them_all_with_their_defaults():
 
 def test_the_radius_of_the_robot_is_that_of_base_graph_and_map():
     p = params.load(DriverParams, {"robot_radius_m": 0.3}, "/driver")
-    assert p.edge.limits.robot_radius_m == p.edge.graph.robot_radius_m == p.edge.local_map.robot_radius_m == 0.3
+    assert (
+        p.drive.edge.limits.robot_radius_m
+        == p.drive.edge.graph.robot_radius_m
+        == p.drive.edge.local_map.robot_radius_m
+        == 0.3
+    )
 
 
 @pytest.mark.parametrize(

@@ -13,9 +13,9 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from glass_nav.localization.beam_classification.case_votes import BeamCases
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
-from glass_nav.ros.conversions import STATES
 from glass_nav.ros.localization import beam_displays
 from glass_nav.sensing.scan import Scan
+from glass_nav.vocabulary import BeamCase, LocalizationState
 
 HEIGHT_M = 0.4
 
@@ -63,7 +63,7 @@ def test_the_beam_cloud_holds_the_answers_with_colour_and_case():
     assert columns["range"].tolist() == [1.0, 2.0]
     assert columns["weight"] == pytest.approx([0.1, 0.9])
     colour = int(np.ascontiguousarray(columns["rgb"]).view("<u4")[1])
-    assert (colour >> 16, colour >> 8 & 255, colour & 255) == tuple(beam_displays.CASE_COLOURS[4])
+    assert (colour >> 16, colour >> 8 & 255, colour & 255) == BeamCase(4).rgb
 
 
 def test_a_scan_without_answers_is_an_empty_cloud():
@@ -75,14 +75,20 @@ def test_a_scan_without_answers_is_an_empty_cloud():
 def test_each_case_has_a_namespace_with_the_ends_of_its_beams():
     scan, cases, surface = beams([1, 3, 4, 1], [1.0, 2.0, 3.0, 4.0], [np.nan, 0.5, 1.5, np.nan])
     markers = received(beam_displays.beam_markers(scan, cases, surface, HEIGHT_M, "base_link"))
-    assert sorted(markers) == ["0 uncertain", "1 diffuse", "2 mirrored", "3 behind one pane", "4 behind two panes"]
+    assert sorted(markers) == [
+        "0 uncertain",
+        "1 first surface",
+        "2 mirrored",
+        "3 behind one pane",
+        "4 behind two panes",
+    ]
     ends = {name: both[1] for name, both in markers.items()}
-    assert points(ends["1 diffuse"]) == pytest.approx(np.array([[0.2, 1.0, 0.4], [4.2, 0.0, 0.4]]))
+    assert points(ends["1 first surface"]) == pytest.approx(np.array([[0.2, 1.0, 0.4], [4.2, 0.0, 0.4]]))
     assert points(ends["3 behind one pane"]) == pytest.approx(np.array([[-1.8, 0.0, 0.4]]))
     assert points(ends["4 behind two panes"]) == pytest.approx(np.array([[0.2, -3.0, 0.4]]))
-    for case, name in enumerate(beam_displays.CASE_NAMES):
-        colour = np.array([ends[name].color.r, ends[name].color.g, ends[name].color.b])
-        assert colour * 255 == pytest.approx(beam_displays.CASE_COLOURS[case], abs=1e-3)
+    for case in BeamCase:
+        end = ends[case.label]
+        assert np.array([end.color.r, end.color.g, end.color.b]) * 255 == pytest.approx(case.rgb, abs=1e-3)
 
 
 def test_a_beam_that_was_cut_has_a_line_from_the_surface_to_its_end():
@@ -150,7 +156,7 @@ def test_the_markers_of_541_beams_take_no_3_ms():
     assert min(seconds) < 0.003
 
 
-@pytest.mark.parametrize("state", sorted(STATES))
+@pytest.mark.parametrize("state", sorted(LocalizationState))
 def test_every_state_has_words_above_the_robot(state):
     marker = beam_displays.status_marker(np.array([3.0, 4.0, 1.0]), "map", state, "the reason", 0.87)
     assert (marker.ns, marker.type, marker.header.frame_id) == ("status", Marker.TEXT_VIEW_FACING, "map")

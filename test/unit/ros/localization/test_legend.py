@@ -7,7 +7,8 @@ from io import BytesIO
 import numpy as np
 from sensor_msgs.msg import Image
 
-from glass_nav.ros.localization import beam_displays, legend, wall_display
+from glass_nav.ros.localization import legend, wall_display
+from glass_nav.vocabulary import CASES_IN_ORDER
 
 
 def rows_with(pixels: np.ndarray, colour) -> np.ndarray:
@@ -27,20 +28,13 @@ def test_the_message_is_an_image_of_its_size():
 def test_each_case_has_a_row_with_its_colour_and_words():
     pixels = legend.draw()
     tops = []
-    for case in legend.CASE_WORDS:
-        rows = rows_with(pixels, beam_displays.CASE_COLOURS[case])
+    for case in CASES_IN_ORDER:
+        rows = rows_with(pixels, case.rgb)
         assert len(rows) >= 16 and np.ptp(rows) == len(rows) - 1, f"case {case}"
         ink = (pixels[rows] == legend.INK).all(axis=2).sum()
         assert ink > 300, f"case {case} has no words"
         tops.append(rows[0])
     assert tops == sorted(tops)
-
-
-def test_words_begin_with_the_number_and_the_name_beside_the_checkbox():
-    for case, words in legend.CASE_WORDS.items():
-        number, name = beam_displays.CASE_NAMES[case].split(" ", 1)
-        assert words.startswith(f"{number} {name.split()[0]}")
-    assert sorted(legend.CASE_WORDS) == [0, 1, 2, 3, 4]
 
 
 def test_no_word_is_cut_off_at_the_edge():
@@ -60,6 +54,6 @@ def test_each_kind_of_wall_has_a_row_with_its_colour_and_name():
 
 
 def test_no_two_colours_are_alike():
-    colours = np.concatenate([beam_displays.CASE_COLOURS.astype(int), wall_display.WALL_COLOURS])
+    colours = np.concatenate([[case.rgb for case in CASES_IN_ORDER], wall_display.WALL_COLOURS])
     apart = np.abs(colours[:, None] - colours).sum(axis=2)
     assert apart[~np.eye(len(colours), dtype=bool)].min() > 80

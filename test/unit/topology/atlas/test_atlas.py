@@ -175,7 +175,7 @@ def no_edges(atlas: Atlas) -> Atlas:
         (changed("edges", "clearance_m", put(0, np.nan)), "edge 0: the clearance must be finite and >= 0 m, got nan"),
         (
             changed("edges", "chord_m", put(1, 4.1)),
-            "edge 1: the chord may not be longer than the way, got chord 4.1 m and length 4 m",
+            "edge 1: the chord must not be longer than the edge, got chord 4.1 m and length 4 m",
         ),
         (changed("edges", "polyline_m", Ragged.empty(3, 2)), "the polylines of edges need 4 rows, got 3"),
         (

@@ -141,7 +141,7 @@ BEYOND_SCHEMA = [
     (set_("nodes", 2, "darts", [4]), "node 0: dart 4 is listed 2 times, each is once in one ring"),
     (set_("nodes", 2, "darts", [9]), "node 2: there is no dart 9, allowed 0 to 7"),
     (set_("nodes", 0, "kind", "ring_marker"), "node 0: a ring_marker has degree 2, got 3"),
-    (set_("edges", 1, "chord", 12), "edge 1: the chord may not be longer than the way, got chord 12 m and length"),
+    (set_("edges", 1, "chord", 12), "edge 1: the chord must not be longer than the edge, got chord 12 m and length"),
     (set_("edges", 0, "polyline", [[0, 0], [6, 0]]), "edge 0: its line ends 2.00 m from node 1, allowed 0.5 m"),
 ]
 
@@ -179,7 +179,7 @@ def test_the_schema_takes_what_the_loader_takes_and_refuses_what_it_can() -> Non
 
 @pytest.mark.parametrize(
     "text, line",
-    [("{", "is no JSON: Expecting"), ("[]", "must be an object with format, version"), ("\x00", "is no JSON")],
+    [("{", "is not JSON: Expecting"), ("[]", "must be an object with format, version"), ("\x00", "is not JSON")],
 )
 def test_what_is_no_json_is_refused(text: str, line: str, tmp_path: Path) -> None:
     path = tmp_path / "atlas.json"

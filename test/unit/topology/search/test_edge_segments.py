@@ -85,8 +85,8 @@ def test_many_walls_are_compared_in_larger_pieces():
 
 def test_little_in_the_way_is_furniture_whatever_its_share():
     test = SegmentTest(segments_max_contradiction=0.4)
-    assert edge_segments.fits(0.9, 0.9, test) and edge_segments.fits(0.4, 5.0, test)
-    assert not edge_segments.fits(0.41, 1.0, test)
+    assert edge_segments.matches(0.9, 0.9, test) and edge_segments.matches(0.4, 5.0, test)
+    assert not edge_segments.matches(0.41, 1.0, test)
 
 
 @pytest.mark.parametrize("value", [0.0, 1.1, float("nan")])
@@ -162,8 +162,8 @@ def test_the_own_walls_of_an_edge_never_rule_it_out(name):
         off = np.append(rng.normal(0.0, 0.1, 2), rng.normal(0.0, 0.07))
         start = se2.compose(off, se2.inverse(atlas.map_from_dart(np.array(dart))))
         seen = Traversal(0, 5.0, 5.0, segments_m=se2.transform_points(start, rows.reshape(-1, 2)).reshape(-1, 4))
-        assert edge_segments.fits(*matcher.contradiction(dart, seen), SegmentTest())
-        others += not edge_segments.fits(
+        assert edge_segments.matches(*matcher.contradiction(dart, seen), SegmentTest())
+        others += not edge_segments.matches(
             *matcher.contradiction(int(rng.integers(len(atlas.darts))), seen),
             SegmentTest(segments_max_contradiction=0.4),
         )

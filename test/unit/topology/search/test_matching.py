@@ -61,7 +61,7 @@ def test_lengths_and_chords_fit_within_their_tolerance(off: float) -> None:
     chord = math.sqrt(18.0)
     assert len(matcher.edges_along(dart, Traversal(0, 5.0 + off * limit, chord, sigma, sigma))) == fits
     assert len(matcher.edges_along(dart, Traversal(0, 5.0, chord + off * limit, sigma, sigma))) == fits
-    joined = matcher.ways_along(
+    joined = matcher.paths_along(
         dart,
         dart ^ 1,
         np.full(2, 5.0),

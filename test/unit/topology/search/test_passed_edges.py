@@ -29,10 +29,10 @@ def test_an_edge_counts_at_both_of_its_ends_to_and_fro() -> None:
     passed.begin(at(0.0, 0.0, WEST, [NORTH, EAST]))
     assert times(passed, at(0.0, 0.0, WEST, [NORTH, EAST])) == [0, 0, 0]
     east = at(5.0, 0.0, WEST, [EAST])
-    passed.way(2, east, 5.0)
+    passed.add(2, east, 5.0)
     assert times(passed, east) == [1, 0]
     back = at(0.1, -0.1, EAST, [WEST, NORTH], yaw=2.0)  # a little off, and looking elsewhere
-    passed.way(0, back, 5.0)
+    passed.add(0, back, 5.0)
     assert times(passed, back) == [2, 0, 0]
     assert times(passed, east) == [2, 0]
     passed.begin(back)
@@ -42,7 +42,7 @@ def test_an_edge_counts_at_both_of_its_ends_to_and_fro() -> None:
 def test_without_odometry_or_directions_nothing_is_known() -> None:
     passed = PassedEdges()
     passed.begin(Meetpoint(2, 1.0))
-    passed.way(1, Meetpoint(2, 1.0, odom_from_base=np.zeros(3)), 3.0)
+    passed.add(1, Meetpoint(2, 1.0, odom_from_base=np.zeros(3)), 3.0)
     assert passed.times(Meetpoint(2, 1.0)) is None
     assert passed.times(Meetpoint(2, 1.0, odom_from_base=np.zeros(3))) is None
     assert times(passed, at(0.0, 0.0, WEST, [EAST])) == [0, 0]
@@ -70,5 +70,5 @@ def test_leaving_by_the_edge_passed_least_comes_along_every_edge() -> None:
         streets[street] = streets.get(street, 0) + 1
         x, y = x + dx, y + dy
         here, ways = meetpoint(x, y, list(directions)[(list(directions).index(ways[rank]) + 2) % 4])
-        passed.way(rank, here, 5.0)
+        passed.add(rank, here, 5.0)
     assert len(streets) == 2 * size * (size - 1)

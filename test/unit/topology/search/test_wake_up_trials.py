@@ -73,10 +73,10 @@ def test_an_edge_that_is_split_adds_up_to_itself() -> None:
                 way = -way
 
 
-def test_surroundings_put_together_otherwise_have_the_same_parts() -> None:
+def test_shuffled_surroundings_have_the_same_parts() -> None:
     atlas = made_atlases.voronoi(200, 1)
     here = Surroundings.of(atlas)
-    there = here.put_together_otherwise(np.random.default_rng(0))
+    there = here.shuffled(np.random.default_rng(0))
     for name in ("r_m", "length_m", "chord_m", "chord_bearing_rad", "turn_rad"):
         one, other = getattr(here, name), getattr(there, name)
         np.testing.assert_array_equal(np.sort(one), np.sort(other))

@@ -81,7 +81,7 @@ def _distance_of_walls(occupied: np.ndarray, rows: np.ndarray, columns: np.ndarr
 
 
 def _posts(points: np.ndarray, blob: np.ndarray, gap: float, smallest: float) -> np.ndarray:
-    """(G,) bool: belongs to a thing smaller than that along both axes, further than the gap from everything else.
+    """(G,) bool: belongs to a thing smaller than that along both axes, and further than the gap from all others.
 
     Points (G, 2) of one blob of cells are one thing, and so are those that the robot cannot pass between.
     """

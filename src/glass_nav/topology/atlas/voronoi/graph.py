@@ -22,12 +22,12 @@ POINT_CELLS = 1.0  # distance of the points of a line
 
 @dataclass(frozen=True)
 class VoronoiGraph:
-    """Nodes and edges in the frame of the map. Nodes are of degree 1, 3 or more, but for one on each plain ring."""
+    """Nodes and edges in the frame of the map. Nodes have degree 1, 3 or more, except one on each plain ring."""
 
     position_m: np.ndarray  # (N, 2)
     r_m: np.ndarray  # (N,) mean distance of the obstacles that it is equidistant from
-    spread_m: np.ndarray  # (N,) how far the meetpoints lay apart that were made one; 0 for most
-    doubt_m: np.ndarray  # (N,) how far the most doubtful of these obstacles is from a wall, at most r
+    spread_m: np.ndarray  # (N,) spread of the meetpoints that were merged; 0 for most
+    doubt_m: np.ndarray  # (N,) distance of the most doubtful of these obstacles from a wall, at most r
     obstacles_m: List[np.ndarray]  # (N) arrays (k, 2): the obstacles' nearest cells
     edge_node: np.ndarray  # (E, 2) int: nodes that each edge joins
     lines_m: List[np.ndarray]  # (E) arrays (n, 2) from the one to the other, n >= 2
@@ -83,7 +83,7 @@ def in_map(grid_map: GridMap, bounds: Bounds, ridges: Ridges, meetpoints: Meetpo
 
 
 def _edge(ends: List[int], line: np.ndarray) -> Tuple[List[int], np.ndarray]:
-    """An edge from its lower node to its higher one, a loop to the side that comes first in order."""
+    """An edge from its lower node to its higher one; a loop in the direction that comes first in order."""
     third = len(line) // 3
     if ends[0] > ends[1] or ends[0] == ends[1] and _order(line[third]) > _order(line[-1 - third]):
         return ends[::-1], line[::-1]
@@ -91,12 +91,12 @@ def _edge(ends: List[int], line: np.ndarray) -> Tuple[List[int], np.ndarray]:
 
 
 def _order(point: np.ndarray) -> Tuple[float, float]:
-    """By x, then y, to a hundredth of a cell: other versions of the mesh round otherwise."""
+    """By x, then y, to a hundredth of a cell: other versions of the mesh round differently."""
     return round(float(point[0]), 2), round(float(point[1]), 2)
 
 
 def _smooth(line: np.ndarray) -> np.ndarray:
-    """A line (n, 2) without the steps of the cells: even points, moved by a cell at most, ends by none."""
+    """A line (n, 2) without the steps of the cells: equidistant points, moved by a cell at most; the ends stay."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     count = max(int(np.ceil(along[-1] / POINT_CELLS)), 1)
     at = np.linspace(0.0, along[-1], count + 1)

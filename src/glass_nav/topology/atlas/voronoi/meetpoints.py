@@ -1,4 +1,4 @@
-"""Chains -> meetpoints: those that no lidar can tell apart are one, and small parts are left out."""
+"""Chains -> meetpoints: those that no lidar can tell apart are merged, and small parts are left out."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from glass_nav.topology.atlas.voronoi.ridges import Ridges
 
 
 class Meetpoints:
-    """Nodes and lines between them; merge() makes nodes one that are too close to tell apart."""
+    """Nodes and lines between them; merge() joins nodes that are too close to tell apart."""
 
     def __init__(self, bounds: Bounds, ridges: Ridges, chains: Sequence[np.ndarray]) -> None:
         self.lines = [ridges.points[chain] for chain in chains]
@@ -31,10 +31,10 @@ class Meetpoints:
         self.edges = set(range(len(self.lines)))
 
     def merge(self, least: float, tolerance: float) -> None:
-        """Contract edges that no robot can tell from a point, the shortest first; the others at their ends grow."""
+        """Contract edges that no robot can tell from a point, the shortest first; their neighbours grow."""
 
         def further(node: int, other: int) -> float:
-            """By how much are the obstacles of the other node further away from this one than its own."""
+            """By how much the obstacles of the other node are further away from this one than its own."""
             away = np.hypot(*(self._obstacles[other] - self.position[node]).T)
             return float(away.max()) - self._r[node]
 
@@ -54,7 +54,7 @@ class Meetpoints:
                         heapq.heappush(short, (self._length[changed], changed))
 
     def drop_small(self, least: float) -> int:
-        """Leave out parts with less way in them, or none; returns how many there were."""
+        """Leave out parts with a smaller total length, or none; returns their number."""
         edges = sorted(self.edges)
         number = {node: index for index, node in enumerate(self.members)}
         count, part = components.connected(
@@ -63,8 +63,8 @@ class Meetpoints:
             np.array([number[self.ends[edge][1]] for edge in edges], int),
         )
         of_edge = np.array([part[number[self.ends[edge][0]]] for edge in edges], int)
-        way = np.bincount(of_edge, [self._length[edge] for edge in edges], minlength=count)
-        small = (way < least) | (way == 0.0)
+        length = np.bincount(of_edge, [self._length[edge] for edge in edges], minlength=count)
+        small = (length < least) | (length == 0.0)
         self.edges -= {edge for edge, its in zip(edges, of_edge.tolist()) if small[its]}
         self.members = {node: members for node, members in self.members.items() if not small[part[number[node]]]}
         return int(small.sum())
@@ -94,7 +94,7 @@ class Meetpoints:
         return sorted(set(self._at[kept]))
 
     def _move_end(self, edge: int, node: int, centre: np.ndarray) -> None:
-        """Let the line of an edge end there instead of at the node: what lies nearer than the node did is cut off."""
+        """Let the line of an edge end at the centre instead of the node; points nearer to it than the node are cut off."""
         for side in (0, 1):
             if self.ends[edge][side] == node:
                 line = self.lines[edge][::-1] if side else self.lines[edge]
@@ -106,7 +106,7 @@ class Meetpoints:
         self._length[edge] = polyline.length(self.lines[edge])
 
     def _dissolve(self, node: int) -> List[int]:
-        """A node of degree 2 is none, but for the only one on a ring."""
+        """Remove a node of degree 2, unless it is the only one on a ring."""
         first, second = self._at[node]
         if first == second:
             return [first]

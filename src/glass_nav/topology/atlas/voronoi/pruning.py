@@ -16,10 +16,10 @@ CORNER_SLACK_CELLS = 2.0  # unless by so much walls are rough
 
 
 class Chains:
-    """The raw graph as junctions, ends and the chains of plain vertices between them; prune() takes twigs off.
+    """The raw graph as junctions, ends and the chains of plain vertices between them; prune() removes twigs.
 
-    A leaf ends where it stops running into a corner: a corridor in the middle of its end, not in the corner of it
-    whose twig was pruned last.
+    A leaf ends before it runs into a corner: a corridor ends in the middle, not in the corner whose twig was pruned
+    last.
     """
 
     def __init__(self, ridges: Ridges) -> None:
@@ -36,7 +36,7 @@ class Chains:
             self._at.setdefault(last, []).append(number)
 
     def prune(self, leaf: float, share_of_r: float) -> None:
-        """Take off leaves with length + r_end - r_junction < max(leaf, share r_junction), least salient first."""
+        """Remove leaves with length + r_end - r_junction < max(leaf, share r_junction), least salient first."""
         twigs: List[Tuple[float, int]] = []
 
         def judge(number: int) -> None:

@@ -1,0 +1,89 @@
+"""The chance of being right that the filter reports, against the truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Optional, Tuple
+
+import numpy as np
+
+from glass_nav.evaluation.metrics import run_story
+from glass_nav.evaluation.metrics.replay_result import ReplayResult
+from glass_nav.evaluation.plots.canvas import Picture, new_figure, save
+from glass_nav.evaluation.plots.report.errors import MIN_M
+from glass_nav.evaluation.plots.report.ground import Ground
+from glass_nav.vocabulary import state_colour, states_in_order
+
+
+def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture]:
+    errors = result.errors
+    if not errors.matched.any():
+        figure = new_figure(10.0, 2.6)
+        axes = figure.subplots()
+        axes.plot(run_story.seconds_of(result), result.reliability, color="#1f77b4", linewidth=1.0)
+        axes.set_ylim(0.0, 1.02)
+        axes.set_xlabel("time since the first scan [s]")
+        axes.set_ylabel("reliability")
+        axes.grid(True, axis="y", linewidth=0.4, alpha=0.6)
+        return save(
+            folder,
+            figure,
+            "reliability",
+            "How reliable it said it was",
+            f"The chance that the pose is right, as the filter tells it, over time; median "
+            f"{np.median(result.reliability):.2f}.",
+            "Without a ground truth nobody can say whether it is so.",
+        )
+    told, off = result.reliability[errors.matched], errors.position_m[errors.matched]
+    state_of, right = np.array(result.states)[errors.matched], run_story.right(errors)[errors.matched]
+    figure = new_figure(10.0, 3.4)
+    left, beside = figure.subplots(1, 2, gridspec_kw={"width_ratios": [1.6, 1.0]})
+    for state in states_in_order(state_of.tolist()):
+        here = state_of == state
+        left.scatter(
+            told[here],
+            np.clip(off[here], MIN_M, 1e3),
+            s=7,
+            alpha=0.5,
+            linewidths=0,
+            color=state_colour(state),
+            label=state,
+        )
+    left.set_yscale("log")
+    left.axhline(run_story.RIGHT_M, color="#555555", linewidth=0.8, linestyle="--")
+    left.set_xlim(-0.02, 1.02)
+    left.set_xlabel("reliability told")
+    left.set_ylabel("true position error [m]")
+    left.legend(loc="lower left", fontsize=8, frameon=True, markerscale=2.0)
+    centres, share, counts = calibration(told, right)
+    beside.plot([0.0, 1.0], [0.0, 1.0], color="#888888", linewidth=0.8, linestyle="--")
+    beside.bar(centres, share, width=0.085, color="#1f77b4")
+    for centre, height, count in zip(centres, share, counts):
+        beside.annotate(str(count), (centre, height), ha="center", va="bottom", fontsize=7)
+    beside.set_xlim(0.0, 1.0)
+    beside.set_ylim(0.0, 1.1)
+    beside.set_xlabel("reliability told")
+    beside.set_ylabel("share that was right")
+    return save(
+        folder,
+        figure,
+        "reliability",
+        "Reliability told, and the truth",
+        "Told reliability against the true error of each scan, and the share of right poses for each class of "
+        "reliability: "
+        + ", ".join(f"{centre:.2f}: {height:.2f} of {count}" for centre, height, count in zip(centres, share, counts))
+        + ".",
+        f"Left: each dot is a scan; above the dashed line ({run_story.RIGHT_M:g} m) the pose was wrong. "
+        "Right: bars on the dashed line would be a reliability that is exactly true; numbers are scans. "
+        "Right is "
+        f"within {run_story.RIGHT_M:g} m and {np.degrees(run_story.RIGHT_RAD):.0f}°.",
+    )
+
+
+def calibration(told: np.ndarray, right: np.ndarray) -> "Tuple[np.ndarray, np.ndarray, np.ndarray]":
+    """Of ten classes of told chance those that hold any: their middle, the share that was right, how many (N,)."""
+    number = np.minimum((np.asarray(told) * 10.0).astype(int), 9)
+    counts = np.bincount(number, minlength=10)
+    hits = np.bincount(number, np.asarray(right, float), minlength=10)
+    held = counts > 0
+    return (np.arange(10)[held] + 0.5) / 10.0, hits[held] / counts[held], counts[held]

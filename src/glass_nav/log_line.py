@@ -1,0 +1,15 @@
+"""A line of the log, as what decides hands it to what writes it."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class LogLine:
+    """To be logged."""
+
+    text: str
+    level: int = logging.INFO
+    often: bool = False  # may come at the rate of a topic: at most one in some seconds is worth reading
