@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""How long does an atlas take to build, and how much memory?
+"""CPU time and memory to build an atlas.
 
     python test/benchmark/atlas_build.py
     python test/benchmark/atlas_build.py --map ../shared/data/maps/huge_map.yaml
     /usr/bin/time -v python test/benchmark/atlas_build.py
 
-A made office floor of --cells x --cells cells of 0.05 m (corridors, rooms with doors and furniture, 30 % of the cells
-along the walls rough), or a map. Prints CPU seconds of the graph and of the segment maps, of one thread, the peak of
-memory, and what the graph's heart would cost otherwise: scipy's Voronoi instead of Delaunay, and the feature transform
-that thinning of the free space would start from. Exit 1 if --limit-s or --limit-mb is missed.
+The map is a generated office floor of --cells x --cells cells of 0.05 m (corridors, rooms with doors and furniture, 30
+% of the cells along the walls rough), or --map. Prints CPU seconds of the graph and of the segment maps on one thread,
+the peak memory, and with --others the cost of alternatives: scipy's Voronoi instead of Delaunay, and the feature
+transform that thinning of the free space would start from. Exit 1 if --limit-s or --limit-mb is exceeded.
 """
 
 from __future__ import annotations
@@ -70,10 +70,10 @@ def peak_mb() -> float:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--map", type=Path, help="instead of the made floor")
+    parser.add_argument("--map", type=Path, help="instead of the generated floor")
     parser.add_argument("--cells", type=int, default=4000)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--others", action="store_true", help="time the other ways to the graph as well")
+    parser.add_argument("--others", action="store_true", help="time the alternatives as well")
     parser.add_argument("--limit-s", type=float, default=60.0)
     parser.add_argument("--limit-mb", type=float, default=2000.0)
     arguments = parser.parse_args()

@@ -32,7 +32,7 @@ from glass_nav.localization.localizer import Localizer
 from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.sensing import deskew
 from glass_nav.simulation import building_file, building_map, lidar
-from glass_nav.simulation.path_follower import FollowerParams
+from glass_nav.simulation.path_follower import PathFollowerParams
 from glass_nav.simulation.simulation import Frame, Simulation
 from glass_nav.world.grid_map import GridMap
 
@@ -44,7 +44,7 @@ def drive(name: str, turn_time_s: float, seed: int, speed_m_s: float, max_scans:
     """The robot once along the first path."""
     building = building_file.load(drives.MAPS / name / "building.yaml")
     simulation = Simulation(building, lidar.preset("sensitive"), seed=seed, scan_rate_hz=10.0, turn_time_s=turn_time_s)
-    frames = simulation.drive(next(iter(building.paths)), FollowerParams(speed_m_s=speed_m_s))
+    frames = simulation.drive(next(iter(building.paths)), PathFollowerParams(speed_m_s=speed_m_s))
     return building_map.draw(building), [frame for frame, _ in zip(frames, range(max_scans))]
 
 
@@ -57,7 +57,7 @@ def errors(grid_map: GridMap, frames: List[Frame], straighten: bool, seed: int) 
     off = []
     for frame in frames:
         turns = straighten and frame.scan.time_increment_s > 0.0
-        scan = deskew.straightened(frame.scan, odometry) if turns else frame.scan
+        scan = deskew.deskewed(frame.scan, odometry) if turns else frame.scan
         error = localizer.update(scan, frame.odom_from_base).map_from_base - frame.map_from_base
         off.append((np.hypot(error[0], error[1]), angles.wrap(error[2])))
     return np.array(off)

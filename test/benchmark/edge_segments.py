@@ -5,10 +5,10 @@
     python test/benchmark/edge_segments.py --seed 210 --edges 120 --changed 0.33
 
 A robot drives edges of the atlases of the simulated buildings, with glass in them and lidars that see more or less of
-it; dead reckoning errs by 2 % in distance and 0.07 rad in heading over an edge. It collects its scans in the local map of
-the driver and reports the walls that it saw as the driver does. Of all directions of edges of the same atlas that match
-its report in length, chord and directions, as of the true one, the contradiction of walls is computed: as often as the
-true edge is ruled out the search would lose the robot. Exit 1 if that happens once.
+it; dead reckoning has errors of 2 % in distance and 0.07 rad in heading over an edge. It collects its scans in the
+local map of the driver and reports the walls that it saw as the driver does. The contradiction of walls is computed for
+the true edge, and for all directed edges of the same atlas that match the report in length, chord and directions. If
+the true edge is ruled out, the search would lose the robot: exit 1 if that happens once.
 """
 
 from __future__ import annotations

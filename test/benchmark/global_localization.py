@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Finding the robot: from anywhere on the map, after it was carried away, and in a building that is not the map's.
+"""Finding the robot: from anywhere on the map, after it was kidnapped, and in a building that is not the map's.
 
     python test/benchmark/global_localization.py                       all tasks, 10 seeds, every log and building
     python test/benchmark/global_localization.py --tasks global --tracks intel glass_bridge --seeds 3
@@ -33,7 +33,7 @@ from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.vocabulary import LocalizationState
 
 MAX_M = 60.0  # of a search
-KNOWN_M = 5.0  # driven with the right pose before the robot is carried away
+KNOWN_M = 5.0  # driven with the right pose before the robot is kidnapped
 LEFT_M = 3.0  # within which LOCALIZED has to be left
 BACK_M = 30.0  # within which the right place has to be found again
 COVARIANCE = np.diag([0.05, 0.05, 0.01])

@@ -21,7 +21,7 @@ from typing import Callable, Dict
 import numpy as np
 
 REPO = Path(__file__).resolve().parents[2]
-sys.path.append(str(REPO / "test" / "unit" / "sensing"))
+sys.path.append(str(REPO / "test" / "support"))
 
 import slow_raycast
 from glass_nav.geometry import se2

@@ -4,7 +4,7 @@
     python test/benchmark/reliability.py --out reliability/              every track, 3 seeds: table, plot, figures
     python test/benchmark/reliability.py --tracks intel glass_office --first-seed 200
 
-Each track and seed has three drives: one in which the robot is carried away after 5 m, one that starts with a wrong
+Each track and seed has three drives: one in which the robot is kidnapped after 5 m, one that starts with a wrong
 pose (AMCL's default uncertainty around a free cell drawn at random) and one without a guess. A pose is right within
 0.7 m and 20 degrees. Printed: what was told against what was true in ten classes, the mean difference weighted by
 counts (expected calibration error), and the share of wrong poses among those told LOCALIZED.
@@ -77,7 +77,7 @@ def _follow(localizer: Localizer, moments: List[tracks.Moment]) -> List[Told]:
         if estimate.updated:
             told.append(
                 Told(
-                    float(estimate.reliability),
+                    float(estimate.confidence),
                     tracks.is_right(estimate.map_from_base, moment.map_from_base),
                     estimate.state == LocalizationState.LOCALIZED,
                 )

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""How long does a step of the search forest take in a large atlas, and how much memory?  CPU time, one thread.
+"""CPU time and memory of a step of the search forest in a large atlas, on one thread.
 
     python test/benchmark/search_forest.py
     python test/benchmark/search_forest.py --nodes 10000 --trials 200
 
-Atlases are Voronoi graphs of random points. Robots wake up anywhere, report with the noise that the tolerances say, and
-drive as they are told until their search is over; then the same with a detector that misses meetpoints and sees some
-where there are none, which makes the search consider its errors. Printed are the CPU time of the slowest step and the
-median of each trial's slowest; the atlas in memory, and the most that the process ever had. Exit 1 if a step without
-detection errors takes longer than its limit: 10, 60, 300 ms at 10^4, 10^5, 10^6 nodes.
+Atlases are Voronoi graphs of random points. Robots wake up anywhere, report with the noise of the tolerances, and drive
+as the search says until it is over; then the same with a detector that misses meetpoints and reports spurious ones, so
+that the search considers detection errors. Prints the CPU time of the slowest step and the median of each trial's
+slowest, the memory of the atlas, and the peak memory of the process. Exit 1 if a step without detection errors takes
+longer than its limit: 10, 60, 300 ms at 10^4, 10^5, 10^6 nodes.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np
 
 REPO = Path(__file__).resolve().parents[2]
-sys.path.append(str(REPO / "test" / "unit" / "topology"))
+sys.path.append(str(REPO / "test" / "support"))
 
 import made_atlases
 from glass_nav.topology.search import wake_up_trials
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search.search_params import SearchParams
-from glass_nav.topology.search.wake_up_trials import Surroundings, TrialParams
+from glass_nav.topology.search.atlas_robot import Surroundings, TrialParams
 
 LIMITS_MS = {10_000: 10.0, 100_000: 60.0, 1_000_000: 300.0}
 

@@ -86,13 +86,13 @@ class Soak:
         from tf2_msgs.msg import TFMessage
 
         from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings
-        from glass_nav.simulation.path_follower import FollowerParams
+        from glass_nav.simulation.path_follower import PathFollowerParams
         from glass_nav.simulation.simulation import Simulation
 
         self._pid, self._end_s, self._speed = node_pid, 60.0 * minutes, speed
         building = building_file.load(shipped_buildings.find(BUILDING))
         self._simulation = Simulation(building, lidar.preset("sensitive"), seed=5, scan_rate_hz=SCAN_RATE_HZ)
-        self._follower = self._simulation.follower("first", FollowerParams(speed_m_s=0.8))
+        self._follower = self._simulation.follower("first", PathFollowerParams(speed_m_s=0.8))
         changed = building.changed(0.5, np.random.default_rng(3))
         self._maps = [building_map.draw(each) for each in (building, changed)]
         self._offset_ns = 0

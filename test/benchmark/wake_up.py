@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Whole wake-ups without ROS: simulated robots that know nothing find out where they are, and drive a tour.
 
-The parts are those of the nodes: the edge driver with its recovery, the search in the atlas, the filter. A robot is put
+What decides is what decides in the nodes: Driver, SearchSession and Localizer, wired as by their topics. A robot is put
 at a random place of a building, seeks a meetpoint, and drives as the votes say until the search is over; then it hands
-its pose over to the filter and drives to nodes of the atlas. Right: CONFIRMED within 0.5 m and 20 degrees of the truth;
-wrong: CONFIRMED elsewhere, or told any place with --believed another building. A collision is a control step in which
-the base stood at an obstacle.
+its pose over to the localization and drives to nodes of the atlas. Right: CONFIRMED within 0.5 m and 20 degrees of the
+truth; wrong: CONFIRMED elsewhere, or any place reported with --believed another building. A collision is a control step
+in which the base stood at an obstacle.
 
     test/benchmark/wake_up.py --opaque --seeds 14        # film on all glass; all buildings, or --buildings A B
     test/benchmark/wake_up.py --lidars sensitive weak coated --jobs 2
@@ -20,7 +20,6 @@ import os
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional
 
@@ -30,29 +29,25 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import floors
 import numpy as np
 
-from glass_nav.driving.base_limits import BaseLimits
-from glass_nav.driving.edge_driver import Arrival, EdgeDriver, EdgeDriverParams
-from glass_nav.driving.recovery import RecoveryParams
+from wired_robot import WiredRobot
+
+from glass_nav.driving.driver_params import DriveParams
+from glass_nav.driving.edge_driver import Arrival
 from glass_nav.driving.route import RoutePlanner
-from glass_nav.driving.route_follower import FollowerParams
-from glass_nav.driving.tasks import EdgeTask, GoTask, Moment, Task
 from glass_nav.geometry import angles, se2
 from glass_nav.localization.localizer import Localizer
 from glass_nav.localization.localizer_params import LocalizerParams
-from glass_nav.hypotheses.scan_explanation import ScanExplanation
 from glass_nav.simulation import lidar, shipped_buildings, start_place
-from glass_nav.simulation.simulation import Frame, Simulation
-from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.simulation.simulation import Simulation
 from glass_nav.topology.search.search_estimate import SearchEstimate
 from glass_nav.topology.search.search_params import SearchParams
+from glass_nav.topology.search_session import SearchSession, SearchStatus, SessionParams
 from glass_nav.vocabulary import Outcome, SearchState
 
-CONTROL_S = 0.05
 SEARCH_S, LEG_S = 900.0, 120.0  # simulated, at most
 MAX_EDGES = 60
 LEGS = 3
 RIGHT_M, RIGHT_RAD = 0.5, math.radians(20.0)
-START_COVARIANCE = np.diag([0.25**2, 0.25**2, 0.17**2])  # as topology_node hands it over
 MIN_LEG_M, MAX_LEG_M, LEG_ROOM_M = 4.0, 15.0, 0.45
 
 
@@ -82,20 +77,16 @@ class Trial:
         passage_m = 0.0 if job.anywhere else start_place.PASSAGE_M
         start = start_place.random_place(building, np.random.default_rng([job.seed, 1]), passage_m)
         self.simulation = Simulation(building, lidar.preset(job.lidar), seed=job.seed, start=start)
-        self.limits = BaseLimits()
-        self.driver = EdgeDriver(EdgeDriverParams(limits=self.limits))
-        explanation = ScanExplanation(self.grid_map) if job.judge else None
-        self.localizer = AtlasLocalizer(
-            self.atlas,
+        self.drive = DriveParams()
+        session = SearchSession(
+            lambda: (self.atlas.name, self.atlas),
+            SessionParams(judge_by_scans=job.judge),
             SearchParams(follow_places=4 if job.follow else 0),
-            explanation.shares if explanation else None,
-            explanation,
         )
+        self.robot = WiredRobot(self.simulation, self.drive, self.atlas, session)
+        if job.verbose:
+            self.robot.on_status = self._print
         self.rng = np.random.default_rng([job.seed, 2])
-        self.collisions = 0
-        self.map_from_odom: Optional[np.ndarray] = None
-        self.command = np.zeros(3)
-        self.verbose = job.verbose
         self._last_node = -1
         self._began_ns = self.simulation.stamp_ns
 
@@ -104,54 +95,21 @@ class Trial:
         """Simulated time since the start."""
         return (self.simulation.stamp_ns - self._began_ns) * 1e-9
 
-    def do(self, task: Task, limit_s: float) -> Iterator[Frame]:
-        """Scan by scan, until the task has an outcome or its time is over."""
-        until_s = self.now_s + limit_s
-        while self.now_s < until_s:
-            frame = self.simulation.look()
-            self.driver.see(frame.scan, frame.odom_from_base)
-            yield frame
-            for _ in range(round(self.simulation.scan_period_s / CONTROL_S)):
-                odom_from_base = self.simulation.reading.odom_from_base
-                pose = None if self.map_from_odom is None else se2.compose(self.map_from_odom, odom_from_base)
-                self.command = task.step(Moment(odom_from_base, pose, self.command, CONTROL_S))
-                self.simulation.move(CONTROL_S, self.command)
-                self.collisions += self.simulation.blocked
-            if task.ending is not None:
-                return
-        task.cancel()
-
     # -- the search
 
     def search(self) -> Dict[str, Any]:
-        """Until the search is over."""
-        estimate: Optional[SearchEstimate] = None
-        rank: Optional[int] = None
-        failures: List[str] = []
-        while self.now_s < SEARCH_S:
-            task = EdgeTask(self.driver, RecoveryParams(), self.limits, rank, may_choose=True)
-            for _ in self.do(task, SEARCH_S - self.now_s):
-                pass
-            if task.arrival is None:
-                failures.append("" if task.ending is None else task.ending.outcome)
-                if len(failures) > 5:
-                    break
-                rank = None
-                continue
-            estimate = self._told(task.arrival, rank)
-            if self.verbose:
-                print(
-                    f"{self.now_s:7.1f} s depth {estimate.depth} {estimate.state}: {estimate.reason}; rank "
-                    f"{estimate.choice.rank if estimate.choice else '-'}; {self._truth(task.arrival)}"
-                    f"{self._scans_say()}",
-                    flush=True,
-                )
-            if estimate.done or estimate.depth >= MAX_EDGES or estimate.choice is None:
+        """Until the search is over, or nobody drives any more."""
+        robot = self.robot
+        robot.wake_up(self.grid_map)
+        while self.now_s < SEARCH_S and not robot.has_given_up:
+            robot.step()
+            estimate = robot.session.status.estimate
+            if estimate is not None and (estimate.done or estimate.depth >= MAX_EDGES):
                 break
-            rank = estimate.choice.rank
+        estimate = robot.session.status.estimate
         return {
             "state": "NO_MEETPOINT" if estimate is None else estimate.state,
-            "failures": failures,
+            "failures": robot.failures,
             "edges": -1 if estimate is None else estimate.depth,
             "search_s": self.now_s,
             "candidates": -1 if estimate is None else len(estimate.dart),
@@ -159,12 +117,14 @@ class Trial:
             **self._errors(estimate),
         }
 
-    def _told(self, arrival: Arrival, rank: Optional[int]) -> SearchEstimate:
-        last = self.localizer.estimate
-        meetpoint = replace(arrival.meetpoint, odom_from_base=arrival.odom_from_base)
-        if arrival.traversal is None or last is None or last.done:
-            return self.localizer.start(meetpoint)
-        return self.localizer.update(arrival.traversal, meetpoint)
+    def _print(self, status: SearchStatus) -> None:
+        estimate, arrival = status.estimate, self.robot.arrival
+        if estimate is not None and arrival is not None:
+            print(
+                f"{self.now_s:7.1f} s depth {estimate.depth} {estimate.state}: {estimate.reason}; rank "
+                f"{estimate.choice.rank if estimate.choice else '-'}; {self._truth(arrival)}{self._scans_say()}",
+                flush=True,
+            )
 
     def _truth(self, arrival: Arrival) -> str:
         """What the meetpoint really is."""
@@ -178,7 +138,8 @@ class Trial:
 
     def _scans_say(self) -> str:
         """How the followed pose that explains most compares, and how far it is off the truth."""
-        standing = self.localizer.standing
+        localizer = self.robot.session.localizer
+        standing = None if localizer is None else localizer.standing
         if standing is None:
             return ""
         off_m = float(np.hypot(*(standing.map_from_base - self.simulation.map_from_base)[:2]))
@@ -202,34 +163,34 @@ class Trial:
         )
 
     def _errors(self, estimate: Optional[SearchEstimate]) -> Dict[str, Any]:
-        truth = self.simulation.map_from_base
+        truth, pose = self.simulation.map_from_base, self.robot.initial_pose
         if self.elsewhere and estimate is not None and estimate.state in (SearchState.CONFIRMED, SearchState.AMBIGUOUS):
             return {"right": False, "wrong": True, "error_m": math.nan}
-        if estimate is None or estimate.state != SearchState.CONFIRMED:
+        if pose is None:
             return {"right": False, "wrong": False, "error_m": math.nan}
-        pose = self.localizer.poses(estimate)[0]
         off_m = float(np.hypot(*(pose[:2] - truth[:2])))
         right = off_m < RIGHT_M and abs(float(angles.wrap(pose[2] - truth[2]))) < RIGHT_RAD
-        self.map_from_odom = se2.compose(pose, se2.inverse(self.simulation.reading.odom_from_base))
         return {"right": right, "wrong": not right, "error_m": off_m}
 
     # -- the tour
 
     def tour(self) -> Dict[str, Any]:
         """To some nodes, while the filter tracks."""
-        mcl = Localizer(LocalizerParams(), self.grid_map, self.rng)
-        assert self.map_from_odom is not None
-        mcl.set_pose(se2.compose(self.map_from_odom, self.simulation.reading.odom_from_base), START_COVARIANCE)
-        planner = RoutePlanner(self.atlas, self.limits, self.grid_map)
+        robot = self.robot
+        robot.localize(Localizer(LocalizerParams(), self.grid_map, self.rng))
+        planner = RoutePlanner(self.atlas, self.drive.edge.limits, self.grid_map)
         off_m: List[float] = []
         outcomes = []
         for node in self._goals(planner):
-            task = GoTask(planner, self.driver, FollowerParams(), RecoveryParams(), self.limits, node)
-            for frame in self.do(task, LEG_S):
-                estimate = mcl.update(frame.scan, frame.odom_from_base)
-                self.map_from_odom = se2.compose(estimate.map_from_base, se2.inverse(frame.odom_from_base))
-                off_m.append(float(np.hypot(*(estimate.map_from_base[:2] - frame.map_from_base[:2]))))
-            outcomes.append("TIME" if task.ending is None else task.ending.outcome)
+            robot.step()  # the driver hears of the localization
+            robot.goto(node)
+            until_s, ended = self.now_s + LEG_S, len(robot.ends)
+            while len(robot.ends) == ended and self.now_s < until_s:
+                frame = robot.step()
+                assert robot.estimate is not None
+                off_m.append(float(np.hypot(*(robot.estimate.map_from_base - frame.map_from_base)[:2])))
+            robot.give_up()
+            outcomes.append("TIME" if self.now_s >= until_s else str(robot.ends[-1].ending.outcome))
         return {
             "legs": outcomes,
             "tracking_m": float(np.mean(off_m)) if off_m else math.nan,
@@ -238,8 +199,8 @@ class Trial:
 
     def _goals(self, planner: RoutePlanner) -> Iterator[int]:
         for _ in range(LEGS):
-            assert self.map_from_odom is not None
-            here = se2.compose(self.map_from_odom, self.simulation.reading.odom_from_base)[:2]
+            assert self.robot.map_from_base is not None
+            here = self.robot.map_from_base[:2]
             for node in self.rng.permutation(len(self.atlas.nodes)).tolist():
                 if self.atlas.nodes.r_m[node] < LEG_ROOM_M:
                     continue
@@ -262,7 +223,7 @@ def run(job: Job) -> Dict[str, Any]:
     return {
         **job._asdict(),
         **found,
-        "collisions": trial.collisions,
+        "collisions": trial.robot.collisions,
         "cpu_s": time.process_time() - began,
         "all_s": trial.now_s,
     }

@@ -64,6 +64,8 @@ SETUP_WORDS = {
     "source",
 }
 FOLDERS = sorted(path.name for path in REPO.iterdir() if path.is_dir() and path.name not in (".git", ".build"))
+FILES = [str(path.relative_to(REPO)) for name in FOLDERS for path in (REPO / name).rglob("*") if path.is_file()]
+ROOMS = sorted(path.parent.name for path in (REPO / "src" / "glass_nav").glob("*/__init__.py"))
 _LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 _PATH = re.compile(rf"(?<![\w/.~-])(?:{'|'.join(re.escape(name) for name in FOLDERS)})/[\w./*-]*[\w*]")
 _MODULE = re.compile(r"`([\w/]+\.(?:py|cpp|hpp|launch|test))`")
@@ -129,13 +131,18 @@ def test_paths_of_the_repository_exist(page: Path) -> None:
     named = {path for path in _PATH.findall(re.sub(r"\]\([^)]*\)", "", text)) if not re.search(r"[A-Z]{3}", path)}
     missing = {path for path in named if not (any(REPO.glob(path)) or any(page.parent.glob(path)))}
     assert missing == set()
-    modules = {name for name in _MODULE.findall(text) if not any(REPO.rglob(name))}
-    assert modules == set()
+    assert {
+        name for name in _MODULE.findall(text) if not any(f"/{file}".endswith(f"/{name}") for file in FILES)
+    } == set()
 
 
 @pytest.mark.parametrize("page", sorted((REPO / "doc").glob("*.md")), ids=lambda page: page.name)
 def test_a_page_has_a_table_or_a_picture(page: Path) -> None:
     assert "|---" in page.read_text(encoding="utf-8") or "![" in page.read_text(encoding="utf-8")
+
+
+def test_the_architecture_has_every_room() -> None:
+    assert [room for room in ROOMS if f"`{room}`" not in (REPO / "doc" / "architecture.md").read_text("utf-8")] == []
 
 
 def test_pictures_are_small_and_all_of_them_are_shown() -> None:

@@ -78,6 +78,11 @@ def test_every_python_module_is_installed(install: Path) -> None:
     assert files(REPO / "src" / "glass_nav", "*.py") <= files(python_folder(install), "*.py")
 
 
+def test_the_templates_of_the_pages_are_installed(install: Path) -> None:
+    pages = Path("evaluation") / "pages" / "templates"
+    assert files(REPO / "src" / "glass_nav" / pages) == files(python_folder(install) / pages) != set()
+
+
 def test_nothing_of_the_tests_or_the_build_is_installed(install: Path) -> None:
     assert not [path for path in files(install) if path.startswith("test") or ".build" in path or "_rostest" in path]
 

@@ -41,8 +41,8 @@ from glass_nav.ros import conversions
 from glass_nav.topology import observations
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import Atlas, Darts, Edges, MapReference, Nodes, Ragged, Visits, rings_clockwise
+from glass_nav.topology.search.atlas_robot import AtlasRobot, Surroundings, TrialParams
 from glass_nav.topology.search.matching import poses_at
-from glass_nav.topology.search.wake_up_trials import AtlasRobot, Surroundings, TrialParams
 from glass_nav.world import map_file
 
 NODE = "/glass_topology"

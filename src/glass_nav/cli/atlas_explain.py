@@ -14,8 +14,8 @@ from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import AtlasError
 from glass_nav.topology.search import forest_explanation
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search.atlas_robot import AtlasRobot, Surroundings, TrialParams
 from glass_nav.topology.search.search_params import SearchParams
-from glass_nav.topology.search.wake_up_trials import AtlasRobot, Surroundings, TrialParams
 
 HELP = "print a search forest row by row"
 DESCRIPTION = """Wakes up a robot without errors and prints its search forest: in each row every edge of every

@@ -12,7 +12,7 @@ from glass_nav.cli.progress import Progress
 from glass_nav.evaluation.metrics import replay_result
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.search import wake_up_trials
-from glass_nav.topology.search.wake_up_trials import TrialParams
+from glass_nav.topology.search.atlas_robot import TrialParams
 
 HELP = "try out how robots that wake up in an atlas fare"
 DESCRIPTION = """Simulated robots wake up anywhere in an atlas, report what they measure (with errors as large as

@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=1,
         metavar="N",
-        help="runs at a time, on so many cores (default 1; more: needs joblib); changes no result",
+        help="runs at a time, a process each (default 1; more need the Python package distributed); changes no result",
     )
     parser.add_argument(
         "--scheduler",

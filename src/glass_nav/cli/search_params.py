@@ -17,6 +17,7 @@ NODE_ONLY = frozenset(
     [
         "atlas",
         "global_frame_id",
+        "odom_frame_id",
         "initial_pose_sigma_m",
         "initial_pose_sigma_rad",
         *params.names(SessionParams),

@@ -16,7 +16,7 @@ from glass_nav.cli.progress import Progress
 from glass_nav.recording.bag_writer import BagWriter
 from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings
 from glass_nav.simulation.lidar import ECHOES, LidarModel
-from glass_nav.simulation.path_follower import FIRST, FollowerParams
+from glass_nav.simulation.path_follower import FIRST, PathFollowerParams
 from glass_nav.simulation.robot import KINDS, RobotParams
 from glass_nav.simulation.simulation import Frame, Simulation
 from glass_nav.vocabulary import CASES_IN_ORDER
@@ -113,7 +113,7 @@ def main(arguments: argparse.Namespace) -> None:
         changed_share=arguments.changed,
         turn_time_s=arguments.turn_time,
     )
-    pace = FollowerParams(speed_m_s=arguments.speed)
+    pace = PathFollowerParams(speed_m_s=arguments.speed)
     way_m = simulation.follower(arguments.path, pace).length_m
     grid_map = building_map.draw(building, arguments.resolution)
     arguments.out.parent.mkdir(parents=True, exist_ok=True)

@@ -50,7 +50,7 @@ class Heard:
         self.initial_pose: Optional[Tuple[int, np.ndarray]] = None  # stamp [ns] and pose (3,)
         self.grid_map: Optional[GridMap] = None
         self.search: Optional[SearchNews] = None
-        self.rows: Deque[SearchNews] = deque()  # of the search forest, that were not told yet
+        self.rows: Deque[SearchNews] = deque()  # of the search forest, not shown yet
 
     def take_search(self, news: SearchNews) -> None:
         """Keep it; the first of each meetpoint is a row of the search forest."""

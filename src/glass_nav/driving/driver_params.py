@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from glass_nav.driving.edge_driver import EdgeDriverParams
 from glass_nav.driving.recovery import RecoveryParams
-from glass_nav.driving.route_follower import FollowerParams
+from glass_nav.driving.route_follower import RouteFollowerParams
 
 
 @dataclass(frozen=True)
@@ -39,5 +39,5 @@ class DriveParams:
 
     rules: DriverRules = field(default_factory=DriverRules)
     edge: EdgeDriverParams = field(default_factory=EdgeDriverParams)
-    follower: FollowerParams = field(default_factory=FollowerParams)
+    follower: RouteFollowerParams = field(default_factory=RouteFollowerParams)
     recovery: RecoveryParams = field(default_factory=RecoveryParams)

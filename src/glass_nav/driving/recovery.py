@@ -13,9 +13,8 @@ from typing import Optional
 
 import numpy as np
 
-from glass_nav.driving import velocity
 from glass_nav.driving.base_limits import BaseLimits
-from glass_nav.geometry import angles
+from glass_nav.geometry import angles, pure_pursuit
 
 # what is going on
 NONE = "NONE"  # nothing to recover from
@@ -146,7 +145,7 @@ class Recovery:
     def _command(self, odom_from_base: np.ndarray) -> np.ndarray:
         if self._step == BACK_OFF:
             left_m = self._p.recovery_back_off_m - self._away_m(self._from, odom_from_base)
-            speed = velocity.braking_speed(left_m, self._limits.max_acceleration_m_s2) + 0.02
+            speed = pure_pursuit.braking_speed(left_m, self._limits.max_acceleration_m_s2) + 0.02
             return np.array([-min(self._p.recovery_speed_m_s, self._limits.max_speed_m_s, speed), 0.0, 0.0])
         if self._step == TURN:
             return np.array([0.0, 0.0, 0.5 * self._limits.max_turn_rad_s])

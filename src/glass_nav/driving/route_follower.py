@@ -22,7 +22,7 @@ TURNED_RAD = 0.1  # ... until it is so near
 
 
 @dataclass(frozen=True)
-class FollowerParams:
+class RouteFollowerParams:
     """How a route is followed."""
 
     lookahead_m: float = 0.4
@@ -42,7 +42,7 @@ class RouteFollower:
         self,
         points_m: np.ndarray,
         limits: BaseLimits,
-        p: FollowerParams = FollowerParams(),
+        p: RouteFollowerParams = RouteFollowerParams(),
         final_yaw_rad: Optional[float] = None,
     ) -> None:
         """Args:

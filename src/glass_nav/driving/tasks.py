@@ -17,7 +17,7 @@ from glass_nav.driving.base_limits import BaseLimits
 from glass_nav.driving.edge_driver import Arrival, EdgeDriver
 from glass_nav.driving.recovery import Recovery, RecoveryParams, Stall
 from glass_nav.driving.route import Route, RouteError, RoutePlanner
-from glass_nav.driving.route_follower import FollowerParams, RouteFollower
+from glass_nav.driving.route_follower import RouteFollower, RouteFollowerParams
 from glass_nav.topology.observations import turn_name
 from glass_nav.vocabulary import DriverPhase, Outcome
 
@@ -190,7 +190,7 @@ class GoTask:
         self,
         planner: RoutePlanner,
         driver: EdgeDriver,
-        follower: FollowerParams,
+        follower: RouteFollowerParams,
         p: RecoveryParams,
         limits: BaseLimits,
         goal: "int | np.ndarray",

@@ -30,10 +30,5 @@ def limited(wanted: np.ndarray, last: np.ndarray, limits: BaseLimits, dt_s: floa
     )
 
 
-def braking_speed(way: float, acceleration: float) -> float:
-    """From which a standstill is reached within the way, with something to spare; of a turn too, in rad."""
-    return float(np.sqrt(2.0 * 0.7 * acceleration * max(way, 0.0)))
-
-
 def _approached(last: float, wanted: float, most: float) -> float:
     return min(max(wanted, last - most), last + most)

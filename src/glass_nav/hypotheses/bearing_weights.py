@@ -1,7 +1,7 @@
 """bearings -> weights: how well does each particle explain the directions in which landmarks were seen?
 
-Each bearing is normal around what the particle expects, or it is wrong and may be anything; so a tag that answered by a
-mirror image, or somebody else's, moves no particle by more than a constant. P particles, N bearings; weights are
+Each bearing is normal around what the particle expects, or it is wrong and uniform; so a tag seen in a mirror, or a
+wrong id, changes no weight by more than a constant. P particles, N bearings; weights are
 natural logarithms, not normalised.
 """
 
@@ -20,8 +20,8 @@ from glass_nav.world.landmark_map import LandmarkMap
 class BearingMixture:
     """How a bearing spreads around the expected one."""
 
-    bearing_wrong_share: float = 0.02  # of bearings that say nothing
-    bearing_sigma_floor: float = 0.01  # [rad] no bearing counts as sharper: particles have gaps between them
+    bearing_wrong_share: float = 0.02  # of bearings that are wrong
+    bearing_sigma_floor: float = 0.01  # [rad] smallest deviation of a bearing: particles have gaps between them
 
     def __post_init__(self) -> None:
         if not 0.0 < self.bearing_wrong_share < 1.0:

@@ -1,15 +1,15 @@
-"""Scans, odometry -> the one place of the map where they fit: nothing is known at the start.
+"""Scans, odometry -> the one place of the map where they fit, with no initial pose.
 
-Multi-hypothesis tracking over an exhaustive search. The first scan is looked for everywhere
-(hypotheses/scan_matcher.py); each place where it lies well becomes a candidate. The candidates go with the odometry,
-are aligned with every scan as far as odometry allows, and gather evidence; from time to time the scan is looked
-for everywhere again, as the truth may have been missed (people, an odometry that slipped). A place is found when all
-others are behind by a margin. The formulation is ours; evidence is that of Thrun, Burgard, Fox, Probabilistic
-Robotics (2005), sec. 6.4, much flattened: scans taken close to each other err alike, and so does a map that has
-changed since, so evidence grows with the way that was driven and not with the number of scans, and it tells
-places apart by where they differ by decimetres. A particle filter finds a place only if a particle falls near it,
-and believes its luck; here every place is tried, and look-alikes stay in the race until something tells them apart.
-K candidates, B beams.
+Multi-hypothesis tracking over an exhaustive search. The first scan is matched against every pose of the map
+(scan_matcher.py); each place where it fits becomes a candidate. Odometry moves the candidates, every scan aligns them
+as far as odometry allows, and each gathers evidence. From time to time a scan is matched everywhere again, because the
+true place may have been missed (people, wheels that slipped). A place is found when all others are behind by a margin.
+
+The formulation is ours. Evidence is the log likelihood of Thrun, Burgard, Fox, Probabilistic Robotics (2005), sec. 6.4,
+much flattened: scans taken close to each other have the same errors, and so has a map that has changed since.
+Therefore evidence grows with the distance driven, not with the number of scans, and it tells places apart by
+differences of decimetres. A particle filter finds a place only if a particle falls near it; here every place is tried,
+and places that look alike remain candidates until a scan distinguishes them. K candidates, B beams.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ from typing import Dict, Optional, Sequence, Tuple
 import numpy as np
 
 from glass_nav.geometry import angles, se2
-from glass_nav.hypotheses import bearing_weights, scan_alignment
+from glass_nav.hypotheses import bearing_weights, pose_tracker, scan_alignment
 from glass_nav.hypotheses.bearing_weights import BearingMixture
+from glass_nav.hypotheses.pose_tracker import PoseTracker
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
@@ -29,18 +30,16 @@ from glass_nav.sensing.scan import Scan, spread_evenly
 from glass_nav.world.landmark_map import LandmarkMap
 
 _BEAMS = 60
-_MIN_BEAMS = 10  # fewer tell nothing about where they were taken
+_MIN_BEAMS = 10  # with fewer a scan is no evidence
 _PLACES = 4000  # of an exhaustive search, before they are aligned
-_SLIDE_M = 0.6  # that an alignment may lead away from where the scan was found
-_MOST = 1500  # candidates that are followed
-_EVIDENCE_SCALE_M = 0.2  # a beam that ends this far from a wall speaks for the place by one half
-_NATS_OF_A_FULL_FIT = 20.0  # between places where all beams end on walls and where none does, in one view
-_VIEW_M = 2.0  # after so much way the surroundings are seen anew
-_HOPELESS = 40.0  # nats behind the best: dropped
-_SAME_CELL = np.array([0.3, 0.3, 0.15])  # candidates in one cell are one [m, m, rad]
-_SAME_PLACE_M, _SAME_PLACE_RAD = 0.7, 0.25  # candidates nearer than this are no rivals
+_SLIDE_M = 0.6  # that an alignment may move a match
+_MAX_CANDIDATES = 1500  # that are followed
+_EVIDENCE_SCALE_M = 0.2  # a beam that ends this far from a wall fits by one half
+_FULL_FIT = 20.0  # log likelihood ratio of a place where all beams end on walls to one where none does, in one view
+_VIEW_M = 2.0  # after this distance the surroundings are seen anew
+_MAX_BEHIND = 40.0  # log likelihood ratio of the best candidate to one that is dropped
 _SEARCH_AGAIN_M = 2.0
-_POOR_FIT = 0.75  # of its usual one: the best candidate may be none, look again at once
+_POOR_FIT = 0.75  # of the best candidate's usual fit: it may be wrong, search again at once
 _STEP_NOISE = np.array(
     [
         [0.03, 0.1, 0.0],  # deviations of odometry: a base, per metre, per radian of the step
@@ -49,18 +48,18 @@ _STEP_NOISE = np.array(
     ]
 )
 _BEAM_VARIANCE = 0.03  # [m2] of a beam of 60 that are worth 20 independent ones of 0.1 m
-_MAX_PENALTY = 1.0  # nats for a step that odometry does not explain: wheels slip
-# Flat: candidates are right to decimetres, and one bearing, 5.4 nats at most, may be a mirror's: it needs a second.
+_MAX_PENALTY = 1.0  # of log likelihood for a step that odometry does not explain: wheels slip
+# Flat: candidates are right to decimetres, and one bearing, which adds 5.4 at most, may be a mirror's: it needs a second.
 _BEARINGS = BearingMixture(bearing_wrong_share=0.1, bearing_sigma_floor=0.1)
 
 
 @dataclass(frozen=True)
 class SearchParams:
-    """When a place is taken for found."""
+    """When a place is accepted as found."""
 
-    search_margin: float = 8.0  # nats that all other places have to be behind
-    search_least_fit: float = 0.5  # of the scans at the place found, mean since it is followed, 0..1
-    recover_when_lost: bool = True  # look everywhere when the scans contradict the pose
+    search_margin: float = 8.0  # log likelihood ratio of the place to all others
+    search_least_fit: float = 0.5  # scan fit at the place, mean since it is followed, 0..1
+    recover_when_lost: bool = True  # search everywhere when the scans contradict the pose
 
     def __post_init__(self) -> None:
         if not 0.0 < self.search_margin < np.inf:
@@ -71,13 +70,13 @@ class SearchParams:
 
 @dataclass(frozen=True)
 class Candidates:
-    """Places that are still possible, the best first."""
+    """Poses that are still possible, the best first."""
 
     poses: np.ndarray  # (K, 3) map_from_base at the last scan
     weights: np.ndarray  # (K,) sum 1
-    fit: float  # mean fit of the best since it is followed, 0..1; NaN: no scan told anything yet
-    lead: float  # nats that the best rival is behind; inf: there is none
-    found: bool  # the best is the place
+    fit: float  # mean fit of the best since it is followed, 0..1; NaN: no scan has been evidence yet
+    lead: float  # log likelihood ratio of the best to its best rival; inf: it has none
+    found: bool  # the robot is at the best
 
     @property
     def covariance(self) -> np.ndarray:
@@ -88,25 +87,24 @@ class Candidates:
 
 
 class GlobalSearch:
-    """Follows all candidates until one is left."""
+    """Follows all candidates until one is far ahead."""
 
     def __init__(self, matcher: ScanMatcher, field: DistanceField, params: SearchParams) -> None:
         """Args:
-        matcher: where to look, the whole map or a part.
+        matcher: of the whole map or a part.
         field: of the map.
-        params: when a place is found.
+        params: when a place is accepted.
         """
         self._matcher, self._field, self._params = matcher, field, params
-        self._poses = np.zeros((0, 3))
-        self._evidence = np.zeros(0)  # (K,) nats
+        self._tracker = PoseTracker(_MAX_BEHIND, _MAX_CANDIDATES)
+        self._evidence = np.zeros(0)  # (K,) log likelihoods
         self._fit_sum = np.zeros(0)  # (K,) of fit times the share of a view
         self._views = np.zeros(0)  # (K,) of these shares
-        self._odom_from_base: Optional[np.ndarray] = None
         self._noise = _STEP_NOISE[:, 0]  # (3,) deviations of the last step
-        self._looked = False
-        self._way_m = 0.0  # since the last look everywhere
+        self._searched = False
+        self._since_search_m = 0.0  # distance since the last search everywhere
         self._driven_m = 0.0  # since the first scan
-        self._told_at_m: Dict[str, float] = {}  # id of a landmark -> way driven when its bearing last counted
+        self._counted_at_m: Dict[str, float] = {}  # id of a landmark -> distance driven when its bearing last counted
 
     def decide_by(self, params: SearchParams) -> None:
         """Other limits from the next scan on."""
@@ -115,116 +113,116 @@ class GlobalSearch:
     def update(
         self, scan: Scan, odom_from_base: np.ndarray, bearings: Sequence[Tuple[LandmarkBearings, LandmarkMap]] = ()
     ) -> Candidates:
-        """One scan more; a scan with too few answers moves the candidates only.
+        """One more scan; a scan with too few returns only moves the candidates.
 
         Args:
             scan: a lidar's turn.
             odom_from_base: (3,) odometry at its stamp.
-            bearings: told with regard to where the robot is at the scan, with the landmarks that they are of.
+            bearings: from the robot's pose at the scan, each with the landmarks that they are of.
         """
         view = self._move(scan, odom_from_base)
-        points = telling_points(scan)
+        points = evidence_points(scan)
         if points is not None:
-            if not self._looked:
-                found = self._look_everywhere(points)
+            if not self._searched:
+                found = self._search_everywhere(points)
                 self._append(found, np.zeros(len(found)))
                 view = 1.0
             self._judge(points, view)
-            if self._way_m >= _SEARCH_AGAIN_M or self._best_fits_poorly(points):
-                found = self._look_everywhere(points)
-                # This scan alone proposes them: they start behind what was followed so far, by how well each fits.
+            if self._since_search_m >= _SEARCH_AGAIN_M or self._best_fits_poorly(points):
+                found = self._search_everywhere(points)
+                # Only this scan proposes them: they start behind the candidates so far, by how well each fits.
                 fits = fit(self._field, points, found)
                 start = self._evidence.max() - self._params.search_margin
-                self._append(found, start + _NATS_OF_A_FULL_FIT * (fits - fits.max()))
+                self._append(found, start + _FULL_FIT * (fits - fits.max()))
                 self._keep_distinct()
-        if len(self._poses):  # there are none before a scan proposes them
+        if len(self._tracker):  # there are none before a scan proposes them
             for taken, landmarks in bearings:
                 self._weigh_by(taken, landmarks)
         return self._candidates()
 
     def add(self, map_from_base: np.ndarray, head_start: float) -> None:
-        """Before the first scan: a candidate where the robot is believed to be, ahead by so many nats."""
+        """Before the first scan: a candidate at the tracked pose, with a head start of log likelihood."""
         self._append(np.asarray(map_from_base, float)[None], np.array([head_start]))
 
     def _move(self, scan: Scan, odom_from_base: np.ndarray) -> float:
-        """The candidates by odometry; the share of a new view that this step gave."""
-        before, self._odom_from_base = self._odom_from_base, np.array(odom_from_base, float)
-        if before is None:
+        """Move the candidates by odometry; the share of a new view that this step gave."""
+        step = self._tracker.carry(odom_from_base)
+        if step is None:
             return 1.0
-        step = se2.compose(se2.inverse(before), odom_from_base)
-        way_m, turn_rad = se2.travelled(step)
-        self._way_m += way_m
-        self._driven_m += way_m
-        self._noise = _STEP_NOISE @ np.array([1.0, way_m, turn_rad])
-        self._poses = se2.compose(self._poses, step)
+        distance_m, turn_rad = se2.travelled(step)
+        self._since_search_m += distance_m
+        self._driven_m += distance_m
+        self._noise = _STEP_NOISE @ np.array([1.0, distance_m, turn_rad])
         # What a turn brings into view is what the lidar does not see already.
         unseen = max(0.0, 2.0 - float(np.ptp(scan.angles_rad)) / np.pi)
-        return min(1.0, (way_m + unseen * turn_rad) / _VIEW_M)
+        return min(1.0, (distance_m + unseen * turn_rad) / _VIEW_M)
 
     def _judge(self, points: np.ndarray, view: float) -> None:
-        """Align the candidates with the scan, as far as odometry allows, and let it speak for each."""
+        """Align the candidates with the scan, as far as odometry allows, and add its evidence to each."""
         information = np.diag(_BEAM_VARIANCE * len(points) / _BEAMS / self._noise**2)
-        moved = scan_alignment.align_near(self._field, points, self._poses, information)
-        off = (moved - self._poses) / self._noise
-        off[:, 2] = angles.wrap(moved[:, 2] - self._poses[:, 2]) / self._noise[2]
+        poses = self._tracker.poses
+        moved = scan_alignment.align_near(self._field, points, poses, information)
+        off = (moved - poses) / self._noise
+        off[:, 2] = angles.wrap(moved[:, 2] - poses[:, 2]) / self._noise[2]
         penalty = np.minimum(0.125 * np.sum(off**2, axis=1), _MAX_PENALTY)
-        self._poses = moved
+        self._tracker.poses = moved
         fits = fit(self._field, points, moved)
-        self._evidence = self._evidence + view * _NATS_OF_A_FULL_FIT * fits - penalty
+        self._evidence = self._evidence + view * _FULL_FIT * fits - penalty
         self._fit_sum = self._fit_sum + view * fits
         self._views = self._views + view
         self._keep_distinct()
 
     def _weigh_by(self, bearings: LandmarkBearings, landmarks: LandmarkMap) -> None:
-        """Let bearings speak for each candidate, those of one landmark once in a view: a mirror stays where it is."""
-        new = np.array([self._driven_m - self._told_at_m.get(name, -_VIEW_M) >= _VIEW_M for name in bearings.ids], bool)
+        """Add the evidence of bearings, of each landmark once in a view: a mirror stays where it is."""
+        new = np.array(
+            [self._driven_m - self._counted_at_m.get(name, -_VIEW_M) >= _VIEW_M for name in bearings.ids], bool
+        )
         bearings = bearings.subset(new)
-        self._told_at_m.update(dict.fromkeys(bearings.ids, self._driven_m))
-        self._evidence = self._evidence + bearing_weights.log_weights(self._poses, bearings, landmarks, _BEARINGS)
+        self._counted_at_m.update(dict.fromkeys(bearings.ids, self._driven_m))
+        self._evidence = self._evidence + bearing_weights.log_weights(
+            self._tracker.poses, bearings, landmarks, _BEARINGS
+        )
         self._keep_distinct()
 
     def _best_fits_poorly(self, points: np.ndarray) -> bool:
         best = int(np.argmax(self._evidence))
-        fit_now = fit(self._field, points, self._poses[best : best + 1])[0]
+        fit_now = fit(self._field, points, self._tracker.poses[best : best + 1])[0]
         return bool(fit_now < _POOR_FIT * self._fit_sum[best] / max(self._views[best], 1e-9))
 
-    def _look_everywhere(self, points: np.ndarray) -> np.ndarray:
-        """(K, 3) places where this scan fits, the best first, each only once."""
-        self._looked, self._way_m = True, 0.0
+    def _search_everywhere(self, points: np.ndarray) -> np.ndarray:
+        """(K, 3) poses where this scan fits, the best first, each place once."""
+        self._searched, self._since_search_m = True, 0.0
         starts = self._matcher.search(points, _PLACES).poses
         places = scan_alignment.align(self._field, points, starts)
         near = np.hypot(*(places.poses[:, :2] - starts[:, :2]).T) < _SLIDE_M  # farther away it is another place
         poses = places.poses[near][np.argsort(-places.fit[near], kind="stable")]
-        return poses[_first_of_each_cell(poses)]
+        return poses[pose_tracker.first_of_each_cell(poses)]
 
     def _append(self, poses: np.ndarray, evidence: np.ndarray) -> None:
         nothing = np.zeros(len(poses))
-        self._poses = np.concatenate([self._poses, poses])
+        self._tracker.add(poses)
         self._evidence = np.concatenate([self._evidence, evidence])
         self._fit_sum = np.concatenate([self._fit_sum, nothing])
         self._views = np.concatenate([self._views, nothing])
 
     def _keep_distinct(self) -> None:
-        """Of candidates that have become one the best, of all those that have a chance, the best first."""
-        order = np.argsort(-self._evidence, kind="stable")
-        order = order[self._evidence[order] > self._evidence[order[0]] - _HOPELESS] if len(order) else order
-        chosen = order[_first_of_each_cell(self._poses[order])][:_MOST]
-        self._poses, self._evidence = self._poses[chosen], self._evidence[chosen]
+        chosen = self._tracker.keep_distinct(self._evidence)
+        self._evidence = self._evidence[chosen]
         self._fit_sum, self._views = self._fit_sum[chosen], self._views[chosen]
 
     def _candidates(self) -> Candidates:
-        if not len(self._poses):
-            return Candidates(self._poses, self._evidence, float("nan"), 0.0, False)
+        poses = self._tracker.poses
+        if not len(poses):
+            return Candidates(poses, self._evidence, float("nan"), 0.0, False)
         weights = np.exp(self._evidence - self._evidence[0])
-        rivals = ~same_place(self._poses, self._poses[0])
-        lead = float(self._evidence[0] - self._evidence[rivals].max()) if rivals.any() else float("inf")
+        lead = pose_tracker.lead(poses[0], self._evidence[0], poses, self._evidence)
         fit = float(self._fit_sum[0] / self._views[0]) if self._views[0] > 0.0 else float("nan")
         found = lead > self._params.search_margin and fit >= self._params.search_least_fit
-        return Candidates(self._poses, weights / weights.sum(), fit, lead, bool(found))
+        return Candidates(poses, weights / weights.sum(), fit, lead, bool(found))
 
 
-def telling_points(scan: Scan) -> Optional[np.ndarray]:
-    """(B, 2) end points [m] in the robot's frame of the beams that places are judged by; None: too few answered."""
+def evidence_points(scan: Scan) -> Optional[np.ndarray]:
+    """(B, 2) end points [m], in the robot's frame, of the beams that are evidence; None: too few returned."""
     beams = spread_evenly(scan.answered, _BEAMS)
     return scan.points_in_base()[beams] if len(beams) >= _MIN_BEAMS else None
 
@@ -232,16 +230,3 @@ def telling_points(scan: Scan) -> Optional[np.ndarray]:
 def fit(field: DistanceField, points_m: np.ndarray, poses: np.ndarray) -> np.ndarray:
     """(K,) how well such points fit at poses (K, 3), 0..1."""
     return scan_alignment.fit(field, points_m, poses, _EVIDENCE_SCALE_M)
-
-
-def same_place(poses: np.ndarray, pose: np.ndarray) -> np.ndarray:
-    """(K,) bool: poses (K, 3) so near to a pose (3,) that they are no rivals of it."""
-    return (np.hypot(*(poses[:, :2] - pose[:2]).T) < _SAME_PLACE_M) & (
-        np.abs(angles.wrap(poses[:, 2] - pose[2])) < _SAME_PLACE_RAD
-    )
-
-
-def _first_of_each_cell(poses: np.ndarray) -> np.ndarray:
-    """Ascending indices of the poses (K, 3) that are the first in their cell of _SAME_CELL; yaw goes round."""
-    cells = np.round(np.column_stack([poses[:, :2], angles.wrap(poses[:, 2])]) / _SAME_CELL).astype(np.int64)
-    return np.sort(np.unique(cells, axis=0, return_index=True)[1])

@@ -1,4 +1,4 @@
-"""Poses -> the poses nearby where the scan fits the walls best.
+"""Poses, scan -> the poses nearby where the scan fits the walls best.
 
 Gauss-Newton on the squared distance of the beams' end points to the nearest wall, with a
 Geman-McClure kernel that narrows from coarse to fine, so that people, furniture and mirrored echoes do
@@ -73,7 +73,7 @@ def align_near(
     first_scale_m: float = 0.2,
     last_scale_m: float = 0.06,
 ) -> np.ndarray:
-    """Slide the scan along the field, each start held where it is by what else is known of it.
+    """Slide the scan along the field, each start held back by prior information about it.
 
     Args:
         field, points_m, iterations, first_scale_m, last_scale_m: as for align().

@@ -1,11 +1,10 @@
-"""A scan, poses that it may come from -> how much of it the map explains from each, glass and all.
+"""A scan, poses that it may come from -> the share of its beams that the map explains from each, glass included.
 
-A beam is explained if it ended at one of the ranges that the five cases offer: the first surface on its way, the next
-ones behind it if the walls before are thin enough for glass, or the mirrored one (seed document
-glass_localization.txt). So a candidate in a building of glass is not ruled out by beams that went through panes, nor
-believed because a wall is somewhere. A beam that ended where the map knows nothing, with nothing of the map on its
-way, is no evidence: who drew the map did not look there. Each pose may slide to where the scan fits best first, for it
-is known to a decimetre or so.
+A beam is explained if it ended at one of the ranges that the five cases expect: the first surface along it, the next
+ones behind if the walls before are thin enough for glass, or the mirrored one (seed document glass_localization.txt).
+So beams that passed panes do not rule a candidate out, and a wall at any distance does not support it. A beam that
+ended in unmapped space without crossing a mapped surface is no evidence: the mapper was not there. Each pose may first
+slide to where the scan fits best, since it is known to about a decimetre.
 """
 
 from __future__ import annotations
@@ -23,13 +22,13 @@ from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import UNKNOWN, GridMap
 
-_BEAMS = 120  # of a scan that are asked
-_NEAR_CELLS = 3.0  # a beam that ends so near to a range that the map offers is explained
+_BEAMS = 120  # of a scan that are used
+_NEAR_CELLS = 3.0  # a beam that ends this close to an expected range is explained
 _MAX_THICK_M = 0.3  # a thicker wall is no glass
-_SLIDES_M, _SLIDES_RAD = 0.5, np.radians(15.0)  # a pose that would slide further stays where it was said to be
+_SLIDES_M, _SLIDES_RAD = 0.5, np.radians(15.0)  # a pose that would slide further stays where it was given
 _AT_ONCE = 64  # poses
 _MIN_BEAMS = 10
-_MIN_TOLD = 0.25  # of the beams that came back; where the map knows less of them it cannot judge
+_MIN_KNOWN = 0.25  # of the beams that returned; where the map knows fewer of them it cannot judge
 
 
 class ScanExplanation:
@@ -39,13 +38,13 @@ class ScanExplanation:
         self._grid_map = grid_map
         self._caster = RayCaster(grid_map)
         self._field = DistanceField(grid_map)
-        self._matcher: Optional[ScanMatcher] = None  # made when it is first asked: it takes some time on a large map
+        self._matcher: Optional[ScanMatcher] = None  # made at its first use: on a large map that takes time
         self._near_m = _NEAR_CELLS * grid_map.resolution_m
         around = np.ones((2 * int(_NEAR_CELLS) + 1,) * 2, bool)
         self._near_unknown = ndimage.binary_dilation(grid_map.occupancy == UNKNOWN, around)  # (H, W)
 
     def shares(self, scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
-        """Of the beams that came back from where the map knows something, those that it explains.
+        """Of the beams that returned from mapped space, the share that the map explains.
 
         Args:
             scan: as it was measured.
@@ -64,12 +63,12 @@ class ScanExplanation:
         Args:
             scan: as it was measured.
             map_from_base: (C, 3) poses.
-            most_m, most_rad: a pose that would slide further stays where it was said to be.
+            most_m, most_rad: a pose that would slide further stays where it was given.
 
         Returns:
-            (C, 3) poses, and (C,) shares in [0, 1] as of shares(); poses as given and NaN if hardly any beam came back.
+            (C, 3) poses, and (C,) shares in [0, 1] as of shares(); poses as given and NaN if hardly any beam returned.
         """
-        beams = _telling(scan)
+        beams = _used_beams(scan)
         if beams is None:
             return np.array(map_from_base, float), np.full(len(map_from_base), np.nan)
         points = scan.points_in_base()[beams]
@@ -82,9 +81,9 @@ class ScanExplanation:
 
     def places(self, scan: Scan, most: int) -> np.ndarray:
         """(K, 3) poses from all over the map where the beams end near walls, K <= most, the best first; none if hardly
-        any beam came back. Neighbouring ones may belong to one and the same place.
+        any beam returned. Neighbouring ones may belong to one place.
         """
-        beams = _telling(scan)
+        beams = _used_beams(scan)
         if beams is None:
             return np.zeros((0, 3))
         if self._matcher is None:
@@ -108,9 +107,9 @@ class ScanExplanation:
         offered = np.stack([hits.first_m, hits.second_m, hits.third_m, hits.mirrored_m])  # (4, P, B)
         explained = (np.abs(offered - measured) <= self._near_m).any(axis=0)
         ends_m = np.stack([se2.transform_points(pose, points_m) for pose in poses])
-        told = explained | (hits.first_m < measured) | ~self._is_unknown(ends_m)
-        count = told.sum(axis=1)
-        few = count < max(_MIN_BEAMS, _MIN_TOLD * len(beams))
+        known = explained | (hits.first_m < measured) | ~self._is_unknown(ends_m)
+        count = known.sum(axis=1)
+        few = count < max(_MIN_BEAMS, _MIN_KNOWN * len(beams))
         return np.where(few, np.nan, explained.sum(axis=1) / np.maximum(count, 1))
 
     def _is_unknown(self, points_m: np.ndarray) -> np.ndarray:
@@ -120,8 +119,8 @@ class ScanExplanation:
         return ~inside | self._near_unknown[np.where(inside, rows, 0), np.where(inside, columns, 0)]
 
 
-def _telling(scan: Scan) -> Optional[np.ndarray]:
-    """(B,) indices of the beams that are asked; None: too few came back."""
+def _used_beams(scan: Scan) -> Optional[np.ndarray]:
+    """(B,) indices of the beams that are used; None: too few returned."""
     answered = np.flatnonzero(scan.answered)
     if len(answered) < _MIN_BEAMS:
         return None

@@ -1,8 +1,8 @@
-"""GridMap, scan -> all places where the scan may have been taken: nothing is known of the pose.
+"""GridMap, scan -> all poses from which the scan may have been taken, with no initial pose.
 
 Correlative scan matching (Olson (2009)) of the beams' end points against a likelihood field, over every position
 and heading, by branch and bound (Hess, Kohler, Rapp, Andor (2016)): the face of ScanMatcher in the compiled module
-_mrpt_grid. It asks neither what was passed on the way nor which wall was met, so it proposes places and judges none.
+_mrpt_grid. It ignores what the beams passed and which wall they met, so it proposes poses and judges none.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Places:
 
 
 class ScanMatcher:
-    """Looks for a scan everywhere in the free cells of one map."""
+    """Matches scans against every pose in the free cells of one map."""
 
     def __init__(self, grid_map: GridMap, field: DistanceField, area: Optional[np.ndarray] = None) -> None:
         """Args:

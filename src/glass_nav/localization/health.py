@@ -10,7 +10,7 @@ import numpy as np
 from glass_nav.health import Health, Level
 from glass_nav.localization.localizer import Estimate
 from glass_nav.sensing.scan import Scan
-from glass_nav.sensing.waiting_scans import ScanCounts
+from glass_nav.sensing.scan_queue import ScanCounts
 from glass_nav.vocabulary import CASES_IN_ORDER, LocalizationState
 from glass_nav.world.grid_map import GridMap
 
@@ -71,8 +71,8 @@ class LocalizationHealth:
         values = dict(
             zip(("std_x [m]", "std_y [m]", "std_yaw [rad]"), np.round(std, 4)),
             particles=len(estimate.particles),
-            used_share=round(float(estimate.used_share), 3),
-            reliability=round(float(estimate.reliability), 3),
+            used_share=round(float(estimate.inlier_ratio), 3),
+            reliability=round(float(estimate.confidence), 3),
             state=estimate.state,
         )
         if estimate.state == LocalizationState.LOST:
@@ -112,7 +112,7 @@ class LocalizationHealth:
         text = f"{answered} of {beams} beams answered"
         if answered < FEW_BEAMS:
             return Health(Level.WARN, f"only {text}: odometry leads", values)
-        return Health(Level.OK, f"{text}, {now.estimate.used_share:.0%} of them are explained", values)
+        return Health(Level.OK, f"{text}, {now.estimate.inlier_ratio:.0%} of them are explained", values)
 
     def _timing(self, now: Situation) -> Health:
         if not self._wall_s:

@@ -8,6 +8,8 @@ from typing import Tuple
 
 import numpy as np
 
+from glass_nav.world.grid_map import GridMap
+
 
 @dataclass(frozen=True)
 class StartPose:
@@ -37,6 +39,38 @@ class StartPose:
     def covariance(self) -> np.ndarray:
         """(3, 3) of x, y, yaw."""
         return np.diag([self.initial_cov_xx, self.initial_cov_yy, self.initial_cov_aa])
+
+
+@dataclass(frozen=True)
+class StartRules:
+    """How the localization begins, and begins again; the names are parameters of the node, AMCL's where AMCL has them."""
+
+    start_without_guess: bool = False  # begin with a search of the whole map, not at initial_pose_*
+    wait_for_initialpose: bool = False  # no pose and no map -> odom before one is given; nothing is searched
+    force_update_after_initialpose: bool = False
+    force_update_after_set_map: bool = False
+    random_seed: int = 0  # < 0: another one at every start
+
+    @property
+    def rng(self) -> np.random.Generator:
+        """A generator that repeats itself from start to start, unless ~random_seed is negative."""
+        return np.random.default_rng(None if self.random_seed < 0 else self.random_seed)
+
+
+@dataclass(frozen=True)
+class PoseGuess:
+    """Where somebody says that the robot was at some time."""
+
+    stamp_ns: int  # 0: now, whenever that is
+    map_from_base: np.ndarray  # (3,)
+    covariance: np.ndarray  # (3, 3) of x, y, yaw
+
+
+def refuse_outside(guess: PoseGuess, grid_map: GridMap) -> None:
+    """ValueError if the pose is not on the map."""
+    if not grid_map.contains(*grid_map.cells(guess.map_from_base[:2])):
+        x, y = guess.map_from_base[:2]
+        raise ValueError(f"the pose x {x:.3f} m, y {y:.3f} m lies outside the map")
 
 
 def checked(map_from_base: np.ndarray, covariance: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from typing import Callable, List, Optional, Tuple
 import numpy as np
 
 from glass_nav.geometry import se2
-from glass_nav.hypotheses import global_search
+from glass_nav.hypotheses import pose_tracker
 from glass_nav.hypotheses.global_search import GlobalSearch
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.localization import initial_pose, start_area
@@ -50,9 +50,9 @@ class Estimate:
     particles: np.ndarray  # (P, 3) poses in map
     state: LocalizationState
     reason: str  # the state in words
-    used_share: float  # share of the answering beams that a case 1-4 explains
+    inlier_ratio: float  # share of the answering beams that a case 1-4 explains
     updated: bool  # whether this scan moved the particles
-    reliability: float  # chance that the pose is right, 0..1
+    confidence: float  # chance that the pose is right, 0..1
     places: int = 1  # that are possible, see pose_state.Judgement
 
 
@@ -259,11 +259,11 @@ class Localizer:
         """The pose is not known: follow all places where it may be. The particles are those places."""
         assert self._search is not None
         candidates = self._search.update(scan, odom_from_base, self._bearings_from(odom_from_base))
-        self._quality.seek(candidates)
+        self._quality.follow_search(candidates)
         if candidates.found:
             return self._settle(scan, odom_from_base, candidates.poses[0], candidates.fit)
         if len(candidates.poses):
-            here = global_search.same_place(candidates.poses, candidates.poses[0])
+            here = pose_tracker.same_place(candidates.poses, candidates.poses[0])
             self._filter.stand_for(candidates.poses, candidates.weights, here, candidates.covariance, _SHOWN)
         return self._classifier.classify(scan, self._filter.best.map_from_base, np.zeros((3, 3)))[0]
 
@@ -279,9 +279,9 @@ class Localizer:
         """The pose with its state; `expected` is of that pose."""
         cases = self._classifier.seen_from(cases, scan, expected)
         answered = int(scan.answered.sum())
-        used_share = float(np.count_nonzero(cases.case)) / answered if answered else float("nan")
+        inlier_ratio = float(np.count_nonzero(cases.case)) / answered if answered else float("nan")
         if updated:
-            self._quality.observe(used_share)
+            self._quality.observe(inlier_ratio)
         judgement = self._quality.judge(self._filter.best)
         trusted = judgement.state == LocalizationState.LOCALIZED
         return Estimate(
@@ -294,9 +294,9 @@ class Localizer:
             self._filter.particles,
             judgement.state,
             judgement.reason,
-            used_share,
+            inlier_ratio,
             updated,
-            judgement.reliability,
+            judgement.confidence,
             judgement.places,
         )
 

@@ -27,15 +27,10 @@ class UpdateSchedule:
         """
         odom_from_base = np.array(odom_from_base, float)
         if odom_from_base.shape != (3,) or not np.all(np.isfinite(odom_from_base)):
-            raise ScanError(
-                f"scan at {scan.stamp_ns * 1e-9:.3f} s: odometry must be finite x, y, yaw, got {odom_from_base}"
-            )
+            raise ScanError(f"odometry must be finite x, y, yaw, got {odom_from_base}", scan.stamp_ns)
         last_ns = self._stamps_ns.get(scan.lidar, scan.stamp_ns)
         if scan.stamp_ns < last_ns:
-            raise ScanError(
-                f"scan at {scan.stamp_ns * 1e-9:.3f} s: time runs backwards, the last scan was "
-                f"at {last_ns * 1e-9:.3f} s"
-            )
+            raise ScanError(f"time runs backwards, the last scan was at {last_ns * 1e-9:.3f} s", scan.stamp_ns)
         self._stamps_ns[scan.lidar] = scan.stamp_ns
         return odom_from_base
 

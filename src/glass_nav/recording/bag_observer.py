@@ -7,7 +7,7 @@ from typing import Any, Callable, Optional, Sequence
 
 import numpy as np
 
-from glass_nav.recording.bag_file import ODOMETRY, SCAN, TF, Bag
+from glass_nav.recording.bag_messages import ODOMETRY, SCAN, TF, Bag, ns_from_header
 from glass_nav.recording.observed import HeardOdometry, HeardScan, HeardTransform, Observed
 
 
@@ -28,15 +28,17 @@ def observe(paths: Sequence[Path], step_done: Optional[Callable[[], None]] = Non
         for connection, heard_ns, message in bag.recorded(*bag.topics_of(SCAN, ODOMETRY, *TF)):
             topic = connection.topic
             if topic in seen.scans:
-                seen.scans[topic].append(heard_scan(message, _stamp_ns(message.header), heard_ns))
+                seen.scans[topic].append(heard_scan(message, ns_from_header(message.header), heard_ns))
             elif topic in seen.odometry:
                 seen.odometry[topic].append(
-                    HeardOdometry(_stamp_ns(message.header), heard_ns, message.header.frame_id, message.child_frame_id)
+                    HeardOdometry(
+                        ns_from_header(message.header), heard_ns, message.header.frame_id, message.child_frame_id
+                    )
                 )
             else:
                 sender = str(getattr(connection.ext, "callerid", None) or "")
                 seen.transforms += [
-                    heard_transform(each, _stamp_ns(each.header), heard_ns, topic.endswith("tf_static"), sender)
+                    heard_transform(each, ns_from_header(each.header), heard_ns, topic.endswith("tf_static"), sender)
                     for each in message.transforms
                 ]
             if step_done is not None:
@@ -81,7 +83,3 @@ def heard_transform(message: Any, stamp_ns: int, heard_ns: int, static: bool, se
         static,
         sender,
     )
-
-
-def _stamp_ns(header: Any) -> int:
-    return int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)

@@ -67,7 +67,7 @@ class BagWriter(MessageWriter):
         increment = float(angles_rad[1] - angles_rad[0]) if len(scan) > 1 else 0.0
         self._send(
             "/scan",
-            scan.stamp_ns + deskew.turn_ns(len(scan), scan.time_increment_s),
+            scan.stamp_ns + deskew.sweep_ns(len(scan), scan.time_increment_s),
             header=self._header(scan.stamp_ns, LASER),
             angle_min=float(angles_rad[0]),
             angle_max=float(angles_rad[-1]),

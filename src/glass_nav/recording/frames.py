@@ -13,6 +13,7 @@ from typing import Dict, List, Optional, Tuple
 Vector = Tuple[float, float, float]
 Quaternion = Tuple[float, float, float, float]
 Transform = Tuple[Vector, Quaternion]
+Planar = Tuple[float, float, float]  # x, y, yaw
 
 IDENTITY: Transform = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 EXTRAPOLATION_NS = 100_000_000  # a robot that stops publishing for a beat is not lost yet
@@ -151,7 +152,7 @@ def inverse(a_from_b: Transform) -> Transform:
     return (-p, -q, -r), back
 
 
-def planar(transform: Transform) -> Tuple[float, float, float]:
+def planar(transform: Transform) -> Planar:
     """x, y and the direction of the x axis seen from above."""
     (x, y, _), rotation = transform
     ahead = _rotate(rotation, (1.0, 0.0, 0.0))

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Sequence, Union
 
-from glass_nav.recording import bag_file, rawlog_file
+from glass_nav.recording import bag_recording, rawlog_file
 from glass_nav.recording.recording import LogOptions, Recording, RecordingError
 
 AnyPath = Union[str, "os.PathLike[str]"]
@@ -21,7 +21,7 @@ def open_log(path: "Union[AnyPath, Sequence[AnyPath]]", options: LogOptions = Lo
     paths = [Path(path)] if isinstance(path, (str, os.PathLike)) else [Path(part) for part in path]
     rawlogs = [part for part in paths if part.name.endswith((".rawlog", ".rawlog.gz"))]
     if not rawlogs:
-        return bag_file.open_log(paths, options)
+        return bag_recording.open_log(paths, options)
     if len(paths) > 1:
         raise RecordingError(f"{rawlogs[0]}: only bags can be parts of one run, got {len(paths)} logs")
     return rawlog_file.open_log(paths[0], options)

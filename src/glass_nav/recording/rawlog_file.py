@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Iterator, List, Optional, Tuple
+from typing import TYPE_CHECKING, Iterator, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -19,12 +19,13 @@ from glass_nav.recording.recording import (
     Step,
     trajectory_from_samples,
 )
-from glass_nav.sensing.scan import ScanError, scan_from_fields
+from glass_nav.sensing.mounting import Mounting, level_mounting
+from glass_nav.sensing.scan import ScanError
+from glass_nav.sensing.scan_placement import NoTransform, RawScan, ScanPlacement, Transforms
 
 if TYPE_CHECKING:
     from glass_nav._mrpt_io import Rawlog
 
-LEVEL = math.cos(math.radians(20.0))  # a scan plane tilted further does not show the plan of a floor
 FRAME_PERIOD_NS = 100_000_000  # between frames of a log without times: only their order counts
 
 
@@ -95,6 +96,36 @@ def _ground_truth(path: Path, options: LogOptions, stamps_ns: np.ndarray, notes:
     return trajectory_file.load(source, stamps_ns)
 
 
+class _RecordTransforms(Transforms):
+    """Of one scan: MRPT keeps the sensor's pose in each record, and odometry beside it or between the records."""
+
+    def __init__(
+        self,
+        sensor_pose: Sequence[float],
+        odometry: "Union[Trajectory, np.ndarray]",
+        laser_pose: Optional[Tuple[float, float, float]],
+    ) -> None:
+        """Args:
+        sensor_pose: x, y, z [m], yaw, pitch, roll [rad] on the robot.
+        odometry: stamped, or the pose (3,) at the record.
+        laser_pose: x, y, yaw to be used instead of the record's.
+        """
+        self._sensor_pose, self._odometry, self._laser_pose = sensor_pose, odometry, laser_pose
+
+    def odom_from_base(self, stamp_ns: int) -> np.ndarray:
+        if not isinstance(self._odometry, Trajectory):
+            return self._odometry
+        if not self._odometry.covers(np.int64(stamp_ns), slack_ns=FRAME_PERIOD_NS):
+            raise NoTransform("no odometry at that time")
+        return self._odometry.at(np.int64(stamp_ns))
+
+    def mounting(self, lidar: str, stamp_ns: int) -> Mounting:
+        x, y, z, yaw, pitch, roll = self._sensor_pose
+        yaw = math.atan2(math.sin(yaw) * math.cos(pitch), math.cos(yaw) * math.cos(pitch))
+        base_from_laser = (x, y, yaw) if self._laser_pose is None else self._laser_pose
+        return level_mounting(np.array(base_from_laser), z, math.cos(pitch) * math.cos(roll))
+
+
 class _Entries:
     """Iterates the scans of a rawlog that is in memory already."""
 
@@ -111,44 +142,44 @@ class _Entries:
     def __iter__(self) -> Iterator[Entry]:
         latest_ns = -1
         for index in self._scans.tolist():
-            stamp_ns = int(self._log["stamps_ns"][index])
-            entry = self._entry(index, stamp_ns, latest_ns)
-            latest_ns = max(latest_ns, stamp_ns)
+            raw = self._raw_scan(index)
+            entry = self._entry(index, raw, latest_ns)
+            latest_ns = max(latest_ns, raw.stamp_ns)
             yield entry
 
-    def _entry(self, index: int, stamp_ns: int, latest_ns: int) -> Entry:
-        log = self._log
-        if stamp_ns < 0:
+    def _entry(self, index: int, raw: RawScan, latest_ns: int) -> Entry:
+        if raw.stamp_ns < 0:
             return Refusal(0, "the scan has no time")
-        if stamp_ns < latest_ns:
-            return Refusal(stamp_ns, "time runs backwards")
-        x, y, _, yaw, pitch, roll = log["sensor_pose"][index].tolist()
-        up = math.cos(pitch) * math.cos(roll)
-        yaw = math.atan2(math.sin(yaw) * math.cos(pitch), math.cos(yaw) * math.cos(pitch))
-        if abs(up) < LEVEL:
-            return Refusal(stamp_ns, f"the laser is tilted by {math.degrees(math.acos(abs(up))):.0f} degrees")
-        if self._odometry is None:
-            before = int(log["odometry_index"][index])  # -1: the frame the robot started in
-            odom_from_base = log["odometry"][before] if before >= 0 else np.zeros(3)
-        elif self._odometry.covers(np.int64(stamp_ns), slack_ns=FRAME_PERIOD_NS):
-            odom_from_base = self._odometry.at(np.int64(stamp_ns))
-        else:
-            return Refusal(stamp_ns, "no odometry at that time")
+        if raw.stamp_ns < latest_ns:
+            return Refusal(raw.stamp_ns, "time runs backwards")
+        sensor_pose = self._log["sensor_pose"][index].tolist()
+        odometry = self._odometry_before(index) if self._odometry is None else self._odometry
+        placement = ScanPlacement(_RecordTransforms(sensor_pose, odometry, self._laser_pose))
+        try:
+            placed = placement.place(raw)
+        except ScanError as err:
+            return Refusal(raw.stamp_ns, err.reason)
+        return Step(placed.scan, np.array(placed.odom_from_base, float))
+
+    def _odometry_before(self, index: int) -> np.ndarray:
+        """(3,) sum of the actions before a frame."""
+        before = int(self._log["odometry_index"][index])  # -1: the frame the robot started in
+        return self._log["odometry"][before] if before >= 0 else np.zeros(3)
+
+    def _raw_scan(self, index: int) -> RawScan:
+        log = self._log
         end = int(self._ends[index])
         part = slice(end - int(log["beams"][index]), end)
+        first_rad, step_rad = float(log["first_angle_rad"][index]), float(log["angle_step_rad"][index])
         # What MRPT calls invalid came back with nothing; it does not tell "nothing met" from "failed".
         ranges_m = np.where(log["valid"][part] != 0, log["ranges_m"][part].astype(float), np.inf)
-        try:
-            scan = scan_from_fields(
-                stamp_ns,
-                ranges_m,
-                float(log["first_angle_rad"][index]),
-                float(log["angle_step_rad"][index]),
-                0.0,
-                float(log["range_max_m"][index]),
-                np.array((x, y, yaw) if self._laser_pose is None else self._laser_pose),
-                upside_down=up < 0.0,
-            )
-        except ScanError as err:
-            return Refusal(stamp_ns, str(err).partition(": ")[2])
-        return Step(scan, np.array(odom_from_base, float))
+        return RawScan(
+            stamp_ns=int(log["stamps_ns"][index]),
+            lidar="",
+            ranges_m=ranges_m,
+            angle_min_rad=first_rad,
+            angle_max_rad=first_rad + step_rad * (len(ranges_m) - 1),
+            angle_increment_rad=step_rad,
+            range_min_m=0.0,
+            range_max_m=float(log["range_max_m"][index]),
+        )

@@ -37,7 +37,7 @@ def load(path: Path, base_from_laser: Sequence[float] = (0.0, 0.0, 0.0)) -> Scan
     try:
         return _from_table(path, text, laser) if path.suffix == ".csv" else _from_message(path, text, laser)
     except ScanError as err:
-        raise RecordingError(f"{path}: {str(err).partition(': ')[2]}") from err
+        raise RecordingError(f"{path}: {err.reason}") from err
 
 
 def _from_message(path: Path, text: str, laser: np.ndarray) -> Scan:

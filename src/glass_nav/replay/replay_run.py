@@ -66,7 +66,7 @@ def run(
                 rows.append(_Row(entry.odom_from_base, estimate, cpu_ms, scores.take(entry.scan, estimate)))
                 listen(entry, estimate)
             except ScanError as err:
-                refusals[str(err).partition(": ")[2]] += 1
+                refusals[err.reason] += 1
         step_done()
     if not rows:
         raise RecordingError(f"{recording.name}: {_nothing_usable(refusals)}")
@@ -127,7 +127,7 @@ class _WorstScans:
         # Nobody relies on a pose that is still being looked for: such scans come last.
         bad = (
             estimate.state not in (LocalizationState.UNKNOWN, LocalizationState.GLOBAL_SEARCH),
-            float(errors.position_m[0]) if errors.matched[0] else 1.0 - estimate.reliability,
+            float(errors.position_m[0]) if errors.matched[0] else 1.0 - estimate.confidence,
         )
         part = row * PARTS // self._expected
         if part not in self._of_part or bad > self._of_part[part][0]:
@@ -160,8 +160,8 @@ class _Row:
         self.stamp_ns, self.map_from_base = estimate.stamp_ns, estimate.map_from_base
         self.deviation = np.sqrt(np.maximum(np.diag(estimate.covariance), 0.0))
         self.state, self.reason = estimate.state, estimate.reason
-        self.used_share, self.updated = estimate.used_share, estimate.updated
-        self.reliability, self.places = estimate.reliability, estimate.places
+        self.used_share, self.updated = estimate.inlier_ratio, estimate.updated
+        self.reliability, self.places = estimate.confidence, estimate.places
         self.particles, self.case, self.true_case = len(estimate.particles), estimate.cases.case, true_case
 
 

@@ -7,7 +7,6 @@ for scans) with one line for the log. B beams, P particles.
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from io import BytesIO
 
 import numpy as np
@@ -26,14 +25,16 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
 
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
+from glass_nav.localization.initial_pose import PoseGuess
 from glass_nav.localization.localizer import BeamCases, Estimate
 from glass_nav.msg import BeamCases as BeamCasesMsg
 from glass_nav.msg import LocalizationStatus
-from glass_nav.sensing.scan import Scan, ScanError, scan_from_fields
+from glass_nav.sensing.mounting import Mounting, level_mounting
+from glass_nav.sensing.scan import Scan, ScanError
+from glass_nav.sensing.scan_placement import PlacedScan, RawScan
 from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
 
-MAX_TILT_RAD = np.radians(20.0)  # a plane tilted by 20 degrees shortens its ranges seen from above by 6 %
 _X_Y_YAW = np.ix_([0, 1, 5], [0, 1, 5])  # of the 6x6 covariances of ROS: x y z roll pitch yaw
 
 
@@ -105,15 +106,6 @@ def transform_stamped(stamp_ns: int, parent: str, child: str, parent_from_child:
     return TransformStamped(header(stamp_ns, parent), child, Transform(pose.position, pose.orientation))
 
 
-@dataclass(frozen=True)
-class PoseGuess:
-    """Where somebody says that the robot was at some time."""
-
-    stamp_ns: int  # 0: now, whenever that is
-    map_from_base: np.ndarray  # (3,)
-    covariance: np.ndarray  # (3, 3) of x, y, yaw
-
-
 def guess_from_msg(msg: PoseWithCovarianceStamped, map_frame: str) -> PoseGuess:
     """The message that rviz sends on `initialpose`, checked. ValueError if it cannot be a start."""
     frame = frame_id(msg.header.frame_id)
@@ -172,49 +164,29 @@ def pose_array(stamp_ns: int, map_frame: str, poses: np.ndarray) -> PoseArray:
 # -- scans
 
 
-@dataclass(frozen=True)
-class Mounting:
-    """How a lidar sits on the robot."""
-
-    base_from_laser: np.ndarray  # (3,) seen from above
-    height_m: float
-    upside_down: bool
-
-
 def mounting_from_transform(base_from_laser: Transform) -> Mounting:
-    """Planar pose of a level lidar, upright or upside down. ScanError if it is neither."""
+    """Where a level lidar sits, upright or upside down. ScanError if it is neither."""
     try:
         planar = planar_from_transform(base_from_laser)
-        up = rotation_from_quaternion(base_from_laser.rotation)[2, 2]
+        upwardness = rotation_from_quaternion(base_from_laser.rotation)[2, 2]
     except ValueError as err:
         raise ScanError(f"the laser's place on the robot: {err}") from err
-    if abs(up) < np.cos(MAX_TILT_RAD):
-        tilt_deg = np.degrees(np.arccos(abs(up)))
-        raise ScanError(
-            f"the laser is tilted by {tilt_deg:.0f} degrees; level within "
-            f"{np.degrees(MAX_TILT_RAD):.0f} degrees is needed, upright or upside down"
-        )
-    return Mounting(planar, float(base_from_laser.translation.z), bool(up < 0.0))
+    return level_mounting(planar, float(base_from_laser.translation.z), float(upwardness))
 
 
-def scan_from_msg(msg: LaserScan, mounting: Mounting) -> Scan:
-    """LaserScan -> Scan by REP 117. ScanError if its fields describe no lidar.
-
-    Args:
-        msg: as the driver sent it.
-        mounting: of the lidar that took it.
-    """
-    return scan_from_fields(
+def raw_scan_from_msg(msg: LaserScan) -> RawScan:
+    """The fields of a LaserScan, nothing checked."""
+    return RawScan(
         ns_from_stamp(msg.header.stamp),
+        frame_id(msg.header.frame_id),
         np.array(msg.ranges, float),
         msg.angle_min,
+        msg.angle_max,
         msg.angle_increment,
         msg.range_min,
         msg.range_max,
-        mounting.base_from_laser,
-        mounting.upside_down,
-        frame_id(msg.header.frame_id),
         msg.time_increment,
+        msg.scan_time,
     )
 
 
@@ -222,29 +194,29 @@ def scan_from_msg(msg: LaserScan, mounting: Mounting) -> Scan:
 AS_MEASURED, CUT, NOT_JUDGED = 0.0, 1.0, -1.0
 
 
-def surface_scan_msg(msg: LaserScan, scan: Scan, surface: SurfaceScan) -> LaserScan:
+def surface_scan_msg(placed: PlacedScan, surface: SurfaceScan) -> LaserScan:
     """The message of `scan_surfaces`: the scan with its beams cut at the first surface of the map.
 
     Fields, order and ranges are the driver's own, but for the ranges of beams that were cut and for the
     intensities: 0 as measured, 1 cut; -1 for all beams while the pose is not trusted and nothing is cut.
 
     Args:
-        msg: as the driver sent it, upside down or not: its beams keep their order.
-        scan: the same for the filter.
+        placed: the scan; upside down or not, its beams keep the driver's order.
         surface: beam by beam in that order.
     """
-    ranges = np.array(msg.ranges, float)
-    ranges[surface.cut] = scan.as_measured(surface.ranges_m)[surface.cut]
+    raw = placed.raw
+    ranges = np.array(raw.ranges_m, float)
+    ranges[surface.cut] = placed.scan.as_measured(surface.ranges_m)[surface.cut]
     flags = np.where(surface.cut, CUT, AS_MEASURED) if surface.trusted else np.full(len(ranges), NOT_JUDGED)
     return LaserScan(
-        header=Header(stamp=msg.header.stamp, frame_id=frame_id(msg.header.frame_id)),
-        angle_min=msg.angle_min,
-        angle_max=msg.angle_max,
-        angle_increment=msg.angle_increment,
-        time_increment=msg.time_increment,
-        scan_time=msg.scan_time,
-        range_min=msg.range_min,
-        range_max=msg.range_max,
+        header=header(raw.stamp_ns, raw.lidar),
+        angle_min=raw.angle_min_rad,
+        angle_max=raw.angle_max_rad,
+        angle_increment=raw.angle_increment_rad,
+        time_increment=raw.time_increment_s,
+        scan_time=raw.scan_time_s,
+        range_min=raw.range_min_m,
+        range_max=raw.range_max_m,
         ranges=ranges.tolist(),
         intensities=flags.tolist(),
     )
@@ -320,15 +292,6 @@ def grid_info(grid_map: GridMap) -> MapMetaData:
 # -- what the filter says
 
 
-def is_finite(estimate: Estimate) -> bool:
-    """Whether the estimate may go out: no NaN on tf, ever."""
-    return bool(
-        np.all(np.isfinite(estimate.map_from_base))
-        and np.all(np.isfinite(estimate.map_from_odom))
-        and np.all(np.isfinite(estimate.covariance))
-    )
-
-
 def status_msg(
     stamp_ns: int, map_frame: str, state: str, reason: str, used_share: float, reliability: float
 ) -> LocalizationStatus:
@@ -349,8 +312,8 @@ def area_from_msg(msg: PolygonStamped, map_frame: str) -> np.ndarray:
     return corners
 
 
-def beam_cases_msg(scan_header: Header, scan: Scan, cases: BeamCases) -> BeamCasesMsg:
-    msg = BeamCasesMsg(header=Header(stamp=scan_header.stamp, frame_id=frame_id(scan_header.frame_id)))
+def beam_cases_msg(scan: Scan, cases: BeamCases) -> BeamCasesMsg:
+    msg = BeamCasesMsg(header=header(scan.stamp_ns, scan.lidar))
     msg.cases = cases.case.astype(np.uint8).tobytes()
     msg.expected, msg.residual = scan.as_measured(cases.expected_m).tolist(), cases.residual_m.tolist()
     msg.weight = cases.weight.tolist()

@@ -1,4 +1,4 @@
-"""One turn of a 2D lidar, checked once and for all.
+"""One sweep of a 2D lidar, its fields checked.
 
 B beams. Ranges follow REP 117: -inf too near, +inf nothing met, NaN no measurement.
 """
@@ -12,7 +12,15 @@ import numpy as np
 
 
 class ScanError(ValueError):
-    """A scan that cannot be used; the text says why."""
+    """A scan that cannot be used.
+
+    The text says why, with the scan's stamp where it is given; `reason` leaves the stamp out, so that equal reasons can
+    be counted.
+    """
+
+    def __init__(self, reason: str, stamp_ns: Optional[int] = None) -> None:
+        super().__init__(reason if stamp_ns is None else f"scan at {stamp_ns * 1e-9:.3f} s: {reason}")
+        self.reason = reason
 
 
 @dataclass(frozen=True)
@@ -45,16 +53,16 @@ class Scan:
         return np.stack([x + ranges_m * np.cos(bearing), y + ranges_m * np.sin(bearing)], axis=-1)
 
     def as_measured(self, ranges_m: np.ndarray) -> np.ndarray:
-        """(B,) ranges of points on the beams from where each beam began, given those from the laser at the stamp.
+        """(B,) ranges from where each beam began, of points on the beams with these ranges from the laser at the stamp.
 
-        Differs for a scan that was straightened, see deskew.py: the driver's ranges are from there.
+        They differ for a scan that was deskewed, see deskew.py: the driver's ranges are from where each beam began.
         """
         if self.origins_m is None:
             return ranges_m
-        there = np.isfinite(ranges_m)
-        along_m = np.where(there, ranges_m, 0.0)
+        finite = np.isfinite(ranges_m)
+        along_m = np.where(finite, ranges_m, 0.0)
         return np.where(
-            there,
+            finite,
             np.hypot(
                 along_m * np.cos(self.angles_rad) - self.origins_m[:, 0],
                 along_m * np.sin(self.angles_rad) - self.origins_m[:, 1],
@@ -63,7 +71,7 @@ class Scan:
         )
 
     def limited(self, min_range_m: float, max_range_m: float) -> "Scan":
-        """The same turn without the ranges outside these limits; a negative limit is the scan's own.
+        """The same scan without the ranges outside these limits; a negative limit is the scan's own.
 
         Raises:
             ScanError: no range is left between the limits.
@@ -73,7 +81,7 @@ class Scan:
         low = max(self.range_min_m, min_range_m)
         high = min(self.range_max_m, max_range_m) if max_range_m >= 0.0 else self.range_max_m
         if not low < high:
-            raise ScanError(f"scan at {self.stamp_ns * 1e-9:.3f} s: no range is left between {low:g} m and {high:g} m")
+            raise ScanError(f"no range is left between {low:g} m and {high:g} m", self.stamp_ns)
         ranges_m = self.ranges_m.copy()
         with np.errstate(invalid="ignore"):
             ranges_m[ranges_m < low] = -np.inf
@@ -113,19 +121,18 @@ def scan_from_fields(
         ScanError: no beams, or fields that describe no lidar.
     """
     ranges_m = np.array(ranges_m, dtype=float).reshape(-1)
-    when = f"scan at {stamp_ns * 1e-9:.3f} s"
     if not len(ranges_m):
-        raise ScanError(f"{when}: no ranges, a scan needs at least 1")
+        raise ScanError("no ranges, a scan needs at least 1", stamp_ns)
     if not (np.isfinite(angle_increment_rad) and angle_increment_rad != 0.0) and len(ranges_m) > 1:
-        raise ScanError(f"{when}: angle_increment must be finite and not 0 rad, got {angle_increment_rad}")
+        raise ScanError(f"angle_increment must be finite and not 0 rad, got {angle_increment_rad}", stamp_ns)
     if not np.isfinite(angle_min_rad):
-        raise ScanError(f"{when}: angle_min must be finite, got {angle_min_rad}")
+        raise ScanError(f"angle_min must be finite, got {angle_min_rad}", stamp_ns)
     if not (np.isfinite(range_max_m) and range_max_m > 0.0):
-        raise ScanError(f"{when}: range_max must be finite and > 0 m, got {range_max_m}")
+        raise ScanError(f"range_max must be finite and > 0 m, got {range_max_m}", stamp_ns)
     if not (np.isfinite(range_min_m) and 0.0 <= range_min_m < range_max_m):
-        raise ScanError(f"{when}: range_min must be in [0, range_max = {range_max_m}) m, got {range_min_m}")
+        raise ScanError(f"range_min must be in [0, range_max = {range_max_m}) m, got {range_min_m}", stamp_ns)
     if np.shape(base_from_laser) != (3,) or not np.all(np.isfinite(base_from_laser)):
-        raise ScanError(f"{when}: the laser's pose on the robot must be finite x, y, yaw, got {base_from_laser}")
+        raise ScanError(f"the laser's pose on the robot must be finite x, y, yaw, got {base_from_laser}", stamp_ns)
     angles_rad = angle_min_rad + angle_increment_rad * np.arange(len(ranges_m))
     with np.errstate(invalid="ignore"):
         ranges_m[ranges_m >= range_max_m] = np.inf

@@ -1,7 +1,7 @@
-"""waypoints -> velocity commands: pure pursuit, which steers for a point of the path a little way ahead.
+"""waypoints -> velocity commands: pure pursuit, which steers for a point of the path a little distance ahead.
 
-Coulter, Implementation of the Pure Pursuit Path Tracking Algorithm, CMU-RI-TR-92-01 (1992). Ours: the point ahead
-runs on beyond the end, so that the steering stays calm there; an omnidirectional base drives to it directly.
+The point ahead runs on beyond the end, so that the steering stays calm there; an omnidirectional base drives to it
+directly.
 W waypoints; poses, velocities as in robot.py.
 """
 
@@ -15,7 +15,7 @@ from typing import Any, List, Tuple
 
 import numpy as np
 
-from glass_nav.geometry import polyline
+from glass_nav.geometry import polyline, pure_pursuit
 from glass_nav.geometry.polyline import Polyline
 from glass_nav.simulation.building import Building
 from glass_nav.simulation.robot import RobotParams
@@ -30,7 +30,7 @@ class PathError(ValueError):
 
 
 @dataclass(frozen=True)
-class FollowerParams:
+class PathFollowerParams:
     """How a path is driven."""
 
     speed_m_s: float = 0.6
@@ -48,7 +48,9 @@ class FollowerParams:
 class PathFollower:
     """Commands a base along a path, from its start to its end, and then to stand."""
 
-    def __init__(self, waypoints_m: np.ndarray, robot: RobotParams, p: FollowerParams = FollowerParams()) -> None:
+    def __init__(
+        self, waypoints_m: np.ndarray, robot: RobotParams, p: PathFollowerParams = PathFollowerParams()
+    ) -> None:
         """Args:
             waypoints_m: (W, 2) in the frame map; points that repeat the one before are left out.
 
@@ -81,9 +83,9 @@ class PathFollower:
         if self.done:
             return np.zeros(3)
         to_point = self._line.at(self.progress_m + self._p.lookahead_m) - map_from_base[:2]
-        distance_m = max(float(np.linalg.norm(to_point)), 1e-6)
+        distance_m = float(np.linalg.norm(to_point))
         bearing = math.remainder(math.atan2(to_point[1], to_point[0]) - float(map_from_base[2]), 2.0 * math.pi)
-        braking = math.sqrt(2.0 * 0.7 * self._robot.max_acceleration_m_s2 * remaining_m) + CREEP_M_S
+        braking = pure_pursuit.braking_speed(remaining_m, self._robot.max_acceleration_m_s2) + CREEP_M_S
         speed = min(self._p.speed_m_s, self._robot.max_speed_m_s, braking)
         if self._robot.kind == "omni":
             return self._sliding(bearing, speed)
@@ -92,23 +94,17 @@ class PathFollower:
     def _steering(self, bearing: float, distance_m: float, speed: float) -> np.ndarray:
         """Along the arc through the point, or first a turn on the spot."""
         if abs(bearing) > TURN_ON_THE_SPOT_RAD:
-            return np.array([0.0, 0.0, self._turn(bearing)])
-        curvature = 2.0 * math.sin(bearing) / distance_m
-        bend = max(abs(curvature), 1e-6)
-        speed = min(speed, self._robot.max_turn_rad_s / bend, math.sqrt(self._p.lateral_acceleration_m_s2 / bend))
-        return np.array([speed, 0.0, speed * curvature])
+            return pure_pursuit.on_the_spot(bearing, self._robot)
+        curvature = pure_pursuit.curvature_towards(bearing, distance_m)
+        return pure_pursuit.along_arc(curvature, self._robot, speed, self._p.lateral_acceleration_m_s2)
 
     def _sliding(self, bearing: float, speed: float) -> np.ndarray:
         """Straight to the point, turning towards it meanwhile."""
         x, y = self._line.direction(self.progress_m)
         ahead = self._line.direction(self.progress_m + self._p.lookahead_m)
+        turn = float(pure_pursuit.on_the_spot(bearing, self._robot)[2])
         speed *= max(0.3, float(x * ahead[0] + y * ahead[1]))  # slower before a corner
-        return np.array([speed * math.cos(bearing), speed * math.sin(bearing), 0.5 * self._turn(bearing)])
-
-    def _turn(self, bearing: float) -> float:
-        """Turn rate that can still be braked within the angle."""
-        rate = math.sqrt(0.7 * 2.0 * self._robot.max_turn_acceleration_rad_s2 * abs(bearing))
-        return math.copysign(min(rate, self._robot.max_turn_rad_s), bearing)
+        return np.array([speed * math.cos(bearing), speed * math.sin(bearing), 0.5 * turn])
 
 
 def find(wanted: str, building: Building) -> np.ndarray:

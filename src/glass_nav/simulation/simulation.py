@@ -20,7 +20,7 @@ from glass_nav.simulation.building import Building
 from glass_nav.simulation.landmark_scanner import LandmarkScanner, ScannerModel, Turn
 from glass_nav.simulation.lidar import LidarModel, TrueScan
 from glass_nav.simulation.odometry import Odometry, OdometryParams
-from glass_nav.simulation.path_follower import FollowerParams, PathFollower
+from glass_nav.simulation.path_follower import PathFollower, PathFollowerParams
 from glass_nav.simulation.robot import Obstacles, Robot, RobotParams
 
 START_NS = 1_600_000_000 * 10**9  # of every run: a stamp that looks like one and says nothing about when it was made
@@ -216,7 +216,7 @@ class Simulation:
         blocked, self._blocked = self._blocked, False
         return Frame(stamp_ns, map_from_base, odom_from_base, scan, truth, readings or (self.reading,), blocked)
 
-    def follower(self, path: "Union[str, np.ndarray]", p: FollowerParams = FollowerParams()) -> PathFollower:
+    def follower(self, path: "Union[str, np.ndarray]", p: PathFollowerParams = PathFollowerParams()) -> PathFollower:
         """For a path by name or file, see path_follower.find(), or waypoints (W, 2). Puts a robot that has not moved
         yet at its start.
 
@@ -231,7 +231,7 @@ class Simulation:
             self._track = [self._moment]
         return follower
 
-    def drive(self, path: "Union[str, np.ndarray]", p: FollowerParams = FollowerParams()) -> Iterator[Frame]:
+    def drive(self, path: "Union[str, np.ndarray]", p: PathFollowerParams = PathFollowerParams()) -> Iterator[Frame]:
         """Follow a path; a frame at once and then one at every turn of the lidar, until the robot stands at the end.
 
         Raises:

@@ -130,7 +130,7 @@ def test_bad_input_is_one_line_and_exit_code_3(run, floor, tmp_path):
     assert run("build", floor, "--out", "a")[0] == 0
     for words, text in (
         (["build", tmp_path / "no.yaml", "--out", "b"], "no.yaml: cannot be read: No such file or directory"),
-        (["build", solid, "--out", "b"], "no way of 2 m for a robot of 0.22 m radius in this map"),
+        (["build", solid, "--out", "b"], "no path of 2 m in this map for a robot of 0.22 m radius"),
         (["show", tmp_path / "b"], "b: no such file, nor an atlas of the package, which are "),
         (["show", tmp_path / "a", "--edge", 5], "a/atlas.json: --edge must be 0 to 4, got 5"),
         (

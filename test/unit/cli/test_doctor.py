@@ -66,7 +66,7 @@ def test_a_damaged_bag_is_a_finding(doctor, room_bag):
     path.write_bytes(content)
     code, out, _ = doctor(path)
     assert code == 1
-    assert "finding  bag-damaged: the bag is damaged, " in out
+    assert "finding  bag-damaged: the bag is damaged: " in out
 
 
 @pytest.mark.parametrize(

@@ -64,7 +64,7 @@ def test_a_lidar_that_turns_makes_a_bag_that_says_so(run, tmp_path):
     code, _, err = run("--turn-time", 0.05, "--seed", 2)
     assert code == 0, err
     recording = open_log(tmp_path / "run.bag")
-    assert "the lidar turns for 50 ms: scans are straightened by odometry" in recording.notes
+    assert "a sweep of the lidar takes 50 ms: scans are deskewed by odometry" in recording.notes
     entries = list(recording)
     assert len(entries) > 20 and all(entry.scan.origins_m is not None for entry in entries[1:])
     stamps_ns = [entry.scan.stamp_ns for entry in entries]

@@ -16,6 +16,7 @@ from glass_nav.compare import engine
 from glass_nav.compare.engine import EngineError, Failed
 
 JOBS = [3, 1, -4, 5, 0, 2]
+WHY = "scripts/setup installs distributed"
 ANSWERS = [9, 1, Failed(-4, "-4 is negative"), 25, 0, 4]
 
 
@@ -31,7 +32,7 @@ def wait_until(condition, timeout_s):
 @pytest.fixture(scope="module")
 def scheduler(tmp_path_factory):
     """Address of a scheduler with one worker, both processes of their own on free ports."""
-    pytest.importorskip("distributed", reason="scripts/setup --dev installs distributed")
+    pytest.importorskip("distributed", reason=WHY)
     folder = tmp_path_factory.mktemp("dask")
     environment = {
         **os.environ,
@@ -77,7 +78,7 @@ def scheduler(tmp_path_factory):
 @pytest.mark.parametrize("cores", [1, 2])
 def test_answers_come_in_the_order_of_the_jobs_and_a_failure_stops_no_other(cores):
     if cores > 1:
-        pytest.importorskip("joblib", reason="scripts/setup installs joblib")
+        pytest.importorskip("distributed", reason=WHY)
     steps = []
     assert engine.run(JOBS, engine_jobs.squared, steps.append, cores) == ANSWERS
     assert sum(steps) == 3 + 1 + 5 + 0 + 2
@@ -92,18 +93,16 @@ def test_a_dask_cluster_gives_the_same_answers(scheduler):
 
 
 def test_more_than_one_core_means_other_processes():
-    pytest.importorskip("joblib", reason="scripts/setup installs joblib")
+    pytest.importorskip("distributed", reason=WHY)
     assert os.getpid() not in engine.run([1, 2], engine_jobs.process, lambda count: None, cores=2)
     assert set(engine.run([1, 2], engine_jobs.process, lambda count: None)) == {os.getpid()}
 
 
 def test_a_process_that_is_killed_is_told_in_one_line():
-    pytest.importorskip("joblib", reason="scripts/setup installs joblib")
+    pytest.importorskip("distributed", reason=WHY)
     answers = engine.run([1, 2], engine_jobs.ended, lambda count: None, cores=2)
     assert [answer.job for answer in answers] == [1, 2]
-    assert {answer.reason for answer in answers} == {
-        "a process ended on its own, out of memory? (fewer --jobs need less)"
-    }
+    assert {answer.reason for answer in answers} == {"its process died, out of memory?"}
 
 
 def test_what_a_worker_of_the_cluster_cannot_do_stops_no_other(scheduler):
@@ -112,15 +111,8 @@ def test_what_a_worker_of_the_cluster_cannot_do_stops_no_other(scheduler):
     assert failed.job == "two" and failed.reason.startswith("TypeError: ")
 
 
-def test_a_joblib_too_old_is_told(monkeypatch):
-    joblib = pytest.importorskip("joblib", reason="scripts/setup installs joblib")
-    monkeypatch.setattr(joblib, "Parallel", lambda: None)  # as before 1.3: without return_as
-    with pytest.raises(EngineError, match="^joblib .* is too old, 1.3 or later is needed$"):
-        engine.run([1, 2], engine_jobs.squared, lambda count: None, cores=2)
-
-
 def test_a_scheduler_without_workers_is_told(monkeypatch):
-    distributed = pytest.importorskip("distributed", reason="scripts/setup --dev installs distributed")
+    distributed = pytest.importorskip("distributed", reason=WHY)
     monkeypatch.setattr(engine, "WORKER_S", 0.5)
     with distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0", scheduler_port=0) as cluster:
         address = cluster.scheduler_address
@@ -129,15 +121,17 @@ def test_a_scheduler_without_workers_is_told(monkeypatch):
     assert str(caught.value) == f"no worker has joined the Dask scheduler at {address} within 0.5 s"
 
 
-@pytest.mark.parametrize("package, options", [("joblib", {"cores": 2}), ("distributed", {"scheduler": "tcp://a:1"})])
-def test_a_package_that_is_missing_is_named(monkeypatch, package, options):
-    monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(EngineError, match=rf"needs the Python package {package} \(pip install {package}\)"):
-        engine.run([1, 2], engine_jobs.squared, lambda count: None, **options)
+@pytest.mark.parametrize("option, given", [("--jobs 2", {"cores": 2}), ("--scheduler", {"scheduler": "tcp://a:1"})])
+def test_without_the_package_the_option_that_needs_it_is_named(monkeypatch, option, given):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(
+        EngineError, match=rf"^{option} needs the Python package distributed \(pip install distributed\)"
+    ):
+        engine.run([1, 2], engine_jobs.squared, lambda count: None, **given)
 
 
 def test_a_scheduler_that_does_not_answer_is_told(monkeypatch):
-    pytest.importorskip("distributed", reason="scripts/setup --dev installs distributed")
+    pytest.importorskip("distributed", reason=WHY)
     monkeypatch.setattr(engine, "CONNECT_S", 0.5)
     with pytest.raises(EngineError, match="^no Dask scheduler answers at tcp://127.0.0.1:9: ") as caught:
         engine.run([1], engine_jobs.squared, lambda count: None, scheduler="tcp://127.0.0.1:9")

@@ -9,6 +9,7 @@ import pytest
 
 from glass_nav.driving import pursuit
 from glass_nav.driving.base_limits import BaseLimits
+from glass_nav.geometry import pure_pursuit
 from glass_nav.simulation import robot
 
 LIMITS = BaseLimits()
@@ -27,7 +28,7 @@ def test_the_arc_leads_through_the_point(point):
 def test_it_is_no_faster_than_the_base_and_slower_in_bends(point):
     speed, _, turn = pursuit.along_arc(np.array(point), LIMITS)
     assert speed <= LIMITS.max_speed_m_s + 1e-12 and abs(turn) <= LIMITS.max_turn_rad_s + 1e-12
-    assert speed * abs(turn) <= pursuit.LATERAL_M_S2 + 1e-9  # v^2 / radius
+    assert speed * abs(turn) <= pure_pursuit.LATERAL_M_S2 + 1e-9  # v^2 / radius
     straight = pursuit.along_arc(np.array([0.5, 0.0]), LIMITS)
     assert straight.tolist() == [LIMITS.max_speed_m_s, 0.0, 0.0]
 

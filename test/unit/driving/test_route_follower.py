@@ -9,7 +9,7 @@ import pytest
 
 from glass_nav.driving import velocity
 from glass_nav.driving.base_limits import BaseLimits
-from glass_nav.driving.route_follower import FollowerParams, RouteFollower
+from glass_nav.driving.route_follower import RouteFollower, RouteFollowerParams
 from glass_nav.geometry import angles
 from glass_nav.simulation.robot import Obstacles, Robot, RobotParams
 
@@ -100,4 +100,4 @@ def test_an_end_that_was_missed_to_the_side_is_returned_to():
 @pytest.mark.parametrize("name", ["lookahead_m", "goal_tolerance_m", "goal_tolerance_rad"])
 def test_a_tolerance_that_is_none_is_refused(name):
     with pytest.raises(ValueError, match=f"^~{name} must be > 0 and finite, got 0.0$"):
-        FollowerParams(**{name: 0.0})
+        RouteFollowerParams(**{name: 0.0})

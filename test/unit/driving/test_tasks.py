@@ -20,7 +20,7 @@ from glass_nav.driving.base_limits import BaseLimits
 from glass_nav.driving.edge_driver import EdgeDriver
 from glass_nav.driving.recovery import RecoveryParams
 from glass_nav.driving.route import RoutePlanner
-from glass_nav.driving.route_follower import FollowerParams
+from glass_nav.driving.route_follower import RouteFollowerParams
 from glass_nav.driving.tasks import EdgeTask, GoTask, Moment
 from glass_nav.geometry import se2
 from glass_nav.simulation import building_map
@@ -149,7 +149,7 @@ def planner():
 
 
 def going(drive, planner, goal, yaw=None):
-    return GoTask(planner, drive.driver, FollowerParams(), QUICK, LIMITS, goal, yaw)
+    return GoTask(planner, drive.driver, RouteFollowerParams(), QUICK, LIMITS, goal, yaw)
 
 
 def node_near(planner, x, y):

@@ -33,10 +33,3 @@ def test_it_slows_down_and_turns_back_as_gently():
 
 def test_it_never_goes_sideways():
     assert velocity.limited(np.array([0.1, 0.4, 0.0]), STANDING, LIMITS, 1.0)[1] == 0.0
-
-
-def test_a_base_that_brakes_from_the_braking_speed_stands_within_the_way():
-    for way in (0.01, 0.1, 1.0):
-        speed = velocity.braking_speed(way, 0.5)
-        assert speed**2 / (2.0 * 0.5) < way
-    assert velocity.braking_speed(-1.0, 0.5) == 0.0

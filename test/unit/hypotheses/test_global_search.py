@@ -9,7 +9,8 @@ import pytest
 from buildings import L_ROOM, SECOND_NS, Building, loop_drive, odometry, off
 
 from glass_nav.geometry import angles, se2
-from glass_nav.hypotheses.global_search import GlobalSearch, SearchParams, same_place
+from glass_nav.hypotheses.global_search import GlobalSearch, SearchParams
+from glass_nav.hypotheses.pose_tracker import same_place
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.sensing import bearings
 from glass_nav.sensing.distance_field import DistanceField

@@ -11,7 +11,7 @@ from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
 from glass_nav.localization.health import LocalizationHealth, Situation
 from glass_nav.localization.localizer import BeamCases, Estimate
 from glass_nav.sensing.scan import Scan
-from glass_nav.sensing.waiting_scans import ScanCounts
+from glass_nav.sensing.scan_queue import ScanCounts
 from glass_nav.world.grid_map import GridMap
 
 OK, WARN, ERROR = Level.OK, Level.WARN, Level.ERROR
@@ -38,7 +38,7 @@ def estimate(state="LOCALIZED", std=0.05, used_share=0.9, beams=100):
         "why",
         used_share,
         True,
-        reliability=0.8,
+        confidence=0.8,
     )
 
 

@@ -208,7 +208,7 @@ def test_a_new_pose_on_the_same_map_keeps_its_glass():
 
 @pytest.mark.long_run
 def test_scans_that_fit_nowhere_teach_nothing():
-    """A robot that was carried away would take all walls for glass."""
+    """A robot that was kidnapped would take all walls for glass."""
     drive = GlassDrive(steps=20)
     localizer = started(GLASS_ROOM, drive.true[0])
     drive.through(localizer, last=12)
@@ -359,7 +359,7 @@ def test_while_places_look_alike_all_of_them_are_told():
         off_m, off_rad = np.array([off(particle, turned) for particle in told.particles]).T
         assert np.any((off_m < 0.15) & (off_rad < np.radians(3.0))), quarter
     assert told.covariance[0, 0] > 0.5  # of all of them, not of one
-    assert told.reliability < 0.5
+    assert told.confidence < 0.5
 
 
 def test_in_an_area_only_what_lies_in_it_is_a_candidate():
@@ -386,8 +386,8 @@ def test_a_scan_without_answers_leaves_a_search_where_it_is():
     localizer = Localizer(parameters(), MAPS[L_ROOM], np.random.default_rng(0))
     localizer.scatter()
     blind = localizer.update(replace(drive.scans[0], ranges_m=np.full(len(drive.scans[0]), np.nan)), drive.odometry[0])
-    assert blind.state == "GLOBAL_SEARCH" and blind.reason == "no scan has told anything yet"
-    assert np.isfinite(blind.map_from_base).all() and blind.reliability < 0.5
+    assert blind.state == "GLOBAL_SEARCH" and blind.reason == "no usable scan yet"
+    assert np.isfinite(blind.map_from_base).all() and blind.confidence < 0.5
     seen = localizer.update(drive.scans[1], drive.odometry[1])
     assert "possible" in seen.reason
 
@@ -405,7 +405,7 @@ def test_a_robot_that_was_carried_away_says_so_and_is_found_again():
     left = next(index for index, estimate in enumerate(estimates) if estimate.state != "LOCALIZED")
     assert left < 8 and way_m[0] > 0.7
     assert "the scans fit" in estimates[left].reason
-    assert estimates[left].reliability < 0.9
+    assert estimates[left].confidence < 0.9
     assert estimates[-1].state == "LOCALIZED" and way_m[-1] < 0.05
 
 
@@ -476,7 +476,7 @@ def test_without_answers_the_robot_goes_where_odometry_leads(nothing, seed):
         assert way_m < 0.08 and turn_rad < np.radians(3.0)
     assert np.linalg.eigvalsh(blind[-1].covariance).min() >= 0.0
     assert np.trace(blind[-1].covariance) > np.trace(blind[0].covariance)  # it knows that it knows less
-    assert all(np.isnan(estimate.used_share) and not estimate.cases.case.any() for estimate in blind)
+    assert all(np.isnan(estimate.inlier_ratio) and not estimate.cases.case.any() for estimate in blind)
     assert drive.errors(estimates)[21:, 0].max() < 0.05  # and what it sees again counts again
 
 
@@ -727,7 +727,7 @@ def test_an_estimate_is_whole(drive):
         assert np.linalg.eigvalsh(estimate.covariance).min() >= -1e-12
         assert 200 <= len(estimate.particles) <= 800 and np.isfinite(estimate.particles).all()
         assert estimate.cases.case.shape == (180,)
-        assert estimate.used_share == pytest.approx(np.mean(estimate.cases.case > 0))
+        assert estimate.inlier_ratio == pytest.approx(np.mean(estimate.cases.case > 0))
         told = estimate.cases.case > 0
         np.testing.assert_allclose(estimate.cases.residual_m[told], (scan.ranges_m - estimate.cases.expected_m)[told])
         assert np.median(np.abs(estimate.cases.residual_m[told])) < 0.03

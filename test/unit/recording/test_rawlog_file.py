@@ -198,7 +198,7 @@ def test_scans_that_cannot_be_used_are_refused_one_by_one():
     assert [entry.reason for entry in entries if isinstance(entry, Refusal)] == [
         "time runs backwards",
         "the scan has no time",
-        "the laser is tilted by 90 degrees",
+        "the laser is tilted by 90 degrees; level within 20 degrees is needed, upright or upside down",
         "angle_increment must be finite and not 0 rad, got 0.0",
     ]
 

@@ -15,7 +15,7 @@ def step(second):
 def test_a_scan_that_the_filter_refuses_is_counted():
     class Filter:
         def update(self, scan, odom_from_base):
-            raise ScanError("scan at 1.000 s: no good")
+            raise ScanError("no good", 1_000_000_000)
 
     with pytest.raises(RecordingError, match="^log: none of its 2 scans can be used; 2 times: no good$"):
         replay_run.run(Recording("log", 2, [step(0), step(1)]), Filter(), lambda stamp_ns: None, 0)

@@ -29,7 +29,10 @@ from glass_nav.localization.localizer import BeamCases, Estimate
 from glass_nav.msg import BeamCases as BeamCasesMsg
 from glass_nav.msg import LocalizationStatus
 from glass_nav.ros import conversions
+from glass_nav.sensing import scan_placement
+from glass_nav.sensing.mounting import Mounting
 from glass_nav.sensing.scan import ScanError
+from glass_nav.sensing.scan_placement import PlacedScan
 from glass_nav.world.grid_map import GridMap
 
 
@@ -200,14 +203,6 @@ def test_the_packed_particles_arrive_as_poses(count):
     assert angles.wrap(back[:, 2] - poses[:, 2]) == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("field", ["map_from_base", "map_from_odom", "covariance"])
-def test_an_estimate_with_nan_is_told_from_one_without(field):
-    good = estimate()
-    assert conversions.is_finite(good)
-    getattr(good, field).flat[0] = np.nan
-    assert not conversions.is_finite(good)
-
-
 def test_the_status_says_the_state_as_number_and_word():
     msg = sent_and_received(conversions.status_msg(7, "map", "LOST", "nothing fits", 0.1, 0.25))
     assert (msg.state, msg.state_name, msg.reason) == (LocalizationStatus.LOST, "LOST", "nothing fits")
@@ -245,15 +240,10 @@ def test_an_area_that_is_none_is_refused(msg, text):
 
 def test_beam_cases_arrive_beam_by_beam():
     msg = sent_and_received(
-        conversions.beam_cases_msg(
-            Header(stamp=rospy.Time(3), frame_id="/laser"),
-            conversions.scan_from_msg(scan_message(), upright()),
-            estimate().cases,
-        ),
-        BeamCasesMsg,
+        conversions.beam_cases_msg(placed(scan_message(frame="/laser")).scan, estimate().cases), BeamCasesMsg
     )
     assert list(msg.cases) == [1, 0, 4]
-    assert (msg.header.frame_id, msg.header.stamp) == ("laser", rospy.Time(3))
+    assert (msg.header.frame_id, msg.header.stamp) == ("laser", rospy.Time(9))
     assert np.array(msg.expected) == pytest.approx([1.0, np.nan, 3.0], nan_ok=True)
     assert np.array(msg.weight) == pytest.approx([0.9, 0.2, 0.6])
 
@@ -261,19 +251,23 @@ def test_beam_cases_arrive_beam_by_beam():
 # -- scans
 
 
-def scan_message(**fields) -> LaserScan:
+def scan_message(frame: str = "laser", **fields) -> LaserScan:
     values = dict(
         angle_min=-0.5, angle_max=0.5, angle_increment=0.5, range_min=0.1, range_max=10.0, ranges=[1.0, np.inf, 2.0]
     )
-    return LaserScan(header=Header(stamp=rospy.Time(9), frame_id="laser"), **{**values, **fields})
+    return LaserScan(header=Header(stamp=rospy.Time(9), frame_id=frame), **{**values, **fields})
 
 
-def upright() -> conversions.Mounting:
-    return conversions.Mounting(np.array([0.2, 0.0, 0.0]), 0.4, False)
+UPRIGHT = Mounting(np.array([0.2, 0.0, 0.0]), 0.4)
+
+
+def placed(msg: LaserScan, mounting: Mounting = UPRIGHT) -> PlacedScan:
+    raw = conversions.raw_scan_from_msg(msg)
+    return PlacedScan(raw, scan_placement.mounted(raw, mounting), mounting, np.zeros(3))
 
 
 def test_a_scan_keeps_ranges_angles_and_stamp():
-    scan = conversions.scan_from_msg(scan_message(), upright())
+    scan = placed(scan_message()).scan
     assert scan.stamp_ns == 9_000_000_000
     assert scan.angles_rad == pytest.approx([-0.5, 0.0, 0.5])
     assert scan.ranges_m.tolist() == [1.0, np.inf, 2.0]
@@ -284,7 +278,7 @@ def test_points_of_a_laser_upside_down_are_those_of_the_rotation_in_space(yaw):
     transform = Transform(Vector3(0.2, -0.1, 0.5), quaternion(np.pi, 0.0, yaw))
     mounting = conversions.mounting_from_transform(transform)
     assert mounting.upside_down and mounting.height_m == 0.5
-    scan = conversions.scan_from_msg(scan_message(ranges=[1.0, 3.0, 2.0]), mounting)
+    scan = placed(scan_message(ranges=[1.0, 3.0, 2.0]), mounting).scan
     in_laser = np.array([[np.cos(-0.5), np.sin(-0.5), 0], [3, 0, 0], [2 * np.cos(0.5), 2 * np.sin(0.5), 0]])
     in_base = in_laser @ conversions.rotation_from_quaternion(transform.rotation).T + [0.2, -0.1, 0.5]
     assert scan.points_in_base() == pytest.approx(in_base[:, :2])
@@ -308,7 +302,7 @@ def surface_scan(cut_m: "list[float]", trusted: bool = True) -> SurfaceScan:
 
 
 def cut(msg: LaserScan, surface: SurfaceScan) -> LaserScan:
-    return conversions.surface_scan_msg(msg, conversions.scan_from_msg(msg, upright()), surface)
+    return conversions.surface_scan_msg(placed(msg), surface)
 
 
 def test_beams_are_cut_in_the_order_of_the_message_and_flagged():
@@ -336,19 +330,18 @@ def test_a_raw_scan_is_told_by_its_intensities():
 
 
 def test_the_frame_of_a_cut_scan_has_no_slash():
-    msg = scan_message()
-    msg.header.frame_id = "/laser"
+    msg = scan_message(frame="/laser")
     assert cut(msg, surface_scan([np.nan] * 3)).header.frame_id == "laser"
 
 
-def test_a_cut_of_a_straightened_scan_is_told_from_where_its_beam_began():
-    msg = scan_message(ranges=[1.0, np.inf, 2.0])
+def test_a_cut_of_a_deskewed_scan_is_told_from_where_its_beam_began():
     began = np.array([[0.0, 0.0], [0.3, 0.4], [0.0, 0.0]])  # the middle beam, straight ahead from beside its way
-    scan = replace(conversions.scan_from_msg(msg, upright()), origins_m=began)
-    out = conversions.surface_scan_msg(msg, scan, surface_scan([np.nan, 1.1, np.nan]))
+    there = placed(scan_message(ranges=[1.0, np.inf, 2.0]))
+    there = replace(there, scan=replace(there.scan, origins_m=began))
+    out = conversions.surface_scan_msg(there, surface_scan([np.nan, 1.1, np.nan]))
     assert out.ranges == pytest.approx([1.0, np.hypot(0.8, 0.4), 2.0])
     cases = replace(estimate().cases, expected_m=np.array([1.0, np.nan, 2.0]))
-    told = conversions.beam_cases_msg(msg.header, scan, cases)
+    told = conversions.beam_cases_msg(there.scan, cases)
     assert told.expected == pytest.approx([1.0, np.nan, 2.0], nan_ok=True)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from glass_nav.simulation import path_follower
 from glass_nav.simulation.building import Building, Wall
-from glass_nav.simulation.path_follower import FollowerParams, PathError, PathFollower
+from glass_nav.simulation.path_follower import PathError, PathFollower, PathFollowerParams
 from glass_nav.simulation.robot import KINDS, Obstacles, Robot, RobotParams
 
 NOTHING = Obstacles(np.zeros((0, 2, 2)))
@@ -23,7 +23,7 @@ PATHS = {
 CONTROL_S = 0.02
 
 
-def followed(waypoints, kind, p=FollowerParams(), robot_pose=None, limit_s=120.0):
+def followed(waypoints, kind, p=PathFollowerParams(), robot_pose=None, limit_s=120.0):
     """Poses of a robot that follows, until it stands at the end."""
     robot_params = RobotParams(kind)
     follower = PathFollower(np.array(waypoints, float), robot_params, p)
@@ -68,7 +68,7 @@ def test_the_whole_way_is_gone_where_a_path_crosses_itself_or_turns_back():
 
 def test_the_speed_is_that_asked_for_within_what_the_base_can():
     for asked, top in ((0.3, 0.3), (5.0, 1.0)):
-        _, velocities, _ = followed(PATHS["straight"], "diff", FollowerParams(speed_m_s=asked))
+        _, velocities, _ = followed(PATHS["straight"], "diff", PathFollowerParams(speed_m_s=asked))
         assert velocities[:, 0].max() == pytest.approx(top)
 
 
@@ -106,7 +106,7 @@ def test_what_is_no_path_is_refused(waypoints, text):
 
 def test_a_speed_of_nothing_is_refused():
     with pytest.raises(ValueError) as caught:
-        FollowerParams(speed_m_s=0.0)
+        PathFollowerParams(speed_m_s=0.0)
     assert str(caught.value) == "speed_m_s of the path follower must be > 0 m/s and finite, got 0.0"
 
 
@@ -153,7 +153,7 @@ def test_a_path_is_found_by_name_by_order_and_as_a_file(tmp_path):
 
 
 def test_the_way_back_is_the_same_path():
-    follower = PathFollower(np.array(PATHS["corner"], float), RobotParams(), FollowerParams(speed_m_s=0.2)).back()
+    follower = PathFollower(np.array(PATHS["corner"], float), RobotParams(), PathFollowerParams(speed_m_s=0.2)).back()
     np.testing.assert_allclose(follower.start, [4.0, 3.0, -math.pi / 2])
     assert follower.length_m == 7.0
     assert np.abs(follower.command(follower.start)).max() == pytest.approx(0.2)

@@ -10,7 +10,7 @@ from glass_nav.geometry import angles, se2
 from glass_nav.simulation.building import Building, Pane, Thing, Wall, box
 from glass_nav.simulation.lidar import PRESETS
 from glass_nav.simulation.odometry import EXACT
-from glass_nav.simulation.path_follower import FollowerParams, PathError
+from glass_nav.simulation.path_follower import PathError, PathFollowerParams
 from glass_nav.simulation.robot import RobotParams
 from glass_nav.simulation.simulation import CONTROL_S, START_NS, Simulation, SimulationError
 
@@ -114,7 +114,7 @@ def test_exact_wheels_tell_the_truth():
 
 def test_waypoints_are_a_path_too_and_a_start_that_was_given_is_kept():
     run = simulation(start=np.array([0.6, 1.0, 0.0]))
-    frames = list(run.drive(np.array([[1.0, 1.0], [2.0, 1.0]]), FollowerParams(speed_m_s=0.3)))
+    frames = list(run.drive(np.array([[1.0, 1.0], [2.0, 1.0]]), PathFollowerParams(speed_m_s=0.3)))
     np.testing.assert_array_equal(frames[0].map_from_base, [0.6, 1.0, 0.0])
     assert np.hypot(*(frames[-1].map_from_base[:2] - [2.0, 1.0])) < 0.05
     steps_m = np.diff([frame.map_from_base[0] for frame in frames])

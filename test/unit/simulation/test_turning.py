@@ -48,7 +48,7 @@ def test_a_robot_that_turns_sees_each_beam_later_than_the_one_before(office):
         assert turned.ranges_m[beam] == pytest.approx(alone, abs=0.05)  # a sector is of one moment
 
 
-def test_a_frame_is_of_its_first_beam_and_odometry_straightens_it(office):
+def test_a_frame_is_of_its_first_beam_and_odometry_deskews_it(office):
     simulation = Simulation(office, QUIET, seed=1, turn_time_s=0.08)
     frames = [simulation.look(), *(simulation.step(0.1, np.array([0.3, 0.0, 1.0])) for _ in range(15))]
     readings = {sample.stamp_ns: sample.odom_from_base for frame in frames for sample in frame.odometry}
@@ -58,7 +58,7 @@ def test_a_frame_is_of_its_first_beam_and_odometry_straightens_it(office):
         assert frame.scan.time_increment_s == pytest.approx(0.08 / 180)
         assert frame.odometry[-1].stamp_ns - frame.stamp_ns == 80_000_000
         np.testing.assert_allclose(frame.odom_from_base, odometry.at(np.int64(frame.stamp_ns)), atol=1e-9)
-        scans = deskew.straightened(frame.scan, odometry), frame.scan
+        scans = deskew.deskewed(frame.scan, odometry), frame.scan
         map_from_laser = se2.compose(frame.map_from_base, frame.scan.base_from_laser)
         off_m.append(
             [

@@ -77,3 +77,8 @@ def test_a_traversal_that_cannot_be_is_refused(fields: Dict[str, Any], line: str
     with pytest.raises(ObservationError) as refused:
         Traversal(**{"rank": 1, "length_m": 5.0, "chord_m": 4.0, **fields})
     assert str(refused.value).startswith("edge traversal: ") and line in str(refused.value)
+
+
+def test_the_odometry_of_a_meetpoint_must_be_finite() -> None:
+    with pytest.raises(ObservationError, match="meetpoint: its odometry needs finite x, y and yaw, got "):
+        Meetpoint(3, 1.0, odom_from_base=np.array([0.0, np.nan, 0.0]))

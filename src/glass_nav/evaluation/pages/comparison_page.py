@@ -1,68 +1,35 @@
-"""A comparison as one HTML file, as a report is one: pictures inside, nothing fetched."""
+"""A comparison as one HTML file, as a report is one."""
 
 from __future__ import annotations
 
-from html import escape
 from pathlib import Path
-from typing import Any, Mapping, Sequence
+from typing import Any, List, Mapping, Sequence
 
 from glass_nav.evaluation.metrics import comparison
 from glass_nav.evaluation.metrics.comparison import Comparison
 from glass_nav.evaluation.metrics.confidence import Interval
-from glass_nav.evaluation.pages import comparison_table, report_page
+from glass_nav.evaluation.pages import comparison_table, templates
 from glass_nav.evaluation.plots import comparison_pictures
 from glass_nav.evaluation.plots.canvas import Picture
 
 
 def write(path: Path, compared: Comparison, drawn: Sequence[Picture], about: Mapping[str, Any]) -> None:
     """The page; the first of the pictures is that of the first screen."""
-    title = f"{' | '.join(compared.contestants)} over {', '.join(compared.logs)}"
-    figures, *rest = drawn
-    head, *rows = comparison_table.summary(compared)
-    body = [
-        '<section class="verdict" style="--grade: var(--link)" aria-labelledby="verdict">'
-        f'<p class="log">{escape(comparison.counted(compared))}: {escape(", ".join(compared.logs))}</p>',
-        f'<h1 id="verdict">{escape(headline(compared))}</h1>',
-        *(f"<p>{escape(note)}</p>" for note in compared.notes),
-        "</section>",
-        '<h2 id="means">All logs</h2><div class="card">',
-        report_page.table(head, rows, numbers=True),
-        f"<p>{escape(_READING.format(first=compared.contestants[0]))}</p></div>",
-        '<h2 id="figures">In pictures</h2>',
-        report_page.framed(figures, lazy=False),
-    ]
-    if len(compared.logs) > 1:
-        for log in compared.logs:
-            head, *rows = comparison_table.summary(compared, log)
-            body += [
-                f"<h2>{escape(log)}</h2>",
-                '<div class="card">',
-                report_page.table(head, rows, numbers=True),
-                "</div>",
-            ]
-    if rest:
-        body += [
-            '<h2 id="logs">Log by log</h2><div class="pictures">',
-            *(report_page.framed(each) for each in rest),
-            "</div>",
-        ]
-        left = len(compared.logs) - comparison_pictures.MAX_LOGS
-        if left > 0:
-            body.append(f"<p>{left} more logs have no pictures of their own.</p>")
-    body += [
-        '<h2 id="contestants">Who took part</h2>',
-        report_page.table(["name", "what"], [[name, str(about["what"][name])] for name in compared.contestants]),
-        '<h2 id="runs">All runs</h2>',
-        _runs(compared),
-    ]
-    path.write_text(report_page.page(title, body), encoding="utf-8")
-
-
-_READING = (
-    "Mean over seeds, ± its 95 % interval (Student's t over the seeds of each log; all logs have the same "
-    "weight). Differences are to {first}, seed by seed: told as better or worse where 0 is outside the "
-    "interval; of 20 figures that are equal in truth, one is told so by chance."
-)
+    several = compared.logs if len(compared.logs) > 1 else []
+    templates.write(
+        path,
+        "comparison.html.j2",
+        title=f"{' | '.join(compared.contestants)} over {', '.join(compared.logs)}",
+        compared=compared,
+        counted=comparison.counted(compared),
+        headline=headline(compared),
+        means=comparison_table.summary(compared),
+        by_log=[(log, comparison_table.summary(compared, log)) for log in several],
+        pictures=drawn,
+        without_pictures=len(compared.logs) - comparison_pictures.MAX_LOGS,
+        contestants=[[name, str(about["what"][name])] for name in compared.contestants],
+        runs=_runs(compared),
+    )
 
 
 def headline(compared: Comparison) -> str:
@@ -90,7 +57,8 @@ def headline(compared: Comparison) -> str:
     return f"{figure.title[0].upper()}{figure.title[1:]}: {said}"
 
 
-def _runs(compared: Comparison) -> str:
+def _runs(compared: Comparison) -> List[List[str]]:
+    """Head and rows."""
     head = [
         "log",
         "contestant",
@@ -110,4 +78,4 @@ def _runs(compared: Comparison) -> str:
         ]
         for run in compared.runs
     ]
-    return report_page.table(head, rows, numbers=True)
+    return [head, *rows]

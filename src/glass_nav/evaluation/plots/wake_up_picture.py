@@ -36,8 +36,8 @@ class WakeUpStory:
     """What happened."""
 
     depths: List[Depth]
-    search_m: np.ndarray  # (N, 2) true way until the place was known, or the end
-    tour_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))  # (M, 2) true way after that
+    search_m: np.ndarray  # (N, 2) true path until the place was known, or the end
+    tour_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))  # (M, 2) true path after that
     handed_over: Optional[np.ndarray] = None  # (3,) pose that the search found
     final: Optional[np.ndarray] = None  # (3,) pose that the localization says at the end
     truth: Optional[np.ndarray] = None  # (3,) true pose then
@@ -88,8 +88,8 @@ def _ground(axes: Any, grid: GridMap, low: np.ndarray, high: np.ndarray) -> None
 def _draw_way(axes: Any, grid: GridMap, story: WakeUpStory, low: np.ndarray, high: np.ndarray) -> None:
     _ground(axes, grid, low, high)
     for way, colour, width, label in (
-        (story.tour_m, TOUR_COLOUR, 3.2, "true way of the tour"),
-        (story.search_m, SEARCH_COLOUR, 1.8, "true way of the search"),
+        (story.tour_m, TOUR_COLOUR, 3.2, "true path of the tour"),
+        (story.search_m, SEARCH_COLOUR, 1.8, "true path of the search"),
     ):
         if len(way):
             axes.plot(way[:, 0], way[:, 1], color=colour, linewidth=width, label=label, zorder=3)

@@ -1,4 +1,4 @@
-"""Scan, cases -> coloured points: what rviz' Select tool shows of each beam that answered. B beams, N answers."""
+"""Scan, cases -> coloured points: what rviz' Select tool shows of each return. B beams, N returns."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ CASE_COLOURS = np.array([case.rgb for case in BeamCase], dtype=np.uint32)  # (5,
 
 
 def points(scan: Scan, cases: BeamCases, height_m: float = 0.0) -> np.ndarray:
-    """(N, 9) float32, little-endian: FIELDS of each beam that answered, in the robot's frame.
+    """(N, 9) float32, little-endian: FIELDS of each return, in the robot's frame.
 
     Args:
-        scan: a lidar's turn.
+        scan: one revolution of a lidar.
         cases: of its beams.
         height_m: of the lidar above the robot's frame.
     """

@@ -1,4 +1,4 @@
-"""Scan, references -> cases, by vote: what did each beam meet?
+"""Scan, expected -> cases, by vote: what did each beam meet?
 
 Seed document glass_localization.txt, sec. III.A, eq. (1) and steps 3 and 4: each preliminary sample
 votes for the reference nearest to the measured range, and the case with the highest vote wins. What the
@@ -24,15 +24,15 @@ from glass_nav.vocabulary import BeamCase
 VOTE_MODES = ("soft", "paper")
 _TIE_ORDER = (BeamCase.DIFFUSE, BeamCase.FIRST_PENETRATION, BeamCase.SECOND_PENETRATION, BeamCase.SPECULAR)
 _GATE_SIGMAS = 3.0
-_OTHER_SURFACE_M = 0.3  # of two expected ranges: an edge lies between them
-_TOLD_GATES = 2.0  # the samples that won the vote may stand one gate away from the pose told
+_OTHER_SURFACE_M = 0.3  # between two expected ranges: an edge lies between them
+_REPORTED_GATES = 2.0  # the samples that won the vote may be one gate away from the reported pose
 _PANE_INDEX = 1.51  # of soda-lime glass
-_WALL_OVER_DARK = 5.0  # reflectance of a wall over that of the darkest that is seen at the largest range
-_UNSEEN_SIDE = 0.002  # chance of a wall to be met from a side that no mapper saw, over that from the other
+_WALL_OVER_DARK = 5.0  # reflectance of a wall over that of the darkest one seen at the largest range
+_UNSEEN_SIDE = 0.002  # probability that a beam meets a wall from an unmapped side, over that from the mapped side
 _MIN_SEEN_THROUGH = 0.05  # a cell may hold a post and the edge of the pane beside it
-_TEMPER = 0.2  # of a sample's evidence: beams err together, and the best sample shall not vote alone
+_TEMPER = 0.2  # of a sample's evidence: the errors of beams are correlated, and the best sample shall not vote alone
 _REACH, _ROUNDS = 2, 3  # of the pull between neighbouring beams
-_BY_SAMPLE = ("range_m", "cos_incidence", "thickness_m")  # fields of references that tell of all samples
+_BY_SAMPLE = ("range_m", "cos_incidence", "thickness_m")  # fields of ExpectedRanges that hold all samples
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class BeamCases:
     """What each beam of a scan met (B beams)."""
 
     case: np.ndarray  # (B,) uint8: 1 diffuse, 2 specular, 3 first penetration, 4 second, 0 uncertain
-    expected_m: np.ndarray  # (B,) reference range of that case at the estimated pose, NaN for case 0
+    expected_m: np.ndarray  # (B,) expected range of that case at the estimated pose, NaN for case 0
     residual_m: np.ndarray  # (B,) measured minus expected, NaN for case 0
     weight: np.ndarray  # (B,) share of the vote that the case won, 0..1
 
@@ -52,15 +52,15 @@ class BeamCases:
 
 @dataclass(frozen=True)
 class CaseVote:
-    """How beams are told apart."""
+    """How beams are classified."""
 
     vote_mode: str = "soft"
-    case_gate_m: float = 0.15  # a reference farther from the measured range gets no vote
+    case_gate_m: float = 0.15  # an expected range farther from the measured one gets no vote
     case_min_share: float = 0.5  # of the vote; a case with less is uncertain
     glass_max_thickness_m: float = 0.2  # a thicker run of occupied cells ends the beam
     normal_min_linearity: float = 0.9
-    prior_uncertain: float = 0.1  # chance to meet what is not on the map
-    prior_uncertain_behind: float = 0.2  # the same behind a pane: rooms that nobody mapped again, and outdoors
+    prior_uncertain: float = 0.1  # probability to meet what is not on the map
+    prior_uncertain_behind: float = 0.2  # the same behind a pane: rooms that have changed since, and outdoors
     mirror_gain: float = 2.0  # how much more light panes mirror than clear glass does
     neighbour_pull: float = 1.5  # log odds that equal cases of all neighbouring beams add
 
@@ -83,7 +83,7 @@ class CaseVote:
 
 def classify(
     measured_m: np.ndarray,
-    references: ExpectedRanges,
+    expected: ExpectedRanges,
     residuals: RangeResiduals,
     vote: CaseVote,
     glass: np.ndarray,
@@ -93,68 +93,70 @@ def classify(
 
     Args:
         measured_m: (B,) ranges by REP 117; beams without an answer are uncertain.
-        references: of the preliminary samples; sample 0 is the pose that expected_m is told for, and for a beam that
-            passes an edge there, the sample that explains it best.
+        expected: of the preliminary samples; expected_m is that of sample 0, and for a beam that passes an edge
+            there, that of the sample that explains it best.
         residuals: where in a wall beams end, and how widely.
         vote: mode, gate and priors.
-        glass: (2, 2, B) chances to be seen through, and if so to be there, of the first and of the second surface
-            at sample 0; of the soft vote.
-        max_range_m: of the lidar: what it can still see; of the soft vote.
+        glass: (2, 2, B) probabilities that the first and the second surface at sample 0 can be seen through, and if so
+            that they are there; for the soft vote.
+        max_range_m: of the lidar; for the soft vote.
     """
     answered = np.isfinite(measured_m)
     if vote.vote_mode == "paper":
-        share = _paper_votes(measured_m, references, residuals, vote)  # (5, B), column sums 1
+        share = _paper_votes(measured_m, expected, residuals, vote)  # (5, B), column sums 1
     else:
-        prior = _priors(_inside_walls(_of_sample_0(references), residuals), glass, max_range_m, vote)
-        share = _pulled(_soft_votes(measured_m, references, residuals, vote, prior), answered, vote.neighbour_pull)
+        prior = _priors(_inside_walls(_of_sample_0(expected), residuals), glass, max_range_m, vote)
+        share = _pulled(_soft_votes(measured_m, expected, residuals, vote, prior), answered, vote.neighbour_pull)
     share[:, ~answered] = np.array([1.0, 0.0, 0.0, 0.0, 0.0])[:, None]
     won, beam = _winner(share), np.arange(len(measured_m))
     case = np.where(answered & (share[won, beam] >= vote.case_min_share), won, BeamCase.UNCERTAIN)
-    offered_m, across_m = (values[0] for values in _offered(case, measured_m, _of_sample_0(references), residuals))
+    expected_m, across_m = (values[0] for values in _expected_of(case, measured_m, _of_sample_0(expected), residuals))
     elsewhere = np.flatnonzero((case > 0) & ~(across_m <= gate_m(residuals, vote)))
     if len(elsewhere):
-        offered_there_m, across_there_m = _offered(
-            case[elsewhere], measured_m[elsewhere], _of_beams(references, elsewhere), residuals
+        expected_there_m, across_there_m = _expected_of(
+            case[elsewhere], measured_m[elsewhere], _of_beams(expected, elsewhere), residuals
         )
         nearest = np.argmin(across_there_m, axis=0), np.arange(len(elsewhere))
-        offered_m[elsewhere], across_m[elsewhere] = offered_there_m[nearest], across_there_m[nearest]
-    return _told(case, share[case, beam], measured_m, offered_m, np.isfinite(across_m))
+        expected_m[elsewhere], across_m[elsewhere] = expected_there_m[nearest], across_there_m[nearest]
+    return _beam_cases(case, share[case, beam], measured_m, expected_m, np.isfinite(across_m))
 
 
 def as_seen_from(
-    cases: BeamCases, measured_m: np.ndarray, references: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote
+    cases: BeamCases, measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote
 ) -> BeamCases:
-    """The same cases from a pose nearby, with the ranges expected at sample 0 of its references.
+    """The same cases from a pose nearby, with the ranges expected at it, sample 0 of `expected`.
 
     A beam that passes an edge from there keeps its range; one that ends farther from its surface is uncertain.
     """
-    offered_m, across_m = _offered(cases.case, measured_m, _of_sample_0(references), residuals)
-    other = np.abs(np.nan_to_num(offered_m[0] - cases.expected_m)) > _OTHER_SURFACE_M  # also where there is none
-    fits = across_m[0] <= _TOLD_GATES * gate_m(residuals, vote)
-    return _told(cases.case, cases.weight, measured_m, np.where(fits, offered_m[0], cases.expected_m), fits | other)
+    expected_m, across_m = _expected_of(cases.case, measured_m, _of_sample_0(expected), residuals)
+    other = np.abs(np.nan_to_num(expected_m[0] - cases.expected_m)) > _OTHER_SURFACE_M  # also where there is none
+    fits = across_m[0] <= _REPORTED_GATES * gate_m(residuals, vote)
+    return _beam_cases(
+        cases.case, cases.weight, measured_m, np.where(fits, expected_m[0], cases.expected_m), fits | other
+    )
 
 
-def _of_sample_0(references: ExpectedRanges) -> ExpectedRanges:
-    return replace(references, **{name: getattr(references, name)[:, :1] for name in _BY_SAMPLE})
+def _of_sample_0(expected: ExpectedRanges) -> ExpectedRanges:
+    return replace(expected, **{name: getattr(expected, name)[:, :1] for name in _BY_SAMPLE})
 
 
-def _of_beams(references: ExpectedRanges, beams: np.ndarray) -> ExpectedRanges:
-    return replace(references, **{name: getattr(references, name)[:, :, beams] for name in _BY_SAMPLE})
+def _of_beams(expected: ExpectedRanges, beams: np.ndarray) -> ExpectedRanges:
+    return replace(expected, **{name: getattr(expected, name)[:, :, beams] for name in _BY_SAMPLE})
 
 
-def _offered(
-    case: np.ndarray, measured_m: np.ndarray, references: ExpectedRanges, residuals: RangeResiduals
+def _expected_of(
+    case: np.ndarray, measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals
 ) -> Tuple[np.ndarray, np.ndarray]:
-    """(N, B) ranges that the samples offer for the case of each beam, and how far across the surface it ended."""
-    references = _inside_walls(references, residuals)
+    """(N, B) ranges expected at the samples for the case of each beam, and the distance from the surface to its end."""
+    expected = _inside_walls(expected, residuals)
     row, beam = np.maximum(case.astype(int) - 1, 0), np.arange(len(case))
-    offered_m = references.range_m[row, :, beam].T
+    expected_m = expected.range_m[row, :, beam].T
     with np.errstate(invalid="ignore"):
-        across_m = np.abs(measured_m - offered_m) * references.cos_incidence[row, :, beam].T
-    return offered_m, np.where(np.isnan(across_m), np.inf, across_m)
+        across_m = np.abs(measured_m - expected_m) * expected.cos_incidence[row, :, beam].T
+    return expected_m, np.where(np.isnan(across_m), np.inf, across_m)
 
 
-def _told(
+def _beam_cases(
     case: np.ndarray, weight: np.ndarray, measured_m: np.ndarray, expected_m: np.ndarray, known: np.ndarray
 ) -> BeamCases:
     known = known & (case > 0)
@@ -168,13 +170,13 @@ def _told(
     )
 
 
-def _inside_walls(references: ExpectedRanges, residuals: RangeResiduals) -> ExpectedRanges:
-    """References where beams end, not at the near boundary of the wall's cells."""
-    depth = residuals.depth_share * references.thickness_m
-    shift = depth / np.maximum(references.cos_incidence, MIN_COS)
+def _inside_walls(expected: ExpectedRanges, residuals: RangeResiduals) -> ExpectedRanges:
+    """Expected ranges where beams end, not at the near boundary of the wall's cells."""
+    depth = residuals.depth_share * expected.thickness_m
+    shift = depth / np.maximum(expected.cos_incidence, MIN_COS)
     mirror = BeamCase.DIFFUSE - 1
-    shift[BeamCase.SPECULAR - 1] += 2.0 * depth[mirror] * references.cos_incidence[mirror]  # it lies so much deeper
-    return replace(references, range_m=references.range_m + shift)
+    shift[BeamCase.SPECULAR - 1] += 2.0 * depth[mirror] * expected.cos_incidence[mirror]  # it lies so much deeper
+    return replace(expected, range_m=expected.range_m + shift)
 
 
 def _winner(share: np.ndarray) -> np.ndarray:
@@ -184,12 +186,12 @@ def _winner(share: np.ndarray) -> np.ndarray:
 
 
 def _paper_votes(
-    measured_m: np.ndarray, references: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote
+    measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote
 ) -> np.ndarray:
-    """(5, B) share of the samples whose nearest reference is that case; equal votes."""
-    references = _inside_walls(references, residuals)
+    """(5, B) share of the samples whose nearest expected range is of that case; equal votes."""
+    expected = _inside_walls(expected, residuals)
     with np.errstate(invalid="ignore"):
-        off = np.abs(measured_m - references.range_m)  # (4, N, B)
+        off = np.abs(measured_m - expected.range_m)  # (4, N, B)
     off[np.isnan(off)] = np.inf
     order = np.array(_TIE_ORDER) - 1
     nearest = order[np.argmin(off[order], axis=0)]  # first of equals
@@ -199,12 +201,12 @@ def _paper_votes(
 
 
 def _soft_votes(
-    measured_m: np.ndarray, references: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote, prior: np.ndarray
+    measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote, prior: np.ndarray
 ) -> np.ndarray:
-    """(5, B) posterior over the cases; samples count by how well each explains the scan.
+    """(5, B) posterior over the cases; samples are weighted by how well each explains the scan.
 
-    A reference has a normal density of width residuals.sigma_m, cut at the gate, across the surface; each case has its
-    prior, (5, B) of _priors(), times the density of its reference. The samples are summed before the cases compete: a
+    The density around an expected range is normal of width residuals.sigma_m, cut at the gate, across the surface; each
+    case has its prior, (5, B) of _priors(), times that density. The samples are summed before the cases compete: a
     corner that some of them graze and others miss is no surface to explain the beam by, if without it a likelier case
     does. The evidence of a sample is the product over the beams that answered, to the power of _TEMPER over the root of
     their number.
@@ -212,9 +214,9 @@ def _soft_votes(
     temper = _TEMPER / np.sqrt(max(np.count_nonzero(np.isfinite(measured_m)), 1))
     return _beam_vote.case_votes(
         measured_m,
-        references.range_m,
-        references.cos_incidence,
-        references.thickness_m,
+        expected.range_m,
+        expected.cos_incidence,
+        expected.thickness_m,
         prior,
         vote.prior_uncertain,
         residuals.depth_share,
@@ -226,49 +228,49 @@ def _soft_votes(
 
 
 def reach_m(residuals: RangeResiduals, vote: CaseVote) -> float:
-    """How far behind the end of a beam a reference may be that still is voted for."""
+    """How far behind the end of a beam an expected range may be and still get a vote."""
     return gate_m(residuals, vote) / MIN_COS
 
 
 def gate_m(residuals: RangeResiduals, vote: CaseVote) -> float:
-    """How far across the surface a beam may end from it: a map that fits badly everywhere needs a wider gate."""
+    """How far across the surface a beam may end from it: a map that fits poorly everywhere needs a wider gate."""
     return max(vote.case_gate_m, _GATE_SIGMAS * residuals.sigma_m)
 
 
-def _priors(references: ExpectedRanges, glass: np.ndarray, max_range_m: float, vote: CaseVote) -> np.ndarray:
-    """(5, B) chance of cases 1 to 4, and last to end at the second surface where the first is gone (case 0).
+def _priors(expected: ExpectedRanges, glass: np.ndarray, max_range_m: float, vote: CaseVote) -> np.ndarray:
+    """(5, B) prior of cases 1 to 4, and last of an end at the second surface where the first is gone (case 0).
 
-    From how glassy the walls proved and how a pane answers at that incidence.
+    From the probability of glass and the glass return model at that incidence.
     """
-    incidence = references.pane_incidence[0]
+    incidence = expected.pane_incidence[0]
     (first, second), (there, _) = glass
     first = np.clip(first, _MIN_SEEN_THROUGH, 1.0)
-    passes = first * there * (1.0 - glass_return_model.least(incidence))
-    mirrored = passes * _chance_of_a_mirror(references, max_range_m, vote.mirror_gain)
+    passes = first * there * (1.0 - glass_return_model.min_share(incidence))
+    mirrored = passes * _chance_of_a_mirror(expected, max_range_m, vote.mirror_gain)
     behind = (passes - mirrored) * (1.0 - vote.prior_uncertain_behind)
-    passes_again = second * (1.0 - glass_return_model.least(np.full(len(first), np.nan)))
+    passes_again = second * (1.0 - glass_return_model.min_share(np.full(len(first), np.nan)))
     gone = first * (1.0 - there)
     prior = np.stack([1.0 - passes - gone, mirrored, behind * (1.0 - passes_again), behind * passes_again, gone])
-    prior[1:4] *= np.where(references.seen_side[1:], 1.0, _UNSEEN_SIDE)
+    prior[1:4] *= np.where(expected.seen_side[1:], 1.0, _UNSEEN_SIDE)
     return (1.0 - vote.prior_uncertain) * prior
 
 
-def _chance_of_a_mirror(references: ExpectedRanges, max_range_m: float, gain: float) -> np.ndarray:
-    """(B,) chance that a mirrored echo is the strongest one, at sample 0; 0 where nothing can mirror.
+def _chance_of_a_mirror(expected: ExpectedRanges, max_range_m: float, gain: float) -> np.ndarray:
+    """(B,) probability that a mirrored echo is the strongest one, at sample 0; 0 where nothing can mirror.
 
-    Echo powers as in the lidar equation for diffuse targets: T^2 / d3^2 behind the pane, R^2 / d2^2 by way of the
-    mirror (Fresnel, unpolarised, two surfaces); one must be above what the lidar still sees of a dark wall at its
-    largest range. Reflectances of walls differ by factors: the chance rises over one decade.
+    Echo powers as in the lidar equation for diffuse targets: T^2 / d3^2 behind the pane, R^2 / d2^2 along the path
+    over the mirror (Fresnel, unpolarised, two surfaces); one must be above what the lidar still sees of a dark wall at its
+    largest range. Reflectances of walls differ by factors: the probability rises over one decade.
     """
-    incidence = np.nan_to_num(references.pane_incidence[0])
+    incidence = np.nan_to_num(expected.pane_incidence[0])
     inside = np.arcsin(np.sin(incidence) / _PANE_INDEX)
     parallel, across = np.cos(incidence), np.cos(inside)
     r_s = ((parallel - _PANE_INDEX * across) / (parallel + _PANE_INDEX * across)) ** 2
     r_p = ((across - _PANE_INDEX * parallel) / (across + _PANE_INDEX * parallel)) ** 2
     surface = 0.5 * (r_s + r_p)
     reflected = np.minimum(gain * 2.0 * surface / (1.0 + surface), 0.9)
-    behind_m = references.range_m[BeamCase.FIRST_PENETRATION - 1, 0]
-    mirrored_m = references.range_m[BeamCase.SPECULAR - 1, 0]
+    behind_m = expected.range_m[BeamCase.FIRST_PENETRATION - 1, 0]
+    mirrored_m = expected.range_m[BeamCase.SPECULAR - 1, 0]
     with np.errstate(invalid="ignore", divide="ignore"):
         wins = (reflected * behind_m / ((1.0 - reflected) * mirrored_m)) ** 2
         seen = (reflected * max_range_m / mirrored_m) ** 2 * _WALL_OVER_DARK
@@ -279,7 +281,7 @@ def _chance_of_a_mirror(references: ExpectedRanges, max_range_m: float, gain: fl
 def _pulled(share: np.ndarray, answered: np.ndarray, pull: float) -> np.ndarray:
     """(5, B) shares after neighbouring beams have pulled each other: mean field of a chain, a few rounds.
 
-    Neighbours mostly meet the same wall the same way; a single beam that fits a farther wall is mostly chance.
+    Neighbours mostly meet the same wall the same way; a single beam that fits a farther wall mostly does so by chance.
     """
     log_share = np.log(share + 1e-6)
     belief = share
@@ -291,7 +293,7 @@ def _pulled(share: np.ndarray, answered: np.ndarray, pull: float) -> np.ndarray:
 
 
 def _mean_of_neighbours(belief: np.ndarray, answered: np.ndarray) -> np.ndarray:
-    """(5, B) mean over the answering ones of the _REACH beams to either side."""
+    """(5, B) mean over the returns among the _REACH beams to either side."""
     width = 2 * _REACH + 1
     padded = np.pad(np.vstack([belief, answered]), ((0, 0), (_REACH + 1, _REACH)))
     running = np.cumsum(padded, axis=1)

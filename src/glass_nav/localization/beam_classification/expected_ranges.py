@@ -1,9 +1,8 @@
-"""Samples -> the four ranges that each beam may show.
+"""Samples -> the four ranges that each beam may measure.
 
 Seed document glass_localization.txt, step 2 (cut off there; the formulation is ours): one ray cast
-that goes on behind the first surface gives what a beam would measure if it came back from it (case 1),
-was mirrored at it (case 2), or passed one or two panes (cases 3 and 4). The map does not say what is
-glass. A corner or a post without a normal is drawn up to a cell too large, and beams that graze it on the
+that goes on behind the first surface gives what a beam would measure if it returned from it (case 1),
+was mirrored at it (case 2), or passed one or two panes (cases 3 and 4). The map does not mark glass. A corner or a post without a normal is drawn up to a cell too large, and beams that graze it on the
 map may miss it: half of the samples see past it. N samples, B beams; arrays by case have 4 rows, case k in row k - 1.
 """
 
@@ -29,12 +28,12 @@ _LINE_CELLS, _GRAZING_COS = 2.0, 0.02  # the line of a wall lies so near to the 
 
 @dataclass(frozen=True)
 class ExpectedRanges:
-    """What the map offers to explain each beam, as seen from each sample; from sample 0, the pose itself, all of it."""
+    """Ranges that the map predicts for each beam from each sample; for sample 0, the pose itself, with more detail."""
 
-    range_m: np.ndarray  # (4, N, B) along the beam, inf where the map offers nothing
-    cos_incidence: np.ndarray  # (4, N, B) |u . n| at the surface that answers; 1 where it has no normal
-    thickness_m: np.ndarray  # (4, N, B) of the wall that answers, as drawn
-    cell: np.ndarray  # (4, N, B) int32 flat cell that answers, -1: none
+    range_m: np.ndarray  # (4, N, B) along the beam, inf where the map has no surface
+    cos_incidence: np.ndarray  # (4, N, B) |u . n| at the surface that returns it; 1 where it has no normal
+    thickness_m: np.ndarray  # (4, N, B) of the wall that returns it, as drawn
+    cell: np.ndarray  # (4, N, B) int32 flat cell that returns it, -1: none
     pane_incidence: np.ndarray  # (1, B) angle to the normal of sample 0's first surface [rad], NaN without one
     line_m: np.ndarray  # (4, B) range of sample 0 by the lines of the walls, face_m behind the near faces
     axis_rad: np.ndarray  # (4, B) axes of their normals in map, up to half a turn; NaN: none. Case 2: mirrored
@@ -51,17 +50,17 @@ def of(
     min_linearity: float,
     behind_m: float = np.inf,
 ) -> ExpectedRanges:
-    """References of every beam of the scan from every sample.
+    """Expected ranges of every beam of the scan from every sample.
 
     Args:
         caster: of the map.
         thickness_m: (H * W,) of the map's walls, sensing/wall_thickness.py.
         samples: (N, 3) robot poses in map.
-        scan: its ranges are looked at for behind_m alone.
+        scan: its ranges matter for behind_m only.
         max_thickness_m: a thicker run of occupied cells cannot be glass and ends the ray.
-        min_linearity: below it a surface has no normal: no mirrored reference.
-        behind_m: farther behind the end of a beam the samples but the first look for nothing, and nowhere where a
-            beam did not answer; inf: everywhere.
+        min_linearity: below it a surface has no normal: no mirrored range.
+        behind_m: all samples but the first look no farther behind the end of a beam than that, and nowhere where a beam
+            did not return; inf: everywhere.
     """
     from_laser = se2.compose(samples, scan.base_from_laser)
     paths = caster.cast_paths(from_laser, scan.angles_rad, _reach_m(scan, behind_m), max_thickness_m, min_linearity)
@@ -98,8 +97,8 @@ def _reach_m(scan: Scan, behind_m: float) -> np.ndarray:
 def _seen_side(grid_map: GridMap, cell: np.ndarray, axis_rad: np.ndarray, direction_rad: np.ndarray) -> np.ndarray:
     """(4, B) bool: the side of the cells (4, B) that the beams come from is not unknown.
 
-    What a mapper drew it saw from somewhere. A lidar that looks back at a building through its glass meets the outer
-    faces of walls, which are on no map: decimetres in front of the inner ones.
+    A mapper draws what it sees. A lidar that looks back at a building through its glass meets the outer faces of walls,
+    which are on no map: decimetres in front of the inner ones.
     """
     facing_rad = np.where(np.isnan(axis_rad), direction_rad + np.pi, axis_rad)
     facing_rad = np.where(np.cos(direction_rad - facing_rad) > 0.0, facing_rad + np.pi, facing_rad)
@@ -115,7 +114,7 @@ def _miss_corners(
     caster: RayCaster, min_linearity: float, range_m: np.ndarray, cos: np.ndarray, cell: np.ndarray
 ) -> None:
     """Let beams pass first and second surfaces without a normal: of each sample every other beam, for each beam every
-    other sample but the first, which is the predicted pose itself. Works on references (4, N, B) in place.
+    other sample but the first, which is the predicted pose itself. Works on expected (4, N, B) in place.
     """
     samples, beams = cell.shape[1:]
     missed = (np.arange(samples)[:, None] + np.arange(beams)) % 2 == 1
@@ -128,7 +127,7 @@ def _miss_corners(
 
 
 def _miss(order: Tuple[int, ...], at: np.ndarray, range_m: np.ndarray, cos: np.ndarray, cell: np.ndarray) -> None:
-    """Take a surface out of the references (4, N, B) at flat places (N, B); what is behind it moves up."""
+    """Take a surface out of the expected (4, N, B) at flat places (N, B); what is behind it moves up."""
     for values, nothing in ((range_m, np.inf), (cos, 1.0), (cell, -1)):
         flat = values.reshape(len(values), -1)
         for to, source in zip(order, order[1:]):

@@ -1,7 +1,7 @@
 """Predicted pose -> preliminary samples around it: the voters of the five cases.
 
 Seed document glass_localization.txt, step 1, eq. (5): poses at regular angular intervals around the
-predicted pose. The document breaks off before it says how wide; radius and heading spread come from
+predicted pose. The document breaks off before it says how far; radius and heading spread come from
 the filter's own covariance here, with a floor. N samples.
 """
 
@@ -20,7 +20,7 @@ _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)  # multiples of it fill an interval evenly,
 
 @dataclass(frozen=True)
 class PreliminarySamples:
-    """How many voters, and how far they stand from the predicted pose at least and at most."""
+    """How many samples vote, and the limits of their distance from the predicted pose."""
 
     sample_count: int = 37
     sample_min_radius_m: float = 0.02

@@ -1,9 +1,9 @@
 """Where in a wall of the map do beams end, and how widely?
 
 A ray cast ends at the near boundary of the first occupied cell; a beam ends where the wall is: half a
-cell deeper on a thin wall, decimetres deeper where the map was drawn with a blurred scanner. How deep,
-as a share of the drawn thickness, and the spread belong to the map and the lidar, so they are learnt
-while driving, across the surface, and every model that compares a range with the map uses them.
+cell deeper on a thin wall, decimetres deeper where the mapping lidar was noisy. That depth, as a share of the drawn
+thickness, and the spread around it depend on map and lidar. They are learnt while driving, across the surface, and
+every model that compares a range with the map uses them.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_NEAR_M = 0.6  # farther from the wall a beam met something else
+_NEAR_M = 0.6  # a beam that ended farther from the wall met something else
 _MIN_BEAMS = 20
 _MEMORY = 0.95  # per scan that is taken in
 _MAD = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
@@ -26,14 +26,14 @@ class RangeResiduals:
     sigma_m: float  # around that, across the surface
 
     def learn(
-        self, across_m: np.ndarray, thickness_m: np.ndarray, least_sigma_m: float, most_sigma_m: float
+        self, across_m: np.ndarray, thickness_m: np.ndarray, min_sigma_m: float, max_sigma_m: float
     ) -> "RangeResiduals":
-        """After one more scan at a pose that is believed.
+        """After one more scan at a trusted pose.
 
         Args:
             across_m: (B,) range residuals to the near boundary times cosine of incidence.
             thickness_m: (B,) of the wall there, as drawn.
-            least_sigma_m, most_sigma_m: the spread is kept within these.
+            min_sigma_m, max_sigma_m: limits of the spread.
         """
         off = across_m - self.depth_share * thickness_m
         near = np.abs(off) < _NEAR_M
@@ -43,5 +43,5 @@ class RangeResiduals:
         sigma = _MAD * float(np.median(np.abs(off[near])))
         return RangeResiduals(
             _MEMORY * self.depth_share + (1.0 - _MEMORY) * share,
-            float(np.clip(_MEMORY * self.sigma_m + (1.0 - _MEMORY) * sigma, least_sigma_m, most_sigma_m)),
+            float(np.clip(_MEMORY * self.sigma_m + (1.0 - _MEMORY) * sigma, min_sigma_m, max_sigma_m)),
         )

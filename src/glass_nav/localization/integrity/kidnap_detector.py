@@ -1,9 +1,10 @@
-"""Scans, tracked poses -> is the robot still there?  Watches a pose that is believed, and finds another if it is wrong.
+"""Scans, tracked poses -> was the robot kidnapped?  Watches the tracked pose, and finds another if it is wrong.
 
-A filter that was carried away, or told a wrong pose, settles where the scan fits best nearby, and is sure of itself.
-What gives it away is that the scans fit worse than they used to. Then the scan is looked for everywhere, with the
-believed pose as one candidate ahead of the others (global_search.py): people all round fit nowhere, and the pose stays;
-if another place is better and stays so over some way, the robot is there. The formulation is ours.
+The filter of a robot that was kidnapped, or given a wrong pose, converges where the scan fits best nearby, and is
+confident there. What gives it away is that scans fit worse than they used to. Then a global search runs beside it, with
+the tracked pose as a candidate that starts ahead (hypotheses/global_search.py). If the robot is merely surrounded by
+people, the scans fit nowhere else, and the pose stays. If another place is better and stays so over some distance, the
+robot is there. The formulation is ours.
 """
 
 from __future__ import annotations
@@ -15,40 +16,40 @@ from typing import Callable, Deque, Optional, Tuple
 import numpy as np
 
 from glass_nav.geometry import se2
-from glass_nav.hypotheses import global_search
+from glass_nav.hypotheses import global_search, pose_tracker
 from glass_nav.hypotheses.global_search import Candidates, GlobalSearch, SearchParams
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.scan import Scan
 
-_USUAL_FIT = 0.9  # of a right pose, until it is known
+_USUAL_FIT = 0.9  # of a right pose, until it is learnt
 _USUAL_SPREAD = 0.02  # around that
-_KNOWN_M = 1.0  # of way that these two are worth
-_LEARN_M, _FORGET_M = 20.0, 0.5  # way over which the usual and the present fit are averaged
-_DELAY_M = 3.0  # what is learnt was so long not doubted
-_MIN_WAY_M = 0.05  # that a scan counts for when the robot stands
-_DOUBT = (0.06, 3.0)  # below the usual fit, as such and in deviations: look everywhere
+_PRIOR_M = 1.0  # distance driven that these two are worth
+_LEARN_M, _FORGET_M = 20.0, 0.5  # distance over which the usual and the present fit are averaged
+_DELAY_M = 3.0  # distance driven without doubt before a fit is learnt
+_MIN_STEP_M = 0.05  # distance that a scan counts for when the robot stands
+_DOUBT = (0.06, 3.0)  # below the usual fit, as such and in deviations: search everywhere
 _POOR = 0.7  # of the usual fit: not to be relied on, whatever there is elsewhere
-_HEAD_START = 3.0  # nats that a believed pose is ahead of all others
-_SETTLED_M = 6.0  # the believed pose stayed the best for so long: that is how scans fit here
-_CALM_M = 2.0  # scans fit as usual for so long: nothing was wrong
-_CLOSE = 1.0  # nats that another place is behind, or less: it may be the right one
+_HEAD_START = 3.0  # log likelihood ratio of the tracked pose to all others at the start of a search
+_SETTLED_M = 6.0  # after this distance as the best candidate, the fit at the tracked pose is the usual one
+_CALM_M = 2.0  # after this distance of usual fits nothing was wrong
+_CLOSE = -1.0  # log likelihood ratio of another place to the tracked pose from which it may be the right one
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the scans say of the pose that is believed."""
+    """What the scans say about the tracked pose."""
 
-    fit: float  # present fit at it, 0..1; NaN: no scan told anything yet
+    fit: float  # present fit at it, 0..1; NaN: no scan has been evidence yet
     usual: float  # what it has been so far
-    behind: float  # nats that it is behind the best place elsewhere; <= 0: it is the best; -inf: nobody asked
+    log_ratio: float  # log likelihood ratio of the best place elsewhere to it; <= 0: it is the best; -inf: no search
     doubted: bool  # the scans fit worse than they used to
-    found: Optional[np.ndarray]  # (3,) the place where the robot is instead
-    candidates: Optional[Candidates]  # while it is looked for
+    found: Optional[np.ndarray]  # (3,) the pose where the robot is instead
+    candidates: Optional[Candidates]  # during a search
 
     @property
     def fit_there(self) -> float:
-        """Of the best of the candidates, 0..1; NaN: there is none."""
+        """Of the best candidate, 0..1; NaN: no search runs."""
         return float("nan") if self.candidates is None else self.candidates.fit
 
     @property
@@ -59,11 +60,11 @@ class Verdict:
     @property
     def contested(self) -> bool:
         """The scans fit worse than they used to, and about as well or better elsewhere."""
-        return self.doubted and self.behind > -_CLOSE
+        return self.doubted and self.log_ratio > _CLOSE
 
 
 class KidnapDetector:
-    """Remembers how well scans fit at the pose, and looks elsewhere when they no longer do."""
+    """Remembers how well scans fit at the tracked pose, and searches elsewhere when they no longer do."""
 
     def __init__(
         self,
@@ -74,19 +75,19 @@ class KidnapDetector:
     ) -> None:
         """Args:
         field: of the map.
-        matcher: makes the one that looks everywhere; called when it is needed first. None: nowhere is room.
-        params: whether and when another place is believed.
+        matcher: makes the one that searches everywhere; called at its first use. None: the map has no free cell.
+        params: whether and when another place is accepted.
         usual_fit: of scans at the pose; None: not known yet.
         """
         self._field, self._matcher, self._params = field, matcher, params
         self._usual, self._spread = _USUAL_FIT if usual_fit is None else usual_fit, _USUAL_SPREAD
-        self._learnt_m = _KNOWN_M
+        self._learnt_m = _PRIOR_M
         self._fit = float("nan")
-        self._recent: Deque[Tuple[float, float]] = collections.deque()  # fit and way of scans not learnt from yet
+        self._recent: Deque[Tuple[float, float]] = collections.deque()  # fit and distance of scans not learnt from yet
         self._recent_m = 0.0
         self._search: Optional[GlobalSearch] = None
-        self._search_way_m = self._calm_m = 0.0
-        self._search_fit_m = 0.0  # sum of fit times way during the search
+        self._search_m = self._calm_m = 0.0
+        self._search_fit_m = 0.0  # sum of fit times distance during the search
         self._odom_from_base: Optional[np.ndarray] = None
         self._verdict = Verdict(float("nan"), self._usual, -np.inf, False, None, None)
 
@@ -97,67 +98,67 @@ class KidnapDetector:
             self._search.decide_by(params)
 
     def observe(self, scan: Scan, odom_from_base: np.ndarray, map_from_base: np.ndarray) -> Verdict:
-        """One scan more and the pose that is believed after it; with too few answers the verdict stays."""
-        way_m = self._way(odom_from_base)
-        points = global_search.telling_points(scan)
+        """One more scan and the tracked pose after it; with too few returns the verdict stays."""
+        step_m = self._distance(odom_from_base)
+        points = global_search.evidence_points(scan)
         if points is None:
             return self._verdict
         fit = float(global_search.fit(self._field, points, map_from_base[None])[0])
-        self._fit = fit if np.isnan(self._fit) else self._fit + (fit - self._fit) * -np.expm1(-way_m / _FORGET_M)
+        self._fit = fit if np.isnan(self._fit) else self._fit + (fit - self._fit) * -np.expm1(-step_m / _FORGET_M)
         doubted = self._usual - self._fit > max(_DOUBT[0], _DOUBT[1] * self._spread)
         if self._search is None and doubted and self._params.recover_when_lost and self._matcher is not None:
             self._search = GlobalSearch(self._matcher(), self._field, self._params)
-            self._search_way_m = self._calm_m = self._search_fit_m = 0.0
+            self._search_m = self._calm_m = self._search_fit_m = 0.0
             self._search.add(map_from_base, _HEAD_START)
             self._recent.clear()
             self._recent_m = 0.0
         if self._search is None:
             if not doubted:
-                self._learn(fit, way_m)
+                self._learn(fit, step_m)
             self._verdict = Verdict(self._fit, self._usual, -np.inf, doubted, None, None)
         else:
-            self._search_way_m += way_m
-            self._search_fit_m += way_m * fit
-            self._calm_m = 0.0 if doubted else self._calm_m + way_m
+            self._search_m += step_m
+            self._search_fit_m += step_m * fit
+            self._calm_m = 0.0 if doubted else self._calm_m + step_m
             self._verdict = self._compare(self._search.update(scan, odom_from_base), map_from_base, doubted)
         return self._verdict
 
     def _compare(self, candidates: Candidates, map_from_base: np.ndarray, doubted: bool) -> Verdict:
-        """Of the believed pose with the best place elsewhere."""
-        here = global_search.same_place(candidates.poses, map_from_base)
+        """The tracked pose with the best place elsewhere."""
+        here = pose_tracker.same_place(candidates.poses, map_from_base)
         with np.errstate(divide="ignore"):
             log_w = np.log(candidates.weights)
         elsewhere = log_w[~here].max() if not here.all() else -np.inf
-        behind = float(elsewhere - log_w[here].max()) if here.any() else np.inf
-        fit_meanwhile = self._search_fit_m / self._search_way_m
-        steady = self._fit > fit_meanwhile - _DOUBT[0]
+        log_ratio = float(elsewhere - log_w[here].max()) if here.any() else np.inf
+        fit_during_search = self._search_fit_m / self._search_m
+        steady = self._fit > fit_during_search - _DOUBT[0]
         best_here = steady and (
-            behind < -self._params.search_margin or (behind <= 0.0 and self._search_way_m > _SETTLED_M)
+            log_ratio < -self._params.search_margin or (log_ratio <= 0.0 and self._search_m > _SETTLED_M)
         )
-        calm = self._calm_m > _CALM_M and behind < self._params.search_margin
-        if best_here and doubted:  # that is how scans fit here, until they fit better again
-            self._usual, self._learnt_m = fit_meanwhile, _KNOWN_M
-        if best_here or calm or (behind <= 0.0 and not doubted):
+        calm = self._calm_m > _CALM_M and log_ratio < self._params.search_margin
+        if best_here and doubted:  # scans fit like this here, until they fit better again
+            self._usual, self._learnt_m = fit_during_search, _PRIOR_M
+        if best_here or calm or (log_ratio <= 0.0 and not doubted):
             self._search = None
         found = candidates.poses[0] if candidates.found and not here[0] else None
-        return Verdict(self._fit, self._usual, behind, doubted, found, candidates)
+        return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates)
 
-    def _learn(self, fit: float, way_m: float) -> None:
-        """How well scans fit where the pose is right, and how much that differs."""
-        self._recent.append((fit, way_m))
-        self._recent_m += way_m
+    def _learn(self, fit: float, step_m: float) -> None:
+        """How well scans fit where the pose is right, and how much that varies."""
+        self._recent.append((fit, step_m))
+        self._recent_m += step_m
         while self._recent_m > _DELAY_M:
-            fit, way_m = self._recent.popleft()
-            self._recent_m -= way_m
-            self._learnt_m = min(self._learnt_m + way_m, _LEARN_M)
-            share = min(1.0, way_m / self._learnt_m)
+            fit, step_m = self._recent.popleft()
+            self._recent_m -= step_m
+            self._learnt_m = min(self._learnt_m + step_m, _LEARN_M)
+            share = min(1.0, step_m / self._learnt_m)
             self._usual += share * (fit - self._usual)
             self._spread += share * (1.2533 * abs(fit - self._usual) - self._spread)  # mean deviation -> standard one
 
-    def _way(self, odom_from_base: np.ndarray) -> float:
-        """Way since the last scan [m]; a turn counts as the way that shows as much anew."""
+    def _distance(self, odom_from_base: np.ndarray) -> float:
+        """Distance since the last scan [m]; a turn counts as the distance that brings as much into view."""
         before, self._odom_from_base = self._odom_from_base, np.array(odom_from_base, float)
         if before is None:
             return _FORGET_M
-        way_m, turn_rad = se2.travelled(se2.compose(se2.inverse(before), odom_from_base))
-        return max(way_m + 0.5 * turn_rad, _MIN_WAY_M)
+        step_m, turn_rad = se2.travelled(se2.compose(se2.inverse(before), odom_from_base))
+        return max(step_m + 0.5 * turn_rad, _MIN_STEP_M)

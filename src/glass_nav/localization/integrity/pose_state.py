@@ -1,8 +1,8 @@
-"""Is it lost?  The filter's own signs -> a state, a reason in words, and a chance that the pose is right.
+"""Is it lost?  Inlier ratio, covariance, verdict of the kidnap detector -> a state, a reason in words, a confidence.
 
-Covariance alone does not tell: a filter that settled in the wrong corridor is sure of itself. What
-tells is how much of the scan the map explains at the pose, whether scans fit as well as they used to, and
-whether they fit better elsewhere (kidnap_detector.py).
+Covariance alone cannot show it: a filter that converged in the wrong corridor has a small one. What shows it is how
+much of the scan the map explains at the pose, whether scans fit as well as they used to, and whether they fit better
+elsewhere (kidnap_detector.py).
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from glass_nav.localization.integrity.kidnap_detector import Verdict
 from glass_nav.localization.particle_filter.pose_estimate import PoseEstimate
 from glass_nav.vocabulary import LocalizationState
 
-_POSSIBLE = 8.0  # nats behind the best: a place that still counts in words
-_LOST_BEHIND = 3.0  # nats that another place is better by
+_POSSIBLE = 8.0  # log likelihood ratio of the best place to one that is still counted as possible
+_LOST = 3.0  # log likelihood ratio of another place to the tracked pose
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class Judgement:
 
     state: LocalizationState
     reason: str  # in one sentence
-    reliability: float  # chance that the pose is right, 0..1
-    places: int = 1  # that are possible while the pose is looked for; 0: no scan has told anything yet
+    confidence: float  # chance that the pose is right, 0..1
+    places: int = 1  # that are possible during a global search; 0: no scan has been evidence yet
 
 
 class PoseQuality:
@@ -65,28 +65,28 @@ class PoseQuality:
         self._limits = limits
         self._candidates: Optional[Candidates] = None
         self._verdict: Optional[Verdict] = None
-        self._used_share = float("nan")
+        self._inlier_ratio = float("nan")
 
     def limit_by(self, limits: QualityLimits) -> None:
         """Other limits from now on; what was seen stays."""
         self._limits = limits
 
-    def observe(self, used_share: float) -> None:
+    def observe(self, inlier_ratio: float) -> None:
         """Take in one update; NaN when no beam answered, which says nothing."""
-        if np.isfinite(used_share):
-            past = used_share if np.isnan(self._used_share) else self._used_share
-            self._used_share = self._MEMORY * past + (1.0 - self._MEMORY) * used_share
+        if np.isfinite(inlier_ratio):
+            past = inlier_ratio if np.isnan(self._inlier_ratio) else self._inlier_ratio
+            self._inlier_ratio = self._MEMORY * past + (1.0 - self._MEMORY) * inlier_ratio
 
-    def seek(self, candidates: Candidates) -> None:
-        """The pose is being looked for; these places are possible."""
+    def follow_search(self, candidates: Candidates) -> None:
+        """A global search runs; these places are possible."""
         self._candidates = candidates
 
     def doubt(self, verdict: Verdict) -> None:
-        """What the watch says of the pose that is tracked."""
+        """What the kidnap detector says about the tracked pose."""
         self._verdict = verdict
 
     def judge(self, best: PoseEstimate) -> Judgement:
-        """Of the best cluster of particles."""
+        """State of the best cluster of particles."""
         if self._candidates is not None:
             known = best.share if len(self._candidates.poses) else 0.0
             return Judgement(
@@ -107,31 +107,31 @@ class PoseQuality:
             f"{best.share:.0%} of the weight in one place, sigma {position_sigma_m:.2f} m, "
             f"{np.degrees(heading_sigma_rad):.1f} deg"
         )
-        if np.isnan(self._used_share):
+        if np.isnan(self._inlier_ratio):
             return Judgement(LocalizationState.UNCERTAIN, f"no scan has been used yet; {spread}", 0.0)
-        explained = f"the map explains {self._used_share:.0%} of the answering beams"
-        reliability = _reliability(self._used_share, self._verdict, best)
+        explained = f"the map explains {self._inlier_ratio:.0%} of the answering beams"
+        confidence = _confidence(self._inlier_ratio, self._verdict, best)
         elsewhere = _elsewhere(self._verdict)
-        if elsewhere is not None and self._verdict is not None and self._verdict.behind > _LOST_BEHIND:
-            return Judgement(LocalizationState.LOST, f"{elsewhere}; {explained}", reliability)
-        if self._used_share < limits.lost_used_share:
-            return Judgement(LocalizationState.LOST, explained, reliability)
+        if elsewhere is not None and self._verdict is not None and self._verdict.log_ratio > _LOST:
+            return Judgement(LocalizationState.LOST, f"{elsewhere}; {explained}", confidence)
+        if self._inlier_ratio < limits.lost_used_share:
+            return Judgement(LocalizationState.LOST, explained, confidence)
         if elsewhere is not None:
-            return Judgement(LocalizationState.UNCERTAIN, f"{elsewhere}; {explained}; {spread}", reliability)
-        if wide or self._used_share < limits.uncertain_used_share:
-            return Judgement(LocalizationState.UNCERTAIN, f"{explained}; {spread}", reliability)
+            return Judgement(LocalizationState.UNCERTAIN, f"{elsewhere}; {explained}; {spread}", confidence)
+        if wide or self._inlier_ratio < limits.uncertain_used_share:
+            return Judgement(LocalizationState.UNCERTAIN, f"{explained}; {spread}", confidence)
         doubted = self._verdict is not None and self._verdict.doubted
-        if doubted and reliability < limits.localized_min_reliability:
+        if doubted and confidence < limits.localized_min_reliability:
             return Judgement(
                 LocalizationState.UNCERTAIN,
-                f"all signs together make it right by {reliability:.0%} only; {explained}; {spread}",
-                reliability,
+                f"the pose is right with a chance of only {confidence:.0%}; {explained}; {spread}",
+                confidence,
             )
-        return Judgement(LocalizationState.LOCALIZED, f"{explained}; {spread}", reliability)
+        return Judgement(LocalizationState.LOCALIZED, f"{explained}; {spread}", confidence)
 
 
 def _possible(candidates: Candidates) -> int:
-    """How many places still count."""
+    """How many places are still possible."""
     if not len(candidates.poses):
         return 0
     return int(np.count_nonzero(candidates.weights > candidates.weights[0] * np.exp(-_POSSIBLE)))
@@ -139,38 +139,38 @@ def _possible(candidates: Candidates) -> int:
 
 def _progress(candidates: Candidates) -> str:
     if not len(candidates.poses):
-        return "no scan has told anything yet"
+        return "no usable scan yet"
     possible = _possible(candidates)
     x, y, yaw = candidates.poses[0]
-    best = f"the best at x {x:.1f} m, y {y:.1f} m, {np.degrees(yaw):.0f} deg, where scans fit by {candidates.fit:.0%}"
+    best = f"the best at x {x:.1f} m, y {y:.1f} m, {np.degrees(yaw):.0f} deg, scan fit {candidates.fit:.0%}"
     if possible == 1:
         return f"one place is possible, {best}"
     return f"{possible} places are possible, {best}"
 
 
 def _elsewhere(verdict: Optional[Verdict]) -> Optional[str]:
-    """Why to doubt the pose, in words; None: there is no reason."""
+    """Why the pose is in doubt, in words; None: it is not."""
     if verdict is None:
         return None
     if verdict.contested and verdict.candidates is not None:
         x, y, _ = verdict.candidates.poses[0]
         return f"the scans fit as well or better elsewhere, best at x {x:.1f} m, y {y:.1f} m"
     if verdict.poor:
-        return f"the scans fit by {verdict.fit:.0%}, where they used to fit by {verdict.usual:.0%}"
+        return f"scan fit {verdict.fit:.0%}, usually {verdict.usual:.0%}"
     return None
 
 
-def _reliability(used_share: float, verdict: Optional[Verdict], best: PoseEstimate) -> float:
+def _confidence(inlier_ratio: float, verdict: Optional[Verdict], best: PoseEstimate) -> float:
     """Chance that the pose is right.
 
     Logistic regression over 5500 poses of five real logs and five simulated buildings (drives as those of
-    test/benchmark/reliability.py, seeds 20 to 22), in which robots were carried away, started wrong, or were right;
+    test/benchmark/reliability.py, seeds 20 to 22), in which robots were kidnapped, started wrong, or were right;
     the constant from 4400 poses of all tracks (seed 200).
     """
     sigma_m = float(np.clip(np.sqrt(np.trace(best.covariance[:2, :2])), 0.005, 2.0))
-    logit = -2.1 - 6.8 * (1.0 - used_share) - 1.9 * np.log(sigma_m)
+    logit = -2.1 - 6.8 * (1.0 - inlier_ratio) - 1.9 * np.log(sigma_m)
     if verdict is not None and np.isfinite(verdict.fit):
         logit -= 22.8 * max(0.0, verdict.usual - verdict.fit)
         if verdict.candidates is not None:
-            logit += 2.4 - 0.95 * (float(np.clip(verdict.behind, -8.0, 8.0)) + 3.0)
+            logit += 2.4 - 0.95 * (float(np.clip(verdict.log_ratio, -8.0, 8.0)) + 3.0)
     return float(min(best.share, 1.0) / (1.0 + np.exp(-logit)))

@@ -1,12 +1,12 @@
 """Cases -> weights: how well does each particle explain the scan, by the beams that are understood?
 
 Two modes. "ranges" is the document's (seed glass_localization.txt; Thrun et al. (2005), sec. 6.3.1): the sum
-over beams with case c > 0 of log(z_hit exp(-r^2 / (2 s^2)) + z_rand), r the residual to the reference of
+over beams with case c > 0 of log(z_hit exp(-r^2 / (2 s^2)) + z_rand), r the residual to the expected range of
 case c by a ray cast from the particle, measured across the surface. "field" takes for r how far the beam
-ends from the nearest wall, for the beams whose case says that they ended at one (1, 3 and 4): no ray is
-cast, all beams of a scan can be used, and what was mirrored or is not understood cannot attract anything,
-which is what misleads a plain likelihood field among glass. P particles, B beams; weights are natural
-logarithms, not normalised. Neighbouring beams err together, so that B of them weigh as
+ends from the nearest wall, for the beams of cases that end at one (1, 3 and 4): no ray is
+cast, all beams of a scan can be used, and mirrored or uncertain beams attract nothing, which is what
+misleads a plain likelihood field among glass. P particles, B beams; weights are natural
+logarithms, not normalised. The errors of neighbouring beams are correlated, so that B of them weigh as
 laser_independent_beams.
 """
 
@@ -76,7 +76,7 @@ def by_ranges(
         residuals: where in a wall beams end, and how widely.
         mixture: how sharply.
         max_range_m: how far to look.
-        max_thickness_m, min_linearity: as for the references of the cases.
+        max_thickness_m, min_linearity: as for the expected ranges of the cases.
 
     Returns:
         (P,) log likelihoods; all 0 if there is no beam.
@@ -120,7 +120,7 @@ def by_field(
 
 
 def known_ends(case: np.ndarray) -> np.ndarray:
-    """(B,) bool: the beam ended at a surface of the map, by a straight way."""
+    """(B,) bool: the beam ended at a surface of the map, and was not mirrored."""
     return (case != BeamCase.UNCERTAIN) & (case != BeamCase.SPECULAR)
 
 
@@ -132,6 +132,6 @@ def _log_density(across_m: np.ndarray, residuals: RangeResiduals, mixture: BeamM
 def independent_beams(residuals: RangeResiduals, mixture: BeamMixture) -> float:
     """As how many independent beams the chosen ones count.
 
-    A spread wider than the lidar's is the map's fault, and the map errs the same way along a whole wall.
+    A spread wider than the lidar's comes from the map, whose error is the same along a whole wall.
     """
     return mixture.laser_independent_beams * min(1.0, (mixture.laser_sigma_hit / residuals.sigma_m) ** 2)

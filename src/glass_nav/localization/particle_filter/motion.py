@@ -15,7 +15,7 @@ import numpy as np
 from glass_nav.geometry import angles, se2
 
 MODELS = ("diff", "omni", "diff-corrected", "omni-corrected")
-_ON_THE_SPOT_M = 0.01  # below this way the direction of travel is noise
+_ON_THE_SPOT_M = 0.01  # below this distance the direction of travel is noise
 
 
 @dataclass(frozen=True)
@@ -24,10 +24,10 @@ class OdometryNoise:
 
     odom_model_type: str = "diff-corrected"
     odom_alpha1: float = 0.02  # turn from turn (variance [rad2/rad2] in the corrected models)
-    odom_alpha2: float = 0.01  # turn from way [rad2/m2]
-    odom_alpha3: float = 0.02  # way from way [m2/m2]
-    odom_alpha4: float = 0.01  # way from turn [m2/rad2]
-    odom_alpha5: float = 0.02  # sideways from way, omni only [m2/m2]
+    odom_alpha2: float = 0.01  # turn from distance [rad2/m2]
+    odom_alpha3: float = 0.02  # distance from distance [m2/m2]
+    odom_alpha4: float = 0.01  # distance from turn [m2/rad2]
+    odom_alpha5: float = 0.02  # sideways from distance, omni only [m2/m2]
 
     def __post_init__(self) -> None:
         if self.odom_model_type not in MODELS:
@@ -61,15 +61,15 @@ def _deviation(variance: float, noise: OdometryNoise) -> float:
 
 
 def _diff(step: np.ndarray, noise: OdometryNoise, rng: np.random.Generator, count: int) -> np.ndarray:
-    way, _ = se2.travelled(step)
-    turn_1 = float(np.arctan2(step[1], step[0])) if way >= _ON_THE_SPOT_M else 0.0
+    distance, _ = se2.travelled(step)
+    turn_1 = float(np.arctan2(step[1], step[0])) if distance >= _ON_THE_SPOT_M else 0.0
     turn_2 = float(angles.wrap(step[2] - turn_1))
     square_1, square_2 = _turn_either_way(turn_1) ** 2, _turn_either_way(turn_2) ** 2
     a1, a2, a3, a4 = noise.odom_alpha1, noise.odom_alpha2, noise.odom_alpha3, noise.odom_alpha4
-    turns_1 = turn_1 + rng.normal(0.0, _deviation(a1 * square_1 + a2 * way**2, noise), count)
-    ways = way + rng.normal(0.0, _deviation(a3 * way**2 + a4 * (square_1 + square_2), noise), count)
-    turns_2 = turn_2 + rng.normal(0.0, _deviation(a1 * square_2 + a2 * way**2, noise), count)
-    return np.stack([ways * np.cos(turns_1), ways * np.sin(turns_1), turns_1 + turns_2], axis=-1)
+    turns_1 = turn_1 + rng.normal(0.0, _deviation(a1 * square_1 + a2 * distance**2, noise), count)
+    distances = distance + rng.normal(0.0, _deviation(a3 * distance**2 + a4 * (square_1 + square_2), noise), count)
+    turns_2 = turn_2 + rng.normal(0.0, _deviation(a1 * square_2 + a2 * distance**2, noise), count)
+    return np.stack([distances * np.cos(turns_1), distances * np.sin(turns_1), turns_1 + turns_2], axis=-1)
 
 
 def _turn_either_way(turn: float) -> float:
@@ -78,11 +78,11 @@ def _turn_either_way(turn: float) -> float:
 
 
 def _omni(step: np.ndarray, noise: OdometryNoise, rng: np.random.Generator, count: int) -> np.ndarray:
-    way, _ = se2.travelled(step)
+    distance, _ = se2.travelled(step)
     bearing, turn = float(np.arctan2(step[1], step[0])), float(angles.wrap(step[2]))
     a1, a2, a3, a4, a5 = (noise.odom_alpha1, noise.odom_alpha2, noise.odom_alpha3, noise.odom_alpha4, noise.odom_alpha5)
-    ways = way + rng.normal(0.0, _deviation(a3 * way**2 + a1 * turn**2, noise), count)
-    turns = turn + rng.normal(0.0, _deviation(a4 * turn**2 + a2 * way**2, noise), count)
-    sideways = rng.normal(0.0, _deviation(a1 * turn**2 + a5 * way**2, noise), count)
+    distances = distance + rng.normal(0.0, _deviation(a3 * distance**2 + a1 * turn**2, noise), count)
+    turns = turn + rng.normal(0.0, _deviation(a4 * turn**2 + a2 * distance**2, noise), count)
+    sideways = rng.normal(0.0, _deviation(a1 * turn**2 + a5 * distance**2, noise), count)
     cos, sin = np.cos(bearing), np.sin(bearing)
-    return np.stack([ways * cos - sideways * sin, ways * sin + sideways * cos, turns], axis=-1)
+    return np.stack([distances * cos - sideways * sin, distances * sin + sideways * cos, turns], axis=-1)

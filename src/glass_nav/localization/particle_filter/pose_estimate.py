@@ -1,6 +1,6 @@
 """Weights -> pose: mean and covariance of the best cluster of particles.
 
-Particles of other clusters are other answers: they belong neither into the mean nor into the
+Other clusters are other hypotheses: they belong neither to the mean nor to the
 covariance. P particles.
 """
 

@@ -1,10 +1,10 @@
 """Odometry and scan -> where to put the particles.
 
-A lidar tells the pose far more sharply than odometry does, so particles drawn from odometry alone
-mostly land where the scan rules them out. Part of them is therefore drawn around the poses at which the
+A lidar measures the pose far more precisely than odometry does, so particles drawn from odometry alone
+mostly land where the scan rules them out. Some of them is therefore drawn around the poses at which the
 scan fits (the improved proposal of Grisetti, Stachniss, Burgard (2007), as a mixture as in Thrun et al.
 (2005), sec. 8.3.5), and every particle carries the ratio of target to proposal density, so that the
-answer stays the filter's and not the aligner's. P particles, K alignments.
+posterior stays the filter's and not the aligner's. P particles, K alignments.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ class Proposal:
 
     proposal_scan_share: float = 0.5  # of the particles drawn around aligned poses; 0 turns it off
     proposal_max_beams: int = 90
-    proposal_min_cluster_share: float = 0.5  # below it the cloud has no one place to align from
-    odom_slip_probability: float = 0.001  # that a step of odometry is worth nothing
+    proposal_min_cluster_share: float = 0.5  # below it the cloud has no single place to align from
+    odom_slip_probability: float = 0.001  # that a step of odometry is useless
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.proposal_scan_share < 1.0:
@@ -59,7 +59,7 @@ def draw(
         weights: (P,) of them, sum 1.
         best: their best cluster, which the scan was aligned from.
         aligned: K poses at which the scan fits.
-        beam_information: what one aligned beam says across the wall [1/m2].
+        beam_information: of one aligned beam, across the wall [1/m2].
         proposal: shares and deviations.
         rng: source of all randomness.
 

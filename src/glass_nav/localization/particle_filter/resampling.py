@@ -1,4 +1,4 @@
-"""Weights -> which particles live on, and how many are enough.
+"""Weights -> which particles are drawn, and how many are enough.
 
 Low-variance resampling: Thrun, Burgard, Fox, Probabilistic Robotics (2005), table 4.4. Number of
 particles: KLD sampling, Fox, Adapting the Sample Size in Particle Filters (2003). P particles.
@@ -47,19 +47,19 @@ def effective_count(weights: np.ndarray) -> float:
     return float(1.0 / np.sum(weights**2))
 
 
-def tempered(log_w: np.ndarray, least_effective: float = 20.0) -> np.ndarray:
-    """(P,) weights that sum to 1, flattened until that many particles count.
+def tempered(log_w: np.ndarray, min_effective: float = 20.0) -> np.ndarray:
+    """(P,) weights that sum to 1, flattened until the effective count is that large.
 
-    A scan that one particle alone explains says more about the model of the errors than about the pose.
+    If only one particle explains a scan, the error model is more likely wrong than all other particles.
     """
     weights = normalised(log_w)
-    least_effective = min(least_effective, 0.5 * len(weights))
-    if effective_count(weights) >= least_effective:
+    min_effective = min(min_effective, 0.5 * len(weights))
+    if effective_count(weights) >= min_effective:
         return weights
     low, high = 0.0, 1.0
     for _ in range(20):
         power = 0.5 * (low + high)
-        enough = effective_count(normalised(power * log_w)) >= least_effective
+        enough = effective_count(normalised(power * log_w)) >= min_effective
         low, high = (power, high) if enough else (low, power)
     return normalised(low * log_w)
 

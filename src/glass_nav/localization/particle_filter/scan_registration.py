@@ -1,11 +1,10 @@
 """Predicted particles, scan -> the poses nearby where the scan fits: where the cases are voted on.
 
-The seed document assumes a good prediction (assumption i). Real odometry breaks it: wheels slip, an old
-log steps a metre and 10 degrees between scans, a turn of 80 degrees goes unnoticed. So the scan is
-aligned from preliminary samples over the predicted spread first. When it fits much worse there than
-scans did lately, wider spreads are tried; a place that odometry did not lead to is only believed when
-the next scan fits there too, and still not where odometry leads: a crowd around the robot may look like
-another room once.
+The seed document assumes a good prediction (assumption i). Real odometry violates it: wheels slip, an old log steps a
+metre and 10 degrees between scans, a turn of 80 degrees goes unnoticed. So the scan is first aligned from preliminary
+samples over the predicted spread. If it fits much worse there than recent scans did, wider spreads are tried. A place
+that odometry did not lead to is accepted only if the next scan fits there too, and still not where odometry leads: a
+crowd around the robot may look like another room once.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from glass_nav.sensing.distance_field import DistanceField
 _MIN_STARTS, _MAX_STARTS = 37, 360
 _START_GRID = np.array([0.12, 0.12, 0.05])  # [m, m, rad] of spread that the least starts cover
 _ALIGNED_STARTS = 60  # the best of more starts
-_LEVELS = (  # limits of the starts' spread: as predicted, a bad step of odometry, a spin that went unnoticed
+_LEVELS = (  # limits of the starts' spread: as predicted, a bad step of odometry, an unnoticed turn
     PreliminarySamples(
         sample_min_radius_m=0.12, sample_min_heading_rad=0.05, sample_max_radius_m=0.5, sample_max_heading_rad=0.35
     ),
@@ -39,8 +38,8 @@ _LEVELS = (  # limits of the starts' spread: as predicted, a bad step of odometr
         sample_max_heading_rad=0.5 * np.pi,
     ),
 )
-_POOR_FIT = 0.75  # of the usual fit: odometry is not believed
-_REACH = 3.0  # deviations: farther away a poor fit is chance
+_POOR_FIT = 0.75  # of the usual fit: odometry is not trusted
+_REACH = 3.0  # deviations: farther away a poor fit is due to chance
 _CONVINCING_FIT = 0.9  # of the usual fit: a place that odometry did not lead to
 _MEMORY = 0.9
 _MIN_SCALE_M, _MAX_SCALE_M = 0.06, 0.3  # of the kernel; follows how well the map fits
@@ -48,7 +47,7 @@ _SCALE_MEDIANS = 2.0
 
 
 class ScanRegistration:
-    """Finds the aligned poses and remembers how well scans fit lately."""
+    """Finds the aligned poses and remembers how well recent scans fit."""
 
     def __init__(self, field: DistanceField) -> None:
         self.fits = True  # the last scan fitted about as well as scans usually do
@@ -77,7 +76,7 @@ class ScanRegistration:
                 return farther
             self._suspect = self._search(mean, covariance, odom_from_base, points_m)
             near = _within_reach(found.poses, mean, covariance)
-            if not near.any():  # the scan says nothing about the place that odometry leads to
+            if not near.any():  # the scan is no evidence about the place that odometry leads to
                 return Alignment(mean[None], np.zeros((1, 3, 3)), scan_alignment.fit(self._field, points_m, mean[None]))
             found = Alignment(found.poses[near], found.information[near], found.fit[near])
         self._remember(found, points_m)

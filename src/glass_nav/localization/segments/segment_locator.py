@@ -94,11 +94,11 @@ class SegmentLocator:
     def _cases(self, scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
         vote = CaseVote()
         samples = preliminary_samples.around(map_from_base, np.zeros((3, 3)), PreliminarySamples())
-        references = expected_ranges.of(
+        expected = expected_ranges.of(
             self._caster, self._thickness_m, samples, scan, vote.glass_max_thickness_m, vote.normal_min_linearity
         )
-        glass = self._glass_map.chances(references.cell[[0, 2], 0])
-        return case_votes.classify(scan.ranges_m, references, self._residuals, vote, glass, scan.range_max_m).case
+        glass = self._glass_map.chances(expected.cell[[0, 2], 0])
+        return case_votes.classify(scan.ranges_m, expected, self._residuals, vote, glass, scan.range_max_m).case
 
 
 def _kept_where_free(found: SegmentCorrection, rough: np.ndarray) -> np.ndarray:

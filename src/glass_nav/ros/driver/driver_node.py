@@ -29,7 +29,6 @@ import rospy
 import tf2_ros
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import OccupancyGrid
-from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
@@ -51,6 +50,7 @@ from glass_nav.msg import (
     TraverseEdgeFeedback,
     TurnChoice,
 )
+from glass_nav.rate_limiter import RateLimiter
 from glass_nav.ros import action_status, conversions, shutdown
 from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.driver import driver_displays, driver_messages
@@ -59,9 +59,9 @@ from glass_nav.ros.driver.move_base_task import MoveBase, MoveBaseTask
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
-from glass_nav.ros.rate_limiter import RateLimiter
-from glass_nav.ros.scan_input import STALE_SCANS, ScanInput
+from glass_nav.ros.scan_input import ScanInput
 from glass_nav.sensing.scan import ScanError
+from glass_nav.sensing.scan_placement import RawScan
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import AtlasError
 from glass_nav.vocabulary import LocalizationState, Outcome
@@ -210,19 +210,20 @@ class DriverNode:
         """Scans that have their transforms, of whichever of the two topics the driver prefers now."""
         for lane, source in (("scans", self._scans), ("surfaces", self._surfaces)):
             for msg in mail[lane]:
-                if source.receive(msg, self._clock.now_s, None):
-                    self._reset(f"the last {STALE_SCANS} scans are older than the one before them")
+                stale = source.receive(msg, self._clock.now_s, None)
+                if stale is not None:
+                    self._reset(stale)
         if mail["surfaces"]:
             self._driver.surfaces_came()
         preferred = self._surfaces if self._driver.prefers_surfaces else self._scans
         for source in (self._scans, self._surfaces):
-            for msg in source.take_ready(self._clock.now_s):
+            for raw in source.take_ready(self._clock.now_s):
                 if source is preferred:
-                    self._take_scan(source, msg)
+                    self._take_scan(source, raw)
 
-    def _take_scan(self, source: ScanInput, msg: LaserScan) -> None:
+    def _take_scan(self, source: ScanInput, raw: RawScan) -> None:
         try:
-            placed = source.place(msg)
+            placed = source.place(raw)
         except ScanError as err:
             source.refuse(str(err))
             return

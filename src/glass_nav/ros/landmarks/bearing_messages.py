@@ -6,8 +6,8 @@ from typing import List, Sequence
 
 from glass_nav.msg import LandmarkBearings as LandmarkBearingsMsg
 from glass_nav.ros import conversions
-from glass_nav.ros.conversions import Mounting
 from glass_nav.sensing.bearings import LandmarkBearing
+from glass_nav.sensing.mounting import Mounting
 
 LONGEST_TURN_S = 300.0  # of a sensor: a node that receives bearings remembers odometry for so long
 

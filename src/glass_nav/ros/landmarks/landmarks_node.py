@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 import threading
 from dataclasses import dataclass, field
-from typing import Dict, List, Optional, Tuple
+from typing import List
 
 import numpy as np
 import rospy
@@ -32,9 +32,8 @@ from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 from visualization_msgs.msg import MarkerArray
 
 from glass_nav import params
-from glass_nav.geometry import se2
-from glass_nav.localization.bearings import triangulation
-from glass_nav.localization.bearings.triangulation import Fix, TriangulationLimits
+from glass_nav.localization.bearings.landmark_fixes import FixParams, LandmarkFixes, PlacedFix
+from glass_nav.localization.bearings.triangulation import TriangulationLimits
 from glass_nav.msg import LandmarkBearings as LandmarkBearingsMsg
 from glass_nav.msg import LocalizationStatus
 from glass_nav.ros import conversions, mailbox, shutdown
@@ -42,13 +41,10 @@ from glass_nav.ros.landmarks import bearing_messages, landmark_display
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
-from glass_nav.sensing import bearings
-from glass_nav.sensing.bearings import LandmarkBearing, LandmarkBearings, OdometryDrift
-from glass_nav.vocabulary import LocalizationState
+from glass_nav.sensing.bearings import OdometryDrift
 from glass_nav.world import landmark_file
 from glass_nav.world.landmark_map import LandmarkMap
 
-METHODS = ("least_squares", "document")
 SERVICE_TIMEOUT_S = 10.0
 
 
@@ -57,14 +53,7 @@ class NodeParams:
     """What the node itself needs. Units by REP 103."""
 
     landmark_file: str = ""  # landmarks.yaml; must be given
-    method: str = "least_squares"  # or "document": the average over all triples
-    window_s: float = 90.0  # bearings older than this, against the newest, are forgotten
     transform_wait_s: float = 1.0  # how long a message waits for odometry at its stamps
-    max_age_s: float = 120.0  # of the fix that ~send_initialpose sends
-    rescue_states: str = "UNKNOWN LOST GLOBAL_SEARCH"  # of the localization: a fix goes to initialpose; "": never
-    rescue_period_s: float = 10.0
-    min_position_sigma_m: float = 0.05  # of initialpose: particles in one point would not find the scan's best place
-    min_heading_sigma_rad: float = 0.02
     odom_frame_id: str = "odom"
     base_frame_id: str = "base_link"
     global_frame_id: str = "map"
@@ -72,21 +61,8 @@ class NodeParams:
     def __post_init__(self) -> None:
         if not self.landmark_file:
             raise ValueError("~landmark_file must name a file of landmarks, got ''")
-        if self.method not in METHODS:
-            raise ValueError(f"~method must be one of {', '.join(METHODS)}, got {self.method!r}")
-        for name in (
-            "window_s",
-            "transform_wait_s",
-            "max_age_s",
-            "rescue_period_s",
-            "min_position_sigma_m",
-            "min_heading_sigma_rad",
-        ):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"~{name} must be >= 0 and finite, got {getattr(self, name)}")
-        unknown = [state for state in self.rescue_states.split() if state not in LocalizationState.__members__]
-        if unknown:
-            raise ValueError(f"~rescue_states must be words of {', '.join(LocalizationState)}, got {unknown[0]!r}")
+        if not 0.0 <= self.transform_wait_s < math.inf:
+            raise ValueError(f"~transform_wait_s must be >= 0 and finite, got {self.transform_wait_s}")
         for name in ("odom_frame_id", "base_frame_id", "global_frame_id"):
             frame = conversions.frame_id(getattr(self, name))
             object.__setattr__(self, name, frame)
@@ -99,6 +75,7 @@ class LandmarksNodeParams:
     """Everything the node reads, one flat set of names."""
 
     node: NodeParams = field(default_factory=NodeParams)
+    fixes: FixParams = field(default_factory=FixParams)
     limits: TriangulationLimits = field(default_factory=TriangulationLimits)
     drift: OdometryDrift = field(default_factory=OdometryDrift)
 
@@ -111,21 +88,15 @@ class LandmarksNode:
         LandmarkError: the landmark file cannot be used; one line.
         ValueError: it has fewer than three landmarks.
         """
-        self._p, self._limits, self._drift = p.node, p.limits, p.drift
+        self._p = p.node
         self._landmarks: LandmarkMap = landmark_file.load(self._p.landmark_file)
-        if len(self._landmarks) < 3:
-            raise ValueError(
-                f"{self._p.landmark_file}: three landmarks are needed for a position, it has {len(self._landmarks)}"
-            )
+        try:
+            self._fixes = LandmarkFixes(self._landmarks, p.fixes, p.limits, p.drift)
+        except ValueError as err:
+            raise ValueError(f"{self._p.landmark_file}: {err}") from err
         self._log = LogThrottle()
         self._inbox = Mailbox(bearings=100, states=10, commands=20)
         self._waiting: "List[tuple[float, LandmarkBearingsMsg]]" = []  # arrival [s], for their odometry
-        self._newest: Dict[str, Tuple[LandmarkBearing, np.ndarray]] = {}  # with odom_from_base at its stamp
-        self._fix: Optional[Fix] = None
-        self._odom_at_fix = np.zeros(3)
-        self._why_none = "no bearings came yet"
-        self._state = ""
-        self._sent_ns = self._rescued_ns = 0  # stamps of fixes
         self._clock = LoopClock()
 
         self._tf = tf2_ros.Buffer(rospy.Duration(bearing_messages.LONGEST_TURN_S))
@@ -163,11 +134,10 @@ class LandmarksNode:
             for command in mail["commands"]:
                 command()
             for msg in mail["states"]:
-                self._state = msg.state_name
+                self._fixes.localization_state = msg.state_name
             self._waiting += [(self._clock.now_s, msg) for msg in mail["bearings"]]
             self._work_off()
-            if self._state in self._p.rescue_states.split():
-                self._rescue()
+            self._rescue()
 
     # -- bearings
 
@@ -204,28 +174,15 @@ class LandmarksNode:
                 self._p.base_frame_id, conversions.frame_id(msg.header.frame_id), rospy.Time(0)
             ).transform
         )
+        taken = []
         for bearing in bearing_messages.bearings_from_msg(msg, mounting):
             if bearing.landmark_id in self._landmarks:
-                self._newest[bearing.landmark_id] = bearing, self._odom_from_base(bearing.stamp_ns)
+                taken.append((bearing, self._odom_from_base(bearing.stamp_ns)))
             else:
                 self._log.warn(f"bearing ignored: landmark {bearing.landmark_id!r} is not in {self._p.landmark_file}")
-        if not self._newest:
-            self._why_none = "no known landmark was seen"
-            return
-        newest_ns = max(bearing.stamp_ns for bearing, _ in self._newest.values())
-        self._newest = {
-            name: each for name, each in self._newest.items() if newest_ns - each[0].stamp_ns <= self._p.window_s * 1e9
-        }
-        in_order = sorted(self._newest.values(), key=lambda each: each[0].stamp_ns)
-        self._fix_from(
-            in_order[-1][1],
-            bearings.collected(
-                [bearing for bearing, _ in in_order],
-                np.array([odometry for _, odometry in in_order]),
-                mounting.base_from_laser,
-                self._drift,
-            ),
-        )
+        placed = self._fixes.take(taken, mounting.base_from_laser)
+        if placed is not None:
+            self._publish(placed)
 
     def _odom_from_base(self, stamp_ns: int) -> np.ndarray:
         return conversions.planar_from_transform(
@@ -234,24 +191,18 @@ class LandmarksNode:
             ).transform
         )
 
-    def _fix_from(self, odom_from_base: np.ndarray, taken: LandmarkBearings) -> None:
-        solve = triangulation.average if self._p.method == "document" else triangulation.triangulate
-        try:
-            fix = solve(taken, self._landmarks, self._limits)
-        except triangulation.TriangulationError as err:
-            self._refuse(str(err))
-            return
-        self._fix, self._odom_at_fix = fix, odom_from_base
+    def _publish(self, placed: PlacedFix) -> None:
+        fix = placed.fix
         if fix.excluded_ids:
             self._log.warn(f"bearings that contradict the others are left out: {', '.join(fix.excluded_ids)}")
         frame = self._p.global_frame_id
         self._poses.publish(conversions.pose_with_covariance(fix.stamp_ns, fix.map_from_base, fix.covariance, frame))
-        self._markers.publish(landmark_display.fix_markers(fix, taken, self._landmarks, frame))
+        self._markers.publish(landmark_display.fix_markers(fix, placed.bearings, self._landmarks, frame))
         x, y, yaw = fix.map_from_base
         rospy.loginfo(f"position from {', '.join(fix.used_ids)}: x {x:.2f} m, y {y:.2f} m, yaw {yaw:.3f} rad")
 
     def _refuse(self, why: str) -> None:
-        self._why_none = why
+        self._fixes.why_none = why
         self._log.warn(f"no position from bearings: {why}")
 
     # -- initialpose
@@ -264,44 +215,27 @@ class LandmarksNode:
         return TriggerResponse(success=True, message="sent to initialpose")
 
     def _send_on_request(self) -> None:
-        if self._fix is None:
-            raise ValueError(f"there is no position: {self._why_none}")
-        age_s = self._clock.now_s - self._fix.stamp_ns * 1e-9
-        if age_s > self._p.max_age_s:
-            raise ValueError(
-                f"the last position is {age_s:.0f} s old, allowed {self._p.max_age_s:g} s; since then: {self._why_none}"
-            )
-        self._send(self._fix, "as requested")
+        self._send(self._fixes.requested(self._clock.now_s), "as requested")
 
     def _rescue(self) -> None:
-        """The localization does not know where it is: tell it, once for each fix."""
-        fix = self._fix
-        if (
-            fix is None
-            or fix.stamp_ns <= self._sent_ns
-            or (fix.stamp_ns - self._rescued_ns) * 1e-9 < self._p.rescue_period_s
-        ):
+        last = self._fixes.due_for_rescue()
+        if last is None:
             return
-        self._rescued_ns = fix.stamp_ns
         try:
-            self._send(fix, f"the localization is {self._state}")
+            self._send(last, f"the localization is {self._fixes.localization_state}")
         except ValueError as err:
             self._log.warn(f"initialpose not sent: {err}")
 
-    def _send(self, fix: Fix, why: str) -> None:
-        """As of the newest odometry: whoever receives it need not remember the odometry of a whole turn."""
+    def _send(self, last: PlacedFix, why: str) -> None:
         try:
             newest = self._tf.lookup_transform(self._p.odom_frame_id, self._p.base_frame_id, rospy.Time(0))
         except tf2_ros.TransformException as err:  # tf was cleared since the fix
             raise ValueError(f"no odometry to carry the position along: {err}") from err
-        self._sent_ns = fix.stamp_ns
-        step = se2.compose(se2.inverse(self._odom_at_fix), conversions.planar_from_transform(newest.transform))
-        fix = triangulation.carried_along(fix, conversions.ns_from_stamp(newest.header.stamp), step, self._drift)
-        floor = np.diag(np.square([self._p.min_position_sigma_m] * 2 + [self._p.min_heading_sigma_rad]))
+        fix = self._fixes.initial_pose(
+            last, conversions.ns_from_stamp(newest.header.stamp), conversions.planar_from_transform(newest.transform)
+        )
         self._initial_poses.publish(
-            conversions.pose_with_covariance(
-                fix.stamp_ns, fix.map_from_base, fix.covariance + floor, self._p.global_frame_id
-            )
+            conversions.pose_with_covariance(fix.stamp_ns, fix.map_from_base, fix.covariance, self._p.global_frame_id)
         )
         rospy.loginfo(f"initialpose sent, {why}")
 
@@ -311,9 +245,8 @@ class LandmarksNode:
             return False
         rospy.logwarn(f"{jump}: bearings start over")
         self._tf.clear()
-        self._waiting, self._newest, self._fix, self._state = [], {}, None, ""
-        self._why_none = "no bearings came since time jumped back"
-        self._sent_ns = self._rescued_ns = 0
+        self._waiting = []
+        self._fixes.restart("no bearings came since time jumped back")
         return True
 
 

@@ -36,32 +36,32 @@ import tf2_ros
 from geometry_msgs.msg import PolygonStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import SetMap, SetMapRequest, SetMapResponse
-from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
-from glass_nav.localization import health
+from glass_nav.localization import health, initial_pose
 from glass_nav.localization.health import LocalizationHealth, Situation
-from glass_nav.localization.localizer import Estimate, Localizer
+from glass_nav.localization.pose_memory import PoseMemory
+from glass_nav.localization.saved_pose import SavedPose
+from glass_nav.localization.session import Inputs, LocalizationSession
 from glass_nav.ros import conversions, mailbox, shutdown
 from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.landmarks.bearing_messages import LONGEST_TURN_S
-from glass_nav.ros.localization import initial_poses, params, reconfigure
+from glass_nav.ros.localization import params, reconfigure
 from glass_nav.ros.localization.bearing_input import BearingInput
-from glass_nav.ros.localization.initial_poses import InitialPoses
 from glass_nav.ros.localization.map_source import MapSource
-from glass_nav.ros.localization.pose_memory import PoseMemory
 from glass_nav.ros.localization.publishers import Publishers
 from glass_nav.ros.localization.reconfigure import ReconfigureServer
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
-from glass_nav.ros.scan_input import STALE_SCANS, ScanInput
-from glass_nav.sensing.scan import Scan, ScanError
+from glass_nav.ros.scan_input import ScanInput
+from glass_nav.ros.tf_transforms import TfTransforms
+from glass_nav.sensing.scan import ScanError
+from glass_nav.sensing.scan_placement import RawScan
 from glass_nav.world import landmark_file
 from glass_nav.world.grid_map import GridMap
 
 NO_SCAN_WARNING_S = 15.0  # as AMCL
-SILENCE_S = 3.0  # without a used scan for that long, ~status says why
 SETTLING_S = 5.0  # a player of a launch file needs some seconds: no warning before
 SERVICE_TIMEOUT_S = 30.0
 
@@ -71,29 +71,25 @@ class LocalizationNode:
 
     def __init__(self, p: params.LocalizationParams) -> None:
         self._p = p
-        self._rng = p.node.rng
-        self._localizer: Optional[Localizer] = None
-        self._map: Optional[GridMap] = None
-        self._map_origin = ""  # where it came from, in words
-        self._waits = p.node.wait_for_initialpose  # with a map, without a filter
-        self._estimate: Optional[Estimate] = None
-        self._scan: Optional[Scan] = None  # that the estimate was made of
-        self._pose_is_news = True
         self._log = LogThrottle()
         self._inbox = Mailbox(scans=100, commands=100)
         self._clock = LoopClock()
-        self._last_estimate_s = self._clock.now_s
         self._started_s = time.monotonic()
-        self._simulated = bool(rospy.get_param("/use_sim_time", False))
         self._next_report_s = 0.0  # by the monotonic clock
 
         self._tf = tf2_ros.Buffer(rospy.Duration(LONGEST_TURN_S) if p.node.landmark_file else None)
         self._scans = ScanInput(p.node, p.deskew, self._tf, self._log)
         self._bearings = BearingInput(p.node, self._tf, self._log)
         self._maps = MapSource(p.node, self._log, self._use_map)
-        self._starts = InitialPoses(p, self._tf)
-        self._memory = PoseMemory(p.pose_file, self._log)
+        self._memory = PoseMemory(p.pose_file, _keep_on_server, lambda line: self._log.warn(line, period_s=60.0))
         self._outputs = Publishers(p.node)
+        self._session = LocalizationSession(
+            p.session,
+            TfTransforms(self._tf, p.node.odom_frame_id, p.node.base_frame_id).odom_from_base,
+            bool(rospy.get_param("/use_sim_time", False)),
+            self._clock.now_s,
+            self._outputs.start_over,
+        )
         self._health = LocalizationHealth(p.node.warn_deviations, self._scans.counts)
         self._diagnostics = Diagnostics(*health.ENTRIES)
 
@@ -124,18 +120,16 @@ class LocalizationNode:
                 command()
             self._maps.request()
             mail["scans"] += self._inbox.take_now("scans")  # a new map takes a while
-            if self._waits and mail["scans"]:
+            if self._session.waits_for_pose and mail["scans"]:
                 mail["scans"], self._scans.last_arrival_s = [], self._clock.now_s
-            unusable = "there is no map yet" if self._localizer is None else None
             for msg in mail["scans"]:
-                if self._scans.receive(msg, self._clock.now_s, unusable):
-                    self._restart(f"the last {STALE_SCANS} scans are older than the one before them")
-            if self._localizer is not None:
-                for msg in self._scans.take_ready(self._clock.now_s):
-                    self._step(msg)
-            if self._localizer is not None and self._map is not None:
-                stamp_ns = 0 if self._estimate is None else self._estimate.stamp_ns
-                self._outputs.send_glass_map(self._localizer, self._map, stamp_ns, self._clock.now_s)
+                stale = self._scans.receive(msg, self._clock.now_s, self._session.refusal)
+                if stale is not None:
+                    self._restart(stale)
+            if self._session.refusal is None:
+                for raw in self._scans.take_ready(self._clock.now_s):
+                    self._step(raw)
+            self._send_glass_map()
             self._report()
 
     def save_pose(self) -> None:
@@ -152,7 +146,7 @@ class LocalizationNode:
 
     def _serve_global_localization(self, _request: EmptyRequest) -> EmptyResponse:
         try:
-            self._in_run_loop(self._search)
+            self._in_run_loop(self._session.search)
         except (ValueError, TimeoutError) as err:
             rospy.logwarn(f"global_localization refused: {err}")
             raise rospy.ServiceException(str(err)) from err
@@ -160,7 +154,7 @@ class LocalizationNode:
 
     def _serve_nomotion_update(self, _request: EmptyRequest) -> EmptyResponse:
         try:
-            self._in_run_loop(lambda: self._core().request_update())
+            self._in_run_loop(self._session.request_update)
         except (ValueError, TimeoutError) as err:
             raise rospy.ServiceException(str(err)) from err
         return EmptyResponse()
@@ -175,27 +169,10 @@ class LocalizationNode:
 
     # -- maps, poses and parameters from outside
 
-    def _core(self) -> Localizer:
-        if self._localizer is None:
-            raise ValueError("there is no map yet")
-        return self._localizer
-
     def _use_map(self, grid_map: GridMap, frame: str, origin: str) -> None:
-        """Build the filter around the first map; a later one leaves the particles where they are."""
-        if self._localizer is None:
-            self._map = grid_map
-            if not self._waits:
-                self._begin()
-        elif self._map is not None and grid_map.digest == self._map.digest:
-            rospy.loginfo(f"the map from {origin} is the one that is in use: nothing changes")
+        if not self._session.use_map(grid_map, origin):
             return
-        else:
-            self._localizer.set_map(grid_map)
-            self._map = grid_map
-        self._map_origin = origin
         self._outputs.glass_is_news()
-        height, width = grid_map.occupancy.shape
-        rospy.loginfo(f"map of {width} x {height} cells of {grid_map.resolution_m:g} m from {origin}")
         if conversions.frame_id(frame) != self._p.node.global_frame_id:
             rospy.logwarn(
                 f"the map says it is in frame {frame!r}, ~global_frame_id is "
@@ -205,60 +182,27 @@ class LocalizationNode:
     def _set_map_and_pose(self, request: SetMapRequest) -> None:
         guess = conversions.guess_from_msg(request.initial_pose, self._p.node.global_frame_id)
         grid_map = conversions.map_from_msg(request.map)
-        initial_poses.refuse_outside(guess, grid_map)
+        initial_pose.refuse_outside(guess, grid_map)  # before the map is taken
         self._maps.take(grid_map, request.map.header.frame_id, "service set_map")
-        self._starts.give(guess, self._clock.now_s)
-        self._wait_no_more()
-        if self._p.node.force_update_after_set_map:
-            self._core().request_update()
-
-    def _begin(self) -> str:
-        """A new filter, at the start that there is; where, in words."""
-        assert self._map is not None
-        self._localizer = Localizer(self._p.localizer, self._map, self._rng)
-        self._outputs.start_over()
-        self._pose_is_news = True
-        return self._starts.begin(self._localizer)
+        self._session.give_with_map(guess, self._clock.now_s)
 
     def _take_guess(self, msg: PoseWithCovarianceStamped) -> None:
         try:
             guess = conversions.guess_from_msg(msg, self._p.node.global_frame_id)
-            if self._map is not None:
-                initial_poses.refuse_outside(guess, self._map)
+            self._session.give(guess, self._clock.now_s)
         except ValueError as err:
             rospy.logwarn(f"initialpose refused: {err}")
-            return
-        self._starts.give(guess, self._clock.now_s)
-        self._wait_no_more()
-
-    def _wait_no_more(self) -> None:
-        """There is a pose, or somebody wants one to be found."""
-        if self._waits:
-            self._waits = False
-            if self._map is not None:
-                self._begin()
 
     def _take_area(self, msg: PolygonStamped) -> None:
         try:
-            self._search(conversions.area_from_msg(msg, self._p.node.global_frame_id))
+            self._session.search(conversions.area_from_msg(msg, self._p.node.global_frame_id))
         except ValueError as err:
             rospy.logwarn(f"global_localization_area refused: {err}")
-
-    def _search(self, area: Optional[np.ndarray] = None) -> None:
-        """Start over anywhere in the map, or in an area (N, 2) of it; ValueError if there is no room."""
-        self._wait_no_more()
-        self._core().scatter(area)
-        self._starts.forget()
-        self._outputs.start_over()
-        self._pose_is_news = True
-        where = "the map" if area is None else f"an area of {len(area)} corners"
-        rospy.loginfo(f"global localization: the robot may be anywhere in {where}")
 
     def _take_parameters(self, values: Dict[str, Any]) -> None:
         """Other parameters; what the filter knows stays. ParamError if one cannot be used, and then none is."""
         p = params.changed(self._p, values, rospy.get_name())
-        if self._localizer is not None:
-            self._localizer.reconfigure(p.localizer)
+        self._session.reconfigure(p.session)
         self._p = p
         self._scans.reconfigure(p.node, p.deskew)
         self._outputs.reconfigure(p.node)
@@ -266,107 +210,95 @@ class LocalizationNode:
 
     # -- scans
 
-    def _step(self, msg: LaserScan) -> None:
+    def _step(self, raw: RawScan) -> None:
         """One scan through the filter."""
-        assert self._localizer is not None and self._map is not None
         try:
-            placed = self._scans.place(msg)
+            placed = self._scans.place(raw)
         except ScanError as err:
-            self._pass_over(msg, str(err))
+            self._pass_over(raw.stamp_ns, str(err))
             return
         began_cpu_s, began_s = time.process_time(), time.monotonic()
-        if self._starts.apply(
-            self._localizer, self._map, placed.scan.stamp_ns, placed.odom_from_base, self._clock.now_s
-        ):
-            self._pose_is_news = True
-            if self._p.node.force_update_after_initialpose:
-                self._localizer.request_update()
-        self._bearings.give(self._localizer, placed.scan.stamp_ns)
+        session, scan, odom_from_base = self._session, placed.scan, placed.odom_from_base
+        session.start_at_given_pose(scan.stamp_ns, odom_from_base, self._clock.now_s)
+        self._bearings.give(session.localizer, scan.stamp_ns)
         try:
-            estimate = self._localizer.update(placed.scan, placed.odom_from_base)
+            estimate = session.update(scan, odom_from_base, self._clock.now_s)
         except ValueError as err:  # ScanError, and what the filter cannot work out: a robot drives on by odometry
-            self._pass_over(msg, str(err))
+            self._pass_over(raw.stamp_ns, str(err))
             return
         self._health.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
-        if not conversions.is_finite(estimate):
+        if estimate is None:
             self._scans.counts.refused += 1
             self._log.error("the filter's pose is not finite: nothing is published")
             return
         self._scans.counts.used += 1
-        self._estimate, self._scan, self._last_estimate_s = estimate, placed.scan, self._clock.now_s
-        self._outputs.send(msg, placed, estimate, self._clock.now_s, self._pose_is_news)
-        self._pose_is_news = False
-        self._memory.take(estimate, self._map.digest, self._p.node.save_pose_rate, self._clock.now_s)
+        self._outputs.send(placed, estimate, self._clock.now_s, session.pose_is_news)
+        session.pose_is_news = False
+        self._memory.take(estimate, session.grid_map.digest, self._p.node.save_pose_rate, self._clock.now_s)
 
-    def _pass_over(self, msg: LaserScan, why: str) -> None:
+    def _pass_over(self, stamp_ns: int, why: str) -> None:
         """A scan that cannot be used: the pose moves on with the odometry all the same."""
         self._scans.refuse(why)
-        if self._estimate is not None:
-            self._outputs.send_transform(conversions.ns_from_stamp(msg.header.stamp), self._estimate.map_from_odom)
+        if self._session.estimate is not None:
+            self._outputs.send_transform(stamp_ns, self._session.estimate.map_from_odom)
+
+    def _send_glass_map(self) -> None:
+        session = self._session
+        if session.localizer is not None and session.grid_map is not None:
+            stamp_ns = 0 if session.estimate is None else session.estimate.stamp_ns
+            self._outputs.send_glass_map(session.localizer, session.grid_map, stamp_ns, self._clock.now_s)
 
     # -- time, and what is missing
 
     def _clock_jumped_back(self) -> bool:
         jump = self._clock.tick()
         if self._clock.has_begun:
-            self._scans.last_arrival_s = self._last_estimate_s = self._clock.now_s
+            self._scans.last_arrival_s = self._session.last_estimate_s = self._clock.now_s
         if jump is not None:
             self._restart(jump)
         return jump is not None
 
     def _restart(self, why: str) -> None:
-        """Stamps start over: forget them. In simulated time the robot starts over too, else it stays."""
+        """Time jumped: stamps start over."""
         self._scans.restart(self._clock.now_s)
         self._bearings.restart()
         self._tf.clear()
-        self._starts.forget()
-        self._last_estimate_s = self._clock.now_s
-        if not self._simulated and self._estimate is not None:
-            self._starts.begin_at(self._estimate.map_from_base, self._estimate.covariance)
-        self._estimate = None
-        self._rng = self._p.node.rng  # a bag that starts over gives the same poses again
-        if self._simulated and self._p.node.wait_for_initialpose:
-            self._waits, self._localizer = True, None
-            rospy.logwarn(f"{why}: it waits for initialpose again")
-        elif self._map is not None:
-            rospy.logwarn(f"{why}: the filter starts over {self._begin()}")
+        self._session.restart(why, self._clock.now_s)
 
     def _report(self) -> None:
         """Once a second: diagnostics, and in words what is missing if no scan is being used."""
         if time.monotonic() < self._next_report_s:
             return
         self._next_report_s = time.monotonic() + 1.0
-        trouble = self._missing()
+        session, silence = self._session, self._scans.silence(self._clock.now_s)
+        trouble = session.missing(
+            Inputs(self._clock.now_s, self._scans.last_arrival_s, silence, self._scans.trouble, self._maps.trouble)
+        )
+        if self._clock.now_s == 0.0:
+            if time.monotonic() - self._started_s > SETTLING_S:
+                self._log.warn(trouble, NO_SCAN_WARNING_S)
+        elif self._clock.now_s - self._scans.last_arrival_s > NO_SCAN_WARNING_S:
+            self._log.warn(silence, NO_SCAN_WARNING_S)
         if trouble is not None:
-            self._outputs.send_trouble(self._estimate, trouble)
+            self._outputs.send_trouble(session.estimate, session.state_without_scans, trouble)
         situation = Situation(
-            self._estimate,
-            self._scan,
+            session.estimate,
+            session.scan,
             trouble,
-            self._map,
-            self._map_origin if self._map else self._maps.trouble or "no map yet",
+            session.grid_map,
+            session.map_origin if session.grid_map else self._maps.trouble or "no map yet",
             self._scans.period_s,
             self._scans.lidars,
         )
         self._diagnostics.publish(self._health.report(situation))
 
-    def _missing(self) -> Optional[str]:
-        """Why no scan is being used; None while all is well."""
-        if self._clock.now_s == 0.0:
-            trouble = "time stands still: /use_sim_time is set and nothing publishes /clock"
-            if time.monotonic() - self._started_s > SETTLING_S:
-                self._log.warn(trouble, NO_SCAN_WARNING_S)
-            return trouble
-        without_scan_s = self._clock.now_s - self._scans.last_arrival_s
-        if without_scan_s > NO_SCAN_WARNING_S:
-            self._log.warn(self._scans.silence(self._clock.now_s), NO_SCAN_WARNING_S)
-        if self._localizer is None:
-            return self._maps.trouble or ("it waits for initialpose" if self._map is not None else "no map yet")
-        if without_scan_s > SILENCE_S:
-            return self._scans.silence(self._clock.now_s)
-        if self._clock.now_s - self._last_estimate_s > SILENCE_S or self._estimate is None:
-            return self._scans.trouble
-        return None
+
+def _keep_on_server(saved: SavedPose) -> None:
+    """As AMCL does; OSError without a parameter server."""
+    for name, value in zip(("x", "y", "a"), saved.map_from_base):
+        rospy.set_param(f"~initial_pose_{name}", float(value))
+    for name, value in zip(("xx", "yy", "aa"), np.diag(saved.covariance)):
+        rospy.set_param(f"~initial_cov_{name}", float(value))
 
 
 def _parameter_file() -> Optional[Path]:

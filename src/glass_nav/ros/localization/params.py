@@ -15,9 +15,10 @@ from typing import Any, Dict, List, Mapping, Tuple
 import numpy as np
 
 from glass_nav import amcl_parameters, params
-from glass_nav.localization.initial_pose import StartPose
+from glass_nav.localization.initial_pose import StartPose, StartRules
 from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.saved_pose import PoseFile
+from glass_nav.localization.session import SessionParams
 from glass_nav.params import ParamError
 from glass_nav.sensing.deskew import Deskew
 
@@ -38,10 +39,6 @@ class LocalizationNodeParams:
     transform_wait_s: float = 1.0  # [s] how long a scan waits for odom <- base <- laser
     use_map_topic: bool = False
     first_map_only: bool = False
-    force_update_after_initialpose: bool = False
-    force_update_after_set_map: bool = False
-    start_without_guess: bool = False  # begin with a search of the whole map, not at initial_pose_*
-    wait_for_initialpose: bool = False  # no pose and no map -> odom before one is given; nothing is searched
     gui_publish_rate: float = -1.0  # [Hz] of particlecloud, ~beam_cloud, ~beam_markers; <= 0: no limit
     glass_map_period_s: float = 2.0  # [s] ~glass_map goes out no more often
     save_pose_rate: float = 0.5  # [Hz]; <= 0: only when the node ends
@@ -49,7 +46,6 @@ class LocalizationNodeParams:
     std_warn_level_y: float = 0.2  # [m]
     std_warn_level_yaw: float = 0.1  # [rad]
     landmark_file: str = ""  # landmarks.yaml; "": bearings are not used
-    random_seed: int = 0  # < 0: another one at every start
 
     def __post_init__(self) -> None:
         if len(set(self.scan_topics)) < len(self.scan_topics) or not all(self.scan_topics):
@@ -84,11 +80,6 @@ class LocalizationNodeParams:
         """(3,) ~std_warn_level of x [m], y [m], yaw [rad]."""
         return np.array([self.std_warn_level_x, self.std_warn_level_y, self.std_warn_level_yaw])
 
-    @property
-    def rng(self) -> np.random.Generator:
-        """A generator that repeats itself from start to start, unless ~random_seed is negative."""
-        return np.random.default_rng(None if self.random_seed < 0 else self.random_seed)
-
 
 @dataclass(frozen=True)
 class LocalizationParams:
@@ -96,9 +87,15 @@ class LocalizationParams:
 
     node: LocalizationNodeParams = field(default_factory=LocalizationNodeParams)
     start: StartPose = field(default_factory=StartPose)
+    rules: StartRules = field(default_factory=StartRules)
     pose_file: PoseFile = field(default_factory=PoseFile)
     deskew: Deskew = field(default_factory=Deskew)
     localizer: LocalizerParams = field(default_factory=LocalizerParams)
+
+    @property
+    def session(self) -> SessionParams:
+        """Those that the session begins with."""
+        return SessionParams(self.localizer, self.start, self.rules, self.pose_file)
 
 
 # Of the node's own parameters, those that may change while it runs; of the filter's, all.
@@ -120,7 +117,7 @@ CHANGEABLE = (
 
 def changeable(p: LocalizationParams) -> Dict[str, Any]:
     """Name -> value of the parameters that may change while the node runs."""
-    own = params.as_mapping(p.node)
+    own = {**params.as_mapping(p.node), **params.as_mapping(p.rules)}
     return {**params.as_mapping(p.localizer), **params.as_mapping(p.deskew), **{name: own[name] for name in CHANGEABLE}}
 
 

@@ -14,11 +14,11 @@ from visualization_msgs.msg import MarkerArray
 
 from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.msg import BeamCases, LocalizationStatus
+from glass_nav.rate_limiter import RateLimiter, period_s
 from glass_nav.ros import conversions
 from glass_nav.ros.localization import beam_displays, legend, wall_display
 from glass_nav.ros.localization.params import LocalizationNodeParams
-from glass_nav.ros.rate_limiter import RateLimiter, period_s
-from glass_nav.ros.scan_input import PlacedScan
+from glass_nav.sensing.scan_placement import PlacedScan
 from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
 
@@ -62,26 +62,26 @@ class Publishers:
         """There is another glass map than the one that was sent."""
         self._glass_is_news = True
 
-    def send(self, msg: LaserScan, placed: PlacedScan, estimate: Estimate, now_s: float, pose_is_news: bool) -> None:
+    def send(self, placed: PlacedScan, estimate: Estimate, now_s: float, pose_is_news: bool) -> None:
         """All about one scan that was used.
 
         Args:
-            msg, placed: the scan.
+            placed: the scan.
             estimate: what the filter says of it.
             now_s: ROS time.
             pose_is_news: publish the pose even if this scan did not move the particles.
         """
         self._was_localized = self._was_localized or estimate.state == LocalizationState.LOCALIZED
         self.send_transform(estimate.stamp_ns, estimate.map_from_odom)
-        self._surfaces.publish(conversions.surface_scan_msg(msg, placed.scan, estimate.surface_scan))
+        self._surfaces.publish(conversions.surface_scan_msg(placed, estimate.surface_scan))
         self._status.publish(
             conversions.status_msg(
                 estimate.stamp_ns,
                 self._frame,
                 estimate.state,
                 estimate.reason,
-                estimate.used_share,
-                estimate.reliability,
+                estimate.inlier_ratio,
+                estimate.confidence,
             )
         )
         if estimate.updated or pose_is_news:
@@ -90,7 +90,7 @@ class Publishers:
                 self._particles.publish(conversions.pose_array(estimate.stamp_ns, self._frame, estimate.particles))
         self._glass_is_news = self._glass_is_news or estimate.updated
         if self._beam_cases.get_num_connections():
-            self._beam_cases.publish(conversions.beam_cases_msg(msg.header, placed.scan, estimate.cases))
+            self._beam_cases.publish(conversions.beam_cases_msg(placed.scan, estimate.cases))
         self._show_beams(placed, estimate, now_s)
 
     def send_transform(self, stamp_ns: int, map_from_odom: np.ndarray) -> None:
@@ -104,16 +104,15 @@ class Publishers:
             conversions.transform_stamped(valid_until_ns, self._frame, self._p.odom_frame_id, map_from_odom)
         )
 
-    def send_trouble(self, estimate: Optional[Estimate], trouble: str) -> None:
+    def send_trouble(self, estimate: Optional[Estimate], state: LocalizationState, trouble: str) -> None:
         """~status, and the words in rviz, while no scan is being used.
 
         Args:
             estimate: the last one, None before the first.
+            state: of the localization.
             trouble: why no scan is being used.
         """
-        stamp_ns, where, state = 0, None, "UNKNOWN"
-        if estimate is not None:
-            stamp_ns, where, state = estimate.stamp_ns, estimate.map_from_base, "UNCERTAIN"
+        stamp_ns, where = (0, None) if estimate is None else (estimate.stamp_ns, estimate.map_from_base)
         self._status.publish(conversions.status_msg(stamp_ns, self._frame, state, trouble, NOT_KNOWN, NOT_KNOWN))
         if self._beam_markers.get_num_connections():
             self._beam_markers.publish(
@@ -142,7 +141,7 @@ class Publishers:
             markers = beam_displays.beam_markers(placed.scan, estimate.cases, estimate.surface_scan, height_m, base)
             markers.markers.append(
                 beam_displays.status_marker(
-                    estimate.map_from_base, self._frame, estimate.state, estimate.reason, estimate.used_share
+                    estimate.map_from_base, self._frame, estimate.state, estimate.reason, estimate.inlier_ratio
                 )
             )
             self._beam_markers.publish(markers)

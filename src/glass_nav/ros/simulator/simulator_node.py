@@ -42,7 +42,7 @@ from glass_nav.ros.simulator.frame_messages import FrameNames
 from glass_nav.ros.tools.served_map import ServedMap
 from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings, start_place
 from glass_nav.simulation.landmark_scanner import ScannerModel
-from glass_nav.simulation.path_follower import FollowerParams, PathFollower
+from glass_nav.simulation.path_follower import PathFollower, PathFollowerParams
 from glass_nav.simulation.robot import RobotParams
 from glass_nav.simulation.simulation import CONTROL_S, Frame, Simulation
 
@@ -335,7 +335,7 @@ def _drive(p: SimulatorNodeParams) -> _Drive:
     )
     if p.path in ("", "none"):  # roslaunch cannot hand on an empty argument of its command line
         return _Drive(simulation, None)
-    return _Drive(simulation, simulation.follower(p.path, FollowerParams(speed_m_s=p.path_speed_m_s)))
+    return _Drive(simulation, simulation.follower(p.path, PathFollowerParams(speed_m_s=p.path_speed_m_s)))
 
 
 def main() -> None:

@@ -1,8 +1,9 @@
-"""The last scans, to be looked up by their stamps: what did the robot see when it reported a meetpoint?"""
+"""The last scans, placed when they are asked for by the stamp of a meetpoint."""
 
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from typing import Deque, Optional
 
@@ -11,17 +12,20 @@ import tf2_ros
 from sensor_msgs.msg import LaserScan
 
 from glass_nav.ros import conversions
+from glass_nav.ros.tf_transforms import TfTransforms
 from glass_nav.sensing.scan import Scan, ScanError
+from glass_nav.sensing.scan_placement import NoTransform, RawScan, ScanPlacement
 
 _KEPT = 100  # scans
-_WAIT_S = 0.5  # for one that is still on its way, by the wall clock
+_MAX_WAIT_S, _POLL_S = 0.5, 0.02  # for a scan or a transform that is still on its way, by the wall clock
 
 
 class ScanMemory:
     """Subscribes to scan; at() may be called from any thread."""
 
-    def __init__(self) -> None:
-        self._scans: Deque[LaserScan] = deque(maxlen=_KEPT)
+    def __init__(self, odom_frame: str) -> None:
+        self._odom_frame = odom_frame
+        self._scans: Deque[RawScan] = deque(maxlen=_KEPT)
         self._came = threading.Condition()
         self._tf = tf2_ros.Buffer()
         self._listener = tf2_ros.TransformListener(self._tf)
@@ -31,22 +35,28 @@ class ScanMemory:
 
     def _keep(self, msg: LaserScan) -> None:
         with self._came:
-            self._scans.append(msg)
+            self._scans.append(conversions.raw_scan_from_msg(msg))
             self._came.notify_all()
 
     def at(self, stamp: rospy.Time, base_frame: str) -> "tuple[Optional[Scan], str]":
-        """The scan of that stamp, or None and why there is none."""
-        with self._came:
-            self._came.wait_for(lambda: self._find(stamp) is not None, _WAIT_S)
-            msg = self._find(stamp)
-        if msg is None:
-            return None, f"no scan on {self._subscriber.resolved_name} has the stamp {stamp.to_sec():.3f} s"
-        laser_frame = conversions.frame_id(msg.header.frame_id)
-        try:
-            transform = self._tf.lookup_transform(conversions.frame_id(base_frame), laser_frame, stamp)
-            return conversions.scan_from_msg(msg, conversions.mounting_from_transform(transform.transform)), ""
-        except (tf2_ros.TransformException, ScanError, ValueError) as err:
-            return None, str(err)
+        """The scan of that stamp, deskewed; or None and why there is none."""
+        transforms = TfTransforms(self._tf, self._odom_frame, conversions.frame_id(base_frame))
+        placement = ScanPlacement(transforms)
+        deadline_s = time.monotonic() + _MAX_WAIT_S
+        while True:
+            try:
+                return placement.scan(self._find(conversions.ns_from_stamp(stamp))), ""
+            except (LookupError, NoTransform) as err:
+                if time.monotonic() >= deadline_s:
+                    return None, str(err)
+            except ScanError as err:
+                return None, str(err)
+            with self._came:
+                self._came.wait(_POLL_S)
 
-    def _find(self, stamp: rospy.Time) -> Optional[LaserScan]:
-        return next((msg for msg in reversed(self._scans) if msg.header.stamp == stamp), None)
+    def _find(self, stamp_ns: int) -> RawScan:
+        with self._came:
+            for raw in reversed(self._scans):
+                if raw.stamp_ns == stamp_ns:
+                    return raw
+        raise LookupError(f"no scan on {self._subscriber.resolved_name} has the stamp {stamp_ns * 1e-9:.3f} s")

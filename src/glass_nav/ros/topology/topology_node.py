@@ -4,9 +4,9 @@ Wiring only: SearchSession decides. Callbacks store, one loop works: nothing els
 
 Subscribes: meetpoint (Meetpoint), edge_traversal (EdgeTraversal): of the driver, or by hand; in either order, the
     traversal and the meetpoint at its end belong together. map (OccupancyGrid, if ~check_map): the atlas must be made
-    from it. scan (LaserScan) and tf to the frame of the meetpoint, with map, if ~judge_by_scans: candidates from where
-    the map does not explain the scan of a meetpoint's stamp are ruled out; where meetpoints have odometry, the poses
-    that explain the scans are followed from one meetpoint to the next as well.
+    from it. scan (LaserScan), tf ~odom_frame_id <- frame of the meetpoint <- laser, and map, if ~judge_by_scans:
+    candidates from where the map does not explain the scan of a meetpoint's stamp are ruled out; where meetpoints have
+    odometry, the poses that explain the scans are followed from one meetpoint to the next as well.
 Publishes: turn_choice (TurnChoice): the answer to each meetpoint while there is something to find out;
     initialpose (PoseWithCovarianceStamped) once when CONFIRMED, with the stamp of the meetpoint;
     ~candidates (TopologyCandidates, latched), ~status (TopologyStatus, latched), ~markers (MarkerArray, latched):
@@ -68,7 +68,7 @@ class TopologyNode:
     def __init__(self, p: TopologyParams) -> None:
         self._p = p.node
         self._session = SearchSession(self._read_atlas, p.session, p.search)
-        self._scans = ScanMemory() if p.session.judge_by_scans else None
+        self._scans = ScanMemory(p.node.odom_frame_id) if p.session.judge_by_scans else None
         self._base_frame = ""  # of the last meetpoint
         self._shown_atlas: Optional[Atlas] = None
         self._atlas_markers: List[Marker] = []  # of that atlas

@@ -15,14 +15,16 @@ class TopologyNodeParams:
 
     atlas: str = ""  # atlas.json, atlas.npz, the folder of one, or the name of a shipped one
     global_frame_id: str = "map"
+    odom_frame_id: str = "odom"  # of the odometry by which scans are deskewed
     initial_pose_sigma_m: float = 0.25  # of initialpose
     initial_pose_sigma_rad: float = 0.17  # [rad] 10 degrees
     end_without_atlas: bool = False  # when the atlas is refused, rather than wait for its map
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "global_frame_id", self.global_frame_id.lstrip("/"))
-        if not self.global_frame_id.strip():
-            raise ValueError(f"~global_frame_id must name a frame, got {self.global_frame_id!r}")
+        for name in ("global_frame_id", "odom_frame_id"):
+            object.__setattr__(self, name, getattr(self, name).lstrip("/"))
+            if not getattr(self, name).strip():
+                raise ValueError(f"~{name} must name a frame, got {getattr(self, name)!r}")
         for name in ("initial_pose_sigma_m", "initial_pose_sigma_rad"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise ValueError(f"~{name} must be finite and > 0, got {getattr(self, name)}")

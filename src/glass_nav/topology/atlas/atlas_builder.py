@@ -80,8 +80,8 @@ def build(
         graph = voronoi_graph.build(grid_map, params.graph, step)
     if not graph.lines_m:
         raise AtlasError(
-            f"no way of {params.graph.smallest_component_m:g} m for a robot of "
-            f"{params.graph.robot_radius_m:g} m radius in this map"
+            f"no path of {params.graph.smallest_component_m:g} m in this map for a robot of "
+            f"{params.graph.robot_radius_m:g} m radius"
         )
     with watch("segment maps", len(graph.lines_m) + 1) as step:
         views = EdgeViews(grid_map, params.view)

@@ -15,9 +15,9 @@ from typing import List, Optional, Tuple
 import numpy as np
 
 from glass_nav.geometry import angles
+from glass_nav.hypotheses.followed_poses import MAX_LEAD, FollowedPoses, MapScans, Standing
 from glass_nav.topology.atlas.atlas import Atlas, Visits
 from glass_nav.topology.observations import Meetpoint, Traversal
-from glass_nav.topology.search.followed_poses import MAX_LEAD, FollowedPoses, MapScans, Standing
 from glass_nav.topology.search.graph_verdict import GraphVerdict
 from glass_nav.topology.search.matching import Explained, Matcher, poses_at
 from glass_nav.topology.search.passed_edges import PassedEdges
@@ -64,7 +64,7 @@ class AtlasLocalizer:
         self._passed = PassedEdges()
         self._seen_places = 0  # by the followed poses, when the last search began
         self._estimate: Optional[SearchEstimate] = None
-        self._edges_before = 0  # driven in searches that ended LOST and were begun anew
+        self._edges_before = 0  # driven in searches that ended LOST and were restarted
         self._search = 1
 
     @property
@@ -98,7 +98,7 @@ class AtlasLocalizer:
         self._edges_before, self._search, self._seen_places = 0, 1, 0
         self._passed.begin(meetpoint)
         if self._followed is not None:
-            self._followed.begin(meetpoint)
+            self._followed.begin(meetpoint.odom_from_base, meetpoint.scan)
         return self._begin(meetpoint)
 
     def update(self, traversal: Traversal, meetpoint: Meetpoint) -> SearchEstimate:
@@ -110,18 +110,19 @@ class AtlasLocalizer:
         self._forest.step(traversal, meetpoint)
         self._passed.add(traversal.rank, meetpoint, traversal.length_m)
         if self._followed is not None:
-            self._followed.follow(meetpoint, traversal.length_m)
+            self._followed.follow(meetpoint.odom_from_base, meetpoint.scan, traversal.length_m)
         return self._judged()
 
     def map_from_base(self, dart: np.ndarray) -> np.ndarray:
-        """(C, 3) poses of the robot at the last meetpoint if it came along darts (C,): where it reported to stand there, or
-        else at the meetpoint with the edge behind it.
+        """(C, 3) poses of the robot at the last meetpoint if it came along darts (C,).
+
+        As it reported to stand there, or else at the meetpoint with the edge behind it.
         """
         return poses_at(self._atlas, dart, self._forest.meetpoints[-1])
 
     def poses(self, estimate: SearchEstimate, most: Optional[int] = None) -> np.ndarray:
-        """(C, 3) map_from_base at the last meetpoint, of the first candidates of the last estimate; if scans confirmed a
-        pose, that one.
+        """(C, 3) map_from_base at the last meetpoint, of the first candidates of the last estimate, or the pose that
+        scans confirmed.
         """
         if estimate.map_from_base is not None:
             return estimate.map_from_base[None]
@@ -161,19 +162,19 @@ class AtlasLocalizer:
         standing = self.standing
         if standing is not None:
             estimate = self._with_followed(estimate, standing)
-        if estimate.state == SearchState.LOST and self._may_begin_anew():
-            estimate = self._begun_anew()
+        if estimate.state == SearchState.LOST and self._may_restart():
+            estimate = self._restarted()
         if self._edges_before and self._followed is not None and estimate.choice is not None:
             estimate = replace(estimate, choice=self._least_passed(estimate.choice))
         self._estimate = estimate
         return estimate
 
-    def _may_begin_anew(self) -> bool:
+    def _may_restart(self) -> bool:
         """Where scans are judged, the meetpoint at which nothing matches may be the first of another search."""
         judged = self._matcher.judges_scans and self._forest.meetpoints[-1].scan is not None
         return judged and self._search < self._params.searches and self._forest.depth > 0
 
-    def _begun_anew(self) -> SearchEstimate:
+    def _restarted(self) -> SearchEstimate:
         self._search += 1
         self._edges_before += self._forest.depth
         begun = self._begin(self._forest.meetpoints[-1])

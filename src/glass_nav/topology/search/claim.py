@@ -14,7 +14,7 @@ _TREE_EDGES = 2000  # searched for an edge that was not driven yet
 
 @dataclass(frozen=True)
 class Claim:
-    """When the candidates were first down to a place, or to places that nothing tells apart."""
+    """The first depth at which one candidate was left, or several that nothing tells apart."""
 
     depth: int
     dart: np.ndarray  # (C,)

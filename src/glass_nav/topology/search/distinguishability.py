@@ -14,8 +14,8 @@ import numpy as np
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.search import wake_up_trials
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search.atlas_robot import Surroundings, TrialParams
 from glass_nav.topology.search.search_params import SearchParams
-from glass_nav.topology.search.wake_up_trials import Surroundings, TrialParams
 from glass_nav.vocabulary import SearchState
 
 

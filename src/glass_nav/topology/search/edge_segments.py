@@ -132,8 +132,9 @@ class _Walls:
         )
 
     def beyond(self, points: np.ndarray, path_m: np.ndarray) -> np.ndarray:
-        """(K, P) metres from a piece to the first segment on the line of sight from the nearest viewpoint; negative: the
-        segment is in front of the piece, -inf: there is none.
+        """(K, P) metres from a piece to the first segment on the line of sight from the nearest viewpoint.
+
+        Negative: the segment is in front of the piece; -inf: there is none.
         """
         near = np.argmin(np.sum((points[..., None, :] - path_m) ** 2, axis=-1), axis=-1)
         eye = path_m[near]

@@ -1,4 +1,4 @@
-"""The search forest in words: row by row, as the document draws it, with what made each search node inactive.
+"""The search forest as text: row by row, as the document draws it, with the reason why a search node is inactive.
 
 Seed document: global_localization_procedure.txt, "Building the search forest" to "Updating the Search Forest". A row
 holds a search node for every edge of every active search node of the row before.
@@ -21,7 +21,7 @@ MAX_LINES = 40  # of a row; large atlases have rows of thousands
 
 
 def row(localizer: AtlasLocalizer, estimate: SearchEstimate) -> Iterator[str]:
-    """Lines on the current depth of a search: what was seen, its search nodes, what follows."""
+    """Lines on the current depth of a search: what was seen, its search nodes, the estimate."""
     forest, atlas = localizer.forest, localizer.atlas
     depth, here = forest.depth, forest.meetpoints[-1]
     yield f"Search depth {depth}"
@@ -35,7 +35,7 @@ def row(localizer: AtlasLocalizer, estimate: SearchEstimate) -> Iterator[str]:
         yield from _shortened(
             [
                 f"  node {atlas.darts.node[dart]:3d}  {'from the start' if parent == NO_PARENT else ''}"
-                f"  active with {errors} error{'s' * (errors > 1)} of the detector"
+                f"  active with {errors} detection error{'s' * (errors > 1)}"
                 for dart, parent in zip(found.dart.tolist(), found.parent.tolist())
             ]
         )
@@ -66,7 +66,7 @@ def _expanded_row(localizer: AtlasLocalizer) -> Iterator[str]:
     forest, atlas, matcher = localizer.forest, localizer.atlas, localizer.matcher
     traversal, here, depth = forest.traversals[-1], forest.meetpoints[-1], forest.depth
     before = forest.row(depth - 1).dart
-    if depth == 1:  # there is no arrival edge yet: search nodes are nodes, any edge may be the one that was taken
+    if depth == 1:  # there is no arrival edge yet: search nodes are nodes, and any edge may have been taken
         node = np.unique(atlas.darts.node[before])
         departures = np.concatenate([atlas.rings[int(each)] for each in node] or [np.zeros(0, np.int64)])
         right_turn = np.isin(departures, matcher.departures(before, traversal.rank))

@@ -125,7 +125,7 @@ class Matcher:
         return dart.astype(np.int64)
 
     def others(self, dart: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """All other darts (K,) at the nodes of darts (C,), and for each the index (K,) of the given dart at its node."""
+        """All other darts (K,) at the nodes of darts (C,), and the index (K,) of the given dart at the same node."""
         beside = np.arange(len(dart))
         found, of = [], []
         step = self._next[dart]
@@ -167,8 +167,9 @@ class Matcher:
         return self._explained is not None
 
     def _scan_fits(self, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
-        """(C,) bool: the map explains enough of the scan if darts (C,) are the reference edge; all True if there are too
-        many of them.
+        """(C,) bool: the map explains enough of the scan if darts (C,) are the reference edge.
+
+        All True if there are too many of them.
         """
         if self._explained is None or meetpoint.scan is None or not 0 < len(dart) <= _MAX_JUDGED:
             return np.ones(len(dart), bool)
@@ -244,7 +245,7 @@ class Matcher:
         return kept[fits]
 
     def _segments_fit(self, departure: np.ndarray, traversal: Traversal) -> np.ndarray:
-        """(C,) bool: the walls seen do not contradict those of the atlas along darts; all True if there are too many."""
+        """(C,) bool: the walls seen do not contradict those along darts (C,); all True if there are too many."""
         if self._segments is None or not len(traversal.segments_m) or len(departure) > _MAX_COMPARED:
             return np.ones(len(departure), bool)
         if id(traversal) not in self._compared and len(self._compared) >= _REMEMBERED:

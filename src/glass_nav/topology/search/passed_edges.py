@@ -1,4 +1,4 @@
-"""Odometry at meetpoints -> how often the robot passed each of their edges: the way to get everywhere without an atlas.
+"""Odometry at meetpoints -> how often the robot passed each of their edges, to get everywhere without an atlas.
 
 A robot that always leaves by the edge that it passed least often covers every edge of any building: the rule of
 Tremaux for mazes (Lucas, Recreations mathematiques, 1882). Edges are recognized by where they leave and in which
@@ -45,7 +45,7 @@ class PassedEdges:
         self._last = meetpoint
 
     def times(self, meetpoint: Meetpoint) -> Optional[np.ndarray]:
-        """(degree,) how often each edge of the last meetpoint was passed, in either direction; None if that is not known."""
+        """(degree,) how often each edge of the last meetpoint was passed, in either direction; None: not known."""
         if meetpoint.odom_from_base is None or not len(meetpoint.bearings_rad):
             return None
         centre, bearing = _in_odom(meetpoint)

@@ -8,8 +8,8 @@ active candidates only; the parents of a candidate, and what was ruled out, foll
 be the reference edge.
 
 Beyond the document, the detector may fail: it misses a meetpoint, which joins two edges to one, or reports a spurious
-one, which splits an edge. A row is kept for each number of detection errors, and rows with errors are computed only when
-no candidate without errors is left. Rules for the row of depth d with e errors:
+one, which splits an edge. A row is kept for each number of detection errors, and rows with errors are computed only
+when no candidate without errors is left. Rules for the row of depth d with e errors:
 
 * an edge from the row of d - 1 with e;
 * two edges joined from the row of d - 1 with e - 1, three from that with e - 2;
@@ -166,9 +166,7 @@ class SearchForest:
             (depth, errors), index = before, parent
 
     def has_rival(self, dart: int) -> bool:
-        """Whether the last traversal of a candidate of the current depth also matches a path with a missed meetpoint, to
-        the next meetpoint, if that is near.
-        """
+        """Whether the last traversal of a candidate also matches a path over a missed meetpoint to the next one."""
         came = self.path(dart)
         if not came[-1][2]:
             return False
@@ -246,13 +244,13 @@ class SearchForest:
         if len(parts) == 1:
             return _Course(parts[0], parts[0], True, False)
         sigma = math.sqrt(sum(self._matcher.sigma_length_m(part) ** 2 for part in parts))
-        way = np.array([-1.0 if part.rank == 0 and number else 1.0 for number, part in enumerate(parts)]).cumprod()
-        at = np.cumsum(way * [part.length_m for part in parts])
+        ahead = np.array([-1.0 if part.rank == 0 and number else 1.0 for number, part in enumerate(parts)]).cumprod()
+        at = np.cumsum(ahead * [part.length_m for part in parts])
         net, farthest = (
             Traversal(parts[0].rank, max(float(value), 1e-6), UNKNOWN, sigma_length_m=sigma)
             for value in (at[-1], at.max())
         )
-        return _Course(net, farthest, bool(way[-1] > 0.0), bool(way.min() < 0.0))
+        return _Course(net, farthest, bool(ahead[-1] > 0.0), bool(ahead.min() < 0.0))
 
     def _joined_edges(
         self, departure: np.ndarray, traversal: Traversal, missed: int

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from glass_nav.hypotheses.followed_poses import MAX_LEAD
 from glass_nav.topology.search.edge_segments import SegmentTest
-from glass_nav.topology.search.followed_poses import MAX_LEAD
 from glass_nav.topology.search.matching import Tolerances
 
 VOTE_MODES = ("best", "seed")

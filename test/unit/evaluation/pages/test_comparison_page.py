@@ -61,6 +61,16 @@ def test_names_are_no_markup(tmp_path):
     assert "&lt;b&gt;" in page and "a&amp;b" in page
 
 
+def test_numbers_of_a_table_are_aligned(tmp_path):
+    found = compared({"old": (0.4, 0.5), "new": (0.3, 0.4)})
+    drawn = comparison_pictures.draw_all(tmp_path, found, {})
+    comparison_page.write(tmp_path / "page.html", found, drawn, {"what": {"old": "a", "new": "b"}})
+    page = (tmp_path / "page.html").read_text()
+    assert '<th scope="col">figure</th><th scope="col" class="number">old</th>' in page
+    assert '<th scope="row">position error, mean [m]</th><td class="number">0.450' in page
+    assert '<th scope="row">old</th><td>a</td>' in page
+
+
 @pytest.mark.long_run
 def test_a_sweep_over_many_logs_has_pictures_of_the_first_ones(tmp_path):
     logs = [f"{number}.bag" for number in range(comparison_pictures.MAX_LOGS + 2)]

@@ -152,12 +152,6 @@ def test_the_page_takes_texts_as_texts(tmp_path):
     assert "worst" not in page.partition("<main")[2].replace("worst scans, pictured below", "")
 
 
-def test_numbers_of_a_table_are_aligned():
-    text = report_page.table(["run", "error"], [["a", "1"]], numbers=True)
-    assert '<th scope="col">run</th><th scope="col" class="number">error</th>' in text
-    assert '<th scope="row">a</th><td class="number">1</td>' in text
-
-
 def test_a_kept_scan_comes_back_as_it_was(tmp_path):
     replay_result.write(a_result(worst=KEPT), tmp_path, {})
     kept = replay_result.read(tmp_path)[0].worst

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from buildings import CELL_M, GLASS_ROOM, RANGE_MAX_M, Building
-from made_references import NEVER, OBLIQUE, references
+from made_expected_ranges import NEVER, OBLIQUE, expect
 
 from glass_nav import _beam_vote
 from glass_nav.geometry import se2
@@ -46,7 +46,7 @@ def weight_of_a_mirror(mirrored=3.0, second=5.0, incidence_deg=60.0, **values):
     """Share of the vote that a beam gets for being mirrored whose range fits nothing else."""
     cases = classify(
         mirrored,
-        references(first=1.0, mirrored=mirrored, second=second, incidence=np.radians(incidence_deg)),
+        expect(first=1.0, mirrored=mirrored, second=second, incidence=np.radians(incidence_deg)),
         case_min_share=0.0,
         **values,
     )
@@ -70,14 +70,14 @@ def weight_of_a_mirror(mirrored=3.0, second=5.0, incidence_deg=60.0, **values):
     ],
 )
 def test_a_beam_met_the_surface_that_its_range_fits(mode, measured_m, case):
-    cases = classify(measured_m, references(first=2.0, second=5.0, third=8.0), mode)
+    cases = classify(measured_m, expect(first=2.0, second=5.0, third=8.0), mode)
     assert cases.case.tolist() == [case]
     assert cases.case.dtype == np.uint8
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_what_was_expected_is_told_with_the_case(mode):
-    cases = classify([2.03, 4.96, np.nan, 3.5], references(first=[2.0] * 4, second=[5.0] * 4), mode)
+    cases = classify([2.03, 4.96, np.nan, 3.5], expect(first=[2.0] * 4, second=[5.0] * 4), mode)
     np.testing.assert_allclose(cases.expected_m, [2.0, 5.0, np.nan, np.nan])
     np.testing.assert_allclose(cases.residual_m, [0.03, -0.04, np.nan, np.nan])
     assert np.all((cases.weight >= 0.5) & (cases.weight <= 1.0))
@@ -85,12 +85,12 @@ def test_what_was_expected_is_told_with_the_case(mode):
 
 @pytest.mark.parametrize("mode", MODES)
 def test_shares_count_all_beams(mode):
-    cases = classify([2.0, 2.0, 5.0, np.nan], references(first=[2.0] * 4, second=[5.0] * 4), mode)
+    cases = classify([2.0, 2.0, 5.0, np.nan], expect(first=[2.0] * 4, second=[5.0] * 4), mode)
     assert cases.share() == {0: 0.25, 1: 0.5, 2: 0.0, 3: 0.25, 4: 0.0}
 
 
 def test_without_beams_there_are_no_shares():
-    assert classify(np.zeros(0), references(first=np.zeros((1, 0)))).share() == dict.fromkeys(range(5), 0.0)
+    assert classify(np.zeros(0), expect(first=np.zeros((1, 0)))).share() == dict.fromkeys(range(5), 0.0)
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_without_beams_there_are_no_shares():
     ],
 )
 def test_in_the_paper_the_plainest_of_equal_explanations_wins(equal, winner):
-    assert classify(3.0, references(**equal), "paper").case.tolist() == [winner]
+    assert classify(3.0, expect(**equal), "paper").case.tolist() == [winner]
 
 
 @pytest.mark.parametrize(
@@ -117,31 +117,31 @@ def test_in_the_paper_the_plainest_of_equal_explanations_wins(equal, winner):
     ],
 )
 def test_of_equal_explanations_how_glassy_the_wall_proved_decides(through, there, case):
-    offered = references(first=3.0, second=3.0)
+    offered = expect(first=3.0, second=3.0)
     assert classify(3.0, offered, through=through, there=there).case.tolist() == [case]
 
 
 @pytest.mark.parametrize("second, case", [(0.01, 3), (0.99, 4)])
 def test_how_glassy_the_second_wall_proved_decides_between_one_pane_and_two(second, case):
-    offered = references(first=1.0, second=3.0, third=3.0)
+    offered = expect(first=1.0, second=3.0, third=3.0)
     assert classify(3.0, offered, through=(0.99, second)).case.tolist() == [case]
 
 
 def test_a_pane_answers_head_on_and_lets_pass_what_comes_from_the_side():
     """Half a gate between a pane and the wall behind it, and a range from the middle."""
     for incidence, case in ((0.0, 1), (OBLIQUE, 3)):
-        offered = references(first=2.0, second=2.1, incidence=incidence)
+        offered = expect(first=2.0, second=2.1, incidence=incidence)
         assert classify(2.05, offered, through=0.99).case.tolist() == [case]
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_a_wall_that_never_let_anybody_through_may_do_so_once(mode):
-    assert classify(5.0, references(first=2.0, second=5.0), mode, through=0.0).case.tolist() == [3]
+    assert classify(5.0, expect(first=2.0, second=5.0), mode, through=0.0).case.tolist() == [3]
 
 
 def test_what_ends_behind_a_thing_that_is_gone_has_passed_no_pane():
     """It is at the second surface and yet in none of the cases 1 to 4."""
-    offered = references(first=2.0, second=5.0)
+    offered = expect(first=2.0, second=5.0)
     assert classify(5.0, offered, through=0.99, there=0.02).case.tolist() == [0]
     assert classify(5.0, offered, through=0.99, there=0.98).case.tolist() == [3]
     assert classify(5.0, offered, "paper", through=0.99, there=0.02).case.tolist() == [3]  # knows no glass map
@@ -152,13 +152,13 @@ def test_a_wall_is_not_believed_to_be_met_from_a_side_that_nobody_saw(row, measu
     """Looking back into the building through its glass: the outer face of the wall is not on the map."""
     offered = dict(first=2.0, mirrored=3.0, second=5.0, third=8.0)
     sides = np.ones(4, bool)
-    seen = classify(measured_m, references(**offered), case_min_share=0.0)
+    seen = classify(measured_m, expect(**offered), case_min_share=0.0)
     sides[row] = False
-    unseen = classify(measured_m, references(**offered, seen_side=sides), case_min_share=0.0)
+    unseen = classify(measured_m, expect(**offered, seen_side=sides), case_min_share=0.0)
     assert seen.case.tolist() == [row + 1]
     assert unseen.case.tolist() == [0] or unseen.weight[0] < seen.weight[0]
     sides[row], sides[0] = True, False  # the first surface stands before the lidar, whatever the mapper saw
-    assert classify(2.0, references(**offered, seen_side=sides)).case.tolist() == [1]
+    assert classify(2.0, expect(**offered, seen_side=sides)).case.tolist() == [1]
 
 
 # -- mirrors
@@ -187,7 +187,7 @@ def test_a_lidar_that_sees_farther_sees_fainter_mirrored_echoes():
 
 def test_coated_panes_mirror_more_and_panes_without_gain_not_at_all():
     assert weight_of_a_mirror(mirror_gain=6.0) > weight_of_a_mirror(mirror_gain=1.0)
-    offered = references(first=1.0, mirrored=3.0, second=5.0, incidence=np.radians(80.0))
+    offered = expect(first=1.0, mirrored=3.0, second=5.0, incidence=np.radians(80.0))
     assert classify(3.0, offered, mirror_gain=0.0).case.tolist() == [0]
 
 
@@ -196,18 +196,18 @@ def test_coated_panes_mirror_more_and_panes_without_gain_not_at_all():
 )
 def test_a_wall_behind_and_its_like_in_the_mirror_are_told_apart_by_the_incidence(incidence_deg, case):
     """Both as far away: near head-on a pane mirrors a tenth of the light, grazing it mirrors most."""
-    offered = references(first=1.0, mirrored=4.0, second=4.0, incidence=np.radians(incidence_deg))
+    offered = expect(first=1.0, mirrored=4.0, second=4.0, incidence=np.radians(incidence_deg))
     assert classify(4.0, offered, through=0.9).case.tolist() == [case]
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_where_nothing_is_mirrored_no_beam_is_said_to_be(mode):
-    offered = references(first=[1.0] * 3, second=[5.0] * 3, incidence=np.nan)
+    offered = expect(first=[1.0] * 3, second=[5.0] * 3, incidence=np.nan)
     assert classify([3.0, NEVER, 5.0], offered, mode).case.tolist() == [0, 0, 3]
 
 
 def test_the_paper_believes_every_mirrored_echo():
-    offered = references(first=1.0, mirrored=3.0, second=5.0, incidence=0.0)
+    offered = expect(first=1.0, mirrored=3.0, second=5.0, incidence=0.0)
     assert classify(3.0, offered, "paper").case.tolist() == [2]
 
 
@@ -215,25 +215,25 @@ def test_the_paper_believes_every_mirrored_echo():
 
 
 def test_in_the_paper_every_sample_has_one_vote():
-    offered = references(first=[[2.0], [2.0], [2.0], [9.0]], second=[[5.0], [5.0], [5.0], [2.0]])
+    offered = expect(first=[[2.0], [2.0], [2.0], [9.0]], second=[[5.0], [5.0], [5.0], [2.0]])
     cases = classify(2.0, offered, "paper")
     assert cases.case.tolist() == [1]
     np.testing.assert_allclose(cases.weight, 0.75)
 
 
 def test_in_the_paper_a_sample_votes_for_its_nearest_reference():
-    # All references lie within the gate of 0.15 m.
-    assert classify(2.1, references(first=2.0, second=2.12), "paper").case.tolist() == [3]
+    # All expected ranges lie within the gate of 0.15 m.
+    assert classify(2.1, expect(first=2.0, second=2.12), "paper").case.tolist() == [3]
 
 
 def test_a_case_that_too_few_voted_for_is_uncertain():
-    offered = references(first=[[2.0], [2.0], [2.0], [9.0]])
+    offered = expect(first=[[2.0], [2.0], [2.0], [9.0]])
     assert classify(2.0, offered, "paper", case_min_share=0.7).case.tolist() == [1]
     assert classify(2.0, offered, "paper", case_min_share=0.8).case.tolist() == [0]
 
 
 def test_samples_that_disagree_half_and_half_take_the_plainer_case():
-    cases = classify(2.0, references(first=[[2.0], [9.0]], second=[[9.0], [2.0]]), "paper")
+    cases = classify(2.0, expect(first=[[2.0], [9.0]], second=[[9.0], [2.0]]), "paper")
     assert cases.case.tolist() == [1]
     np.testing.assert_allclose(cases.weight, 0.5)
 
@@ -243,7 +243,7 @@ def test_a_sample_that_explains_the_scan_is_heard_more():
     measured_m = np.append(np.full(20, 3.0), 5.0)
     first = np.stack([np.append(np.full(20, 3.0), 2.0), np.append(np.full(20, 4.0), 5.0)])
     second = np.stack([np.append(np.full(20, NEVER), 5.0), np.full(21, NEVER)])
-    offered = references(first=first, second=second)
+    offered = expect(first=first, second=second)
     assert classify(measured_m, offered, "soft").case[-1] == 3
     assert classify(measured_m, offered, "paper").case[-1] == 1  # one vote each: the plainer case
 
@@ -251,7 +251,7 @@ def test_a_sample_that_explains_the_scan_is_heard_more():
 @pytest.mark.parametrize("mode", MODES)
 def test_a_beam_that_passes_an_edge_at_the_pose_itself_keeps_its_case(mode):
     """What it is told to have met is what the sample sees that explains it best."""
-    offered = references(first=[[NEVER], [2.02], [1.9], [2.1]])
+    offered = expect(first=[[NEVER], [2.02], [1.9], [2.1]])
     cases = classify(2.0, offered, mode)
     assert cases.case.tolist() == [1]
     np.testing.assert_allclose(cases.expected_m, 2.02)
@@ -260,13 +260,13 @@ def test_a_beam_that_passes_an_edge_at_the_pose_itself_keeps_its_case(mode):
 
 @pytest.mark.parametrize("mode", MODES)
 def test_what_the_pose_itself_sees_is_told_even_if_another_sample_fits_better(mode):
-    cases = classify(2.0, references(first=[[2.06], [2.0], [2.0]]), mode)
+    cases = classify(2.0, expect(first=[[2.06], [2.0], [2.0]]), mode)
     np.testing.assert_allclose(cases.expected_m, 2.06)
 
 
 def test_a_corner_that_some_samples_graze_is_no_pane():
     """Half of them see it before the wall. Not each sample decides: without the corner the wall explains the beam."""
-    offered = references(first=[[2.0], [5.0]] * 4, second=[[5.0], [NEVER]] * 4)
+    offered = expect(first=[[2.0], [5.0]] * 4, second=[[5.0], [NEVER]] * 4)
     cases = classify(5.0, offered, through=0.1)
     assert cases.case.tolist() == [1]
     assert cases.weight[0] > 0.85
@@ -284,10 +284,10 @@ def test_the_order_of_the_samples_does_not_matter(seed, mode):
     mirrored = np.where(rng.random(beams) < 0.5, first + rng.uniform(0.3, 2.0, beams), NEVER)
     measured_m = np.where(rng.random(beams) < 0.5, first[0], second[0]) + rng.normal(0.0, 0.05, beams)
     order = np.append(0, 1 + rng.permutation(samples - 1))
-    one = classify(measured_m, references(first, mirrored, second, third), mode, neighbour_pull=1.0)
+    one = classify(measured_m, expect(first, mirrored, second, third), mode, neighbour_pull=1.0)
     other = classify(
         measured_m,
-        references(*[rows[order] for rows in (first, np.tile(mirrored, (samples, 1)), second, third)]),
+        expect(*[rows[order] for rows in (first, np.tile(mirrored, (samples, 1)), second, third)]),
         mode,
         neighbour_pull=1.0,
     )
@@ -301,7 +301,7 @@ def test_the_order_of_the_samples_does_not_matter(seed, mode):
 
 def walls_apart(measured_m):
     """Every beam may end at a wall or, 0.2 m behind it, at another."""
-    return references(first=np.full(len(measured_m), 2.0), second=np.full(len(measured_m), 2.2))
+    return expect(first=np.full(len(measured_m), 2.0), second=np.full(len(measured_m), 2.2))
 
 
 def test_a_beam_between_others_of_one_case_is_pulled_to_it():
@@ -350,32 +350,32 @@ def test_a_scan_read_backwards_has_the_same_cases(pull):
 @pytest.mark.parametrize("mode", MODES)
 def test_a_grazing_beam_is_measured_across_the_wall(mode):
     """0.25 m along a beam that meets the wall at 75 degrees is 0.065 m across: the gate is 0.15 m across."""
-    assert classify(5.25, references(first=5.0, cos=np.cos(np.radians(75.0))), "soft").case.tolist() == [1]
-    assert classify(5.25, references(first=5.0, cos=1.0), mode).case.tolist() == [0]
+    assert classify(5.25, expect(first=5.0, cos=np.cos(np.radians(75.0))), "soft").case.tolist() == [1]
+    assert classify(5.25, expect(first=5.0, cos=1.0), mode).case.tolist() == [0]
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_a_beam_ends_inside_a_wall_that_is_drawn_thick(mode):
     # Half of 0.6 m behind the boundary; seen at 60 degrees the beam needs twice as long for that.
     residuals = RangeResiduals(depth_share=0.5, sigma_m=0.04)
-    head_on = classify([2.3, 2.0], references(first=[2.0, 2.0], thickness_m=0.6), mode, residuals)
+    head_on = classify([2.3, 2.0], expect(first=[2.0, 2.0], thickness_m=0.6), mode, residuals)
     assert head_on.case.tolist() == [1, 0]
     np.testing.assert_allclose(head_on.expected_m, [2.3, np.nan])
-    slanted = classify(2.6, references(first=2.0, thickness_m=0.6, cos=0.5), mode, residuals)
+    slanted = classify(2.6, expect(first=2.0, thickness_m=0.6, cos=0.5), mode, residuals)
     np.testing.assert_allclose(slanted.expected_m, 2.6)
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_a_map_that_fits_badly_gets_a_wider_gate(mode):
-    offered = references(first=2.0)
+    offered = expect(first=2.0)
     assert classify(2.25, offered, mode).case.tolist() == [0]
     assert classify(2.25, offered, mode, RangeResiduals(0.0, 0.15)).case.tolist() == [1]
 
 
 def test_from_another_pose_the_cases_stay_and_the_ranges_change():
     measured_m = np.array([2.0, 5.0, 3.5, 2.0])
-    cases = classify(measured_m, references(first=[2.0] * 4, second=[5.0] * 4))
-    moved = references(first=[2.1, 2.1, 2.1, 2.0], second=[5.2] * 4)
+    cases = classify(measured_m, expect(first=[2.0] * 4, second=[5.0] * 4))
+    moved = expect(first=[2.1, 2.1, 2.1, 2.0], second=[5.2] * 4)
     seen = case_votes.as_seen_from(cases, measured_m, moved, AT_THE_BOUNDARY, CaseVote(case_gate_m=0.15))
     assert seen.case.tolist() == [1, 3, 0, 1]
     np.testing.assert_allclose(seen.expected_m, [2.1, 5.2, np.nan, 2.0])
@@ -386,8 +386,8 @@ def test_from_another_pose_the_cases_stay_and_the_ranges_change():
 def test_from_another_pose_a_beam_that_passes_an_edge_keeps_its_range():
     """There it would meet something a metre away, or nothing: an edge lies between the two poses."""
     measured_m = np.array([2.0, 2.0, 5.0])
-    cases = classify(measured_m, references(first=[2.03] * 3, second=[5.02] * 3))
-    moved = references(first=[3.0, NEVER, 2.0], second=[NEVER, NEVER, 7.0])
+    cases = classify(measured_m, expect(first=[2.03] * 3, second=[5.02] * 3))
+    moved = expect(first=[3.0, NEVER, 2.0], second=[NEVER, NEVER, 7.0])
     seen = case_votes.as_seen_from(cases, measured_m, moved, AT_THE_BOUNDARY, CaseVote(case_gate_m=0.15))
     assert seen.case.tolist() == [1, 1, 3]
     np.testing.assert_allclose(seen.expected_m, [2.03, 2.03, 5.02])
@@ -396,10 +396,10 @@ def test_from_another_pose_a_beam_that_passes_an_edge_keeps_its_range():
 def test_from_another_pose_a_beam_far_from_its_surface_is_uncertain():
     """The same wall, yet it would stand two and a half gates away from where the beam ended."""
     measured_m = np.array([2.14, 2.0])
-    cases = classify(measured_m, references(first=[2.0, 2.0]), "paper")
+    cases = classify(measured_m, expect(first=[2.0, 2.0]), "paper")
     assert cases.case.tolist() == [1, 1]
     seen = case_votes.as_seen_from(
-        cases, measured_m, references(first=[1.76, 1.76]), AT_THE_BOUNDARY, CaseVote(case_gate_m=0.15)
+        cases, measured_m, expect(first=[1.76, 1.76]), AT_THE_BOUNDARY, CaseVote(case_gate_m=0.15)
     )
     assert seen.case.tolist() == [0, 1]
     np.testing.assert_allclose(seen.expected_m, [np.nan, 1.76])

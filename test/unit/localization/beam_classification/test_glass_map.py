@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_references import NEVER, references
+from made_expected_ranges import NEVER, expect
 
 from glass_nav.localization.beam_classification import glass_map
 from glass_nav.localization.beam_classification.glass_map import GlassEvidence, GlassMap
@@ -263,7 +263,7 @@ def crossings(measured_m, offered, residuals=EXACT):
     ],
 )
 def test_a_beam_says_that_it_ended_or_that_it_passed_or_nothing(measured_m, passed):
-    told = crossings(measured_m, references(first=[[2.0], [2.05], [1.95]], cell=7, incidence=0.4))
+    told = crossings(measured_m, expect(first=[[2.0], [2.05], [1.95]], cell=7, incidence=0.4))
     assert told == [(7, 0.4, was) for was in passed]
 
 
@@ -278,31 +278,31 @@ def test_a_beam_says_that_it_ended_or_that_it_passed_or_nothing(measured_m, pass
 )
 @pytest.mark.parametrize("measured_m", [2.025, 4.5])
 def test_what_not_all_samples_agree_on_says_nothing(offered, measured_m):
-    assert crossings(measured_m, references(**offered)) == []
+    assert crossings(measured_m, expect(**offered)) == []
 
 
 def test_what_ended_behind_the_wall_from_every_sample_has_passed_it():
     """An edge, but the beam went on behind both of its walls."""
-    offered = references(first=[[2.0], [2.0], [6.0]])
+    offered = expect(first=[[2.0], [2.0], [6.0]])
     assert [passed for _, _, passed in crossings(8.0, offered)] == [True]
 
 
 def test_a_beam_ends_across_the_wall_as_deep_as_walls_are_drawn():
     """Half of 0.4 m behind the boundary, at 60 degrees twice that way."""
-    offered = references(first=2.0, thickness_m=0.4, cos=0.5, incidence=np.radians(60.0))
+    offered = expect(first=2.0, thickness_m=0.4, cos=0.5, incidence=np.radians(60.0))
     assert [passed for _, _, passed in crossings(2.4, offered)] == [False]
     assert crossings(2.0, offered) == [] and crossings(2.8, offered) == []
     assert [passed for _, _, passed in crossings(4.0, offered)] == [True]
 
 
 def test_a_map_that_fits_badly_takes_more_for_an_end():
-    offered = references(first=2.0)
+    offered = expect(first=2.0)
     assert crossings(2.15, offered) == []
     assert len(crossings(2.15, offered, RangeResiduals(0.5, 0.1))) == 1
 
 
 def test_each_beam_speaks_of_its_own_cell():
-    offered = references(first=[2.0, 2.0, 3.0, 3.0], cell=[5, 6, 7, -1], incidence=[0.1, 0.2, 0.3, 0.4])
+    offered = expect(first=[2.0, 2.0, 3.0, 3.0], cell=[5, 6, 7, -1], incidence=[0.1, 0.2, 0.3, 0.4])
     assert crossings([2.02, 5.0, 1.0, 5.0], offered) == [(5, 0.1, False), (6, 0.2, True)]
 
 

@@ -10,7 +10,7 @@ from glass_nav.localization.beam_classification import glass_return_model
 INCIDENCE_RAD = np.radians(np.linspace(0.0, 89.0, 90))
 
 
-@pytest.mark.parametrize("share", [glass_return_model.least, glass_return_model.most])
+@pytest.mark.parametrize("share", [glass_return_model.min_share, glass_return_model.max_share])
 def test_a_pane_answers_the_less_the_farther_from_head_on(share):
     answers = share(INCIDENCE_RAD)
     assert np.all((answers > 0.0) & (answers < 1.0))
@@ -20,14 +20,14 @@ def test_a_pane_answers_the_less_the_farther_from_head_on(share):
 
 
 def test_a_lidar_that_sees_little_of_glass_never_sees_more_than_one_that_sees_much():
-    assert np.all(glass_return_model.least(INCIDENCE_RAD) <= glass_return_model.most(INCIDENCE_RAD))
+    assert np.all(glass_return_model.min_share(INCIDENCE_RAD) <= glass_return_model.max_share(INCIDENCE_RAD))
     between = np.radians(15.0)
-    assert glass_return_model.most(between) > 2.0 * glass_return_model.least(between)
+    assert glass_return_model.max_share(between) > 2.0 * glass_return_model.min_share(between)
 
 
 def test_what_has_no_normal_is_neither_pane_nor_wall():
     """A railing, a shelf: some beams end there and some pass, for every lidar."""
-    for share in (glass_return_model.least, glass_return_model.most):
+    for share in (glass_return_model.min_share, glass_return_model.max_share):
         answers = share(np.array([[np.nan, 0.0], [1.0, np.nan]]))
         assert answers.shape == (2, 2)
         assert answers[0, 0] == answers[1, 1] and 0.1 < answers[0, 0] < 0.9

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_references import NEVER, references
+from made_expected_ranges import NEVER, expect
 
 from glass_nav.localization.beam_classification import surface_scan
 
@@ -16,11 +16,11 @@ def cut(ranges_m, case, first=2.0, glass=WALL, trusted=True, gate_m=0.15, max_ra
     """glass: chances of every first surface, or (B, 2) of each."""
     ranges_m = np.atleast_1d(np.asarray(ranges_m, float))
     beams = len(ranges_m)
-    seen = references(first=np.broadcast_to(np.asarray(first, float), beams), **offered)
+    seen = expect(first=np.broadcast_to(np.asarray(first, float), beams), **offered)
     return surface_scan.of(
         ranges_m=ranges_m,
         case=np.broadcast_to(case, beams).astype(np.uint8),
-        references=seen,
+        expected=seen,
         glass=np.broadcast_to(np.reshape(np.transpose(glass), (2, -1)), (2, beams)),
         gate_m=np.full(beams, gate_m),
         max_range_m=max_range_m,

@@ -46,7 +46,7 @@ class Watched:
 
 
 def carried(steps=30, offset=(1.2, 0.6, 0.8)):
-    """Where a robot is and where it believes to be: it was carried away and drives on."""
+    """Where a robot is and where it believes to be: it was kidnapped and drives on."""
     true = loop_drive(steps)
     wrong = [se2.compose(true[0] + np.array(offset), se2.compose(se2.inverse(true[0]), pose)) for pose in true]
     return true, wrong

@@ -25,7 +25,7 @@ LIMITS = QualityLimits(
 )
 
 
-SURE = dict(fit=0.95, usual=0.95, behind=-np.inf, doubted=False, found=None, candidates=None)
+SURE = dict(fit=0.95, usual=0.95, log_ratio=-np.inf, doubted=False, found=None, candidates=None)
 
 
 def candidates(count=3, fit=0.9):
@@ -34,17 +34,17 @@ def candidates(count=3, fit=0.9):
     return Candidates(poses, weights / weights.sum(), fit, 3.0, False)
 
 
-def judgement(used_shares, estimate=None, **verdict):
+def judgement(inlier_ratios, estimate=None, **verdict):
     quality = PoseQuality(LIMITS)
-    for used_share in used_shares:
-        quality.observe(used_share)
+    for inlier_ratio in inlier_ratios:
+        quality.observe(inlier_ratio)
     if verdict:
         quality.doubt(Verdict(**{**SURE, **verdict}))
     return quality.judge(best() if estimate is None else estimate)
 
 
-def judged(used_shares, estimate=None, **verdict):
-    told = judgement(used_shares, estimate, **verdict)
+def judged(inlier_ratios, estimate=None, **verdict):
+    told = judgement(inlier_ratios, estimate, **verdict)
     return told.state, told.reason
 
 
@@ -83,10 +83,11 @@ def test_the_widest_direction_counts_not_an_axis():
 
 
 @pytest.mark.parametrize(
-    "used_share, state", [(0.41, "LOCALIZED"), (0.39, "UNCERTAIN"), (0.21, "UNCERTAIN"), (0.19, "LOST"), (0.0, "LOST")]
+    "inlier_ratio, state",
+    [(0.41, "LOCALIZED"), (0.39, "UNCERTAIN"), (0.21, "UNCERTAIN"), (0.19, "LOST"), (0.0, "LOST")],
 )
-def test_what_the_map_explains_decides_however_sure_the_filter_is(used_share, state):
-    assert judged([used_share] * 3)[0] == state
+def test_what_the_map_explains_decides_however_sure_the_filter_is(inlier_ratio, state):
+    assert judged([inlier_ratio] * 3)[0] == state
 
 
 def test_one_bad_scan_loses_nobody_and_many_do():
@@ -110,65 +111,65 @@ def test_a_scan_without_answers_says_nothing():
 
 def test_scans_that_fit_better_elsewhere_make_a_pose_uncertain_and_lost_if_they_do_by_far():
     better = dict(fit=0.8, doubted=True, candidates=candidates())
-    assert judged([0.9], behind=2.0, **better) == (
+    assert judged([0.9], log_ratio=2.0, **better) == (
         "UNCERTAIN",
         "the scans fit as well or better elsewhere, best at x 2.0 m, y 1.0 m; the map explains 90% of the "
         "answering beams; 100% of the weight in one place, sigma 0.05 m, 1.1 deg",
     )
-    assert judged([0.9], behind=4.0, **better) == (
+    assert judged([0.9], log_ratio=4.0, **better) == (
         "LOST",
         "the scans fit as well or better elsewhere, best at x 2.0 m, y 1.0 m; the map explains 90% of the "
         "answering beams",
     )
-    assert judged([0.9], behind=-2.0, **better)[0] == "LOCALIZED"
+    assert judged([0.9], log_ratio=-2.0, **better)[0] == "LOCALIZED"
 
 
 def test_scans_that_fit_here_as_they_used_to_are_not_called_elsewhere():
     """In a corridor without a mark many places fit as well."""
-    assert judged([0.9], behind=4.0, candidates=candidates())[0] == "LOCALIZED"
+    assert judged([0.9], log_ratio=4.0, candidates=candidates())[0] == "LOCALIZED"
 
 
 def test_scans_that_fit_far_worse_than_they_used_to_make_a_pose_uncertain():
     state, reason = judged([0.9], fit=0.5, usual=0.9, doubted=True)
-    assert state == "UNCERTAIN" and reason.startswith("the scans fit by 50%, where they used to fit by 90%; ")
+    assert state == "UNCERTAIN" and reason.startswith("scan fit 50%, usually 90%; ")
     assert judged([0.9], fit=0.87, usual=0.9, doubted=True)[0] == "LOCALIZED"
 
 
 def test_a_search_says_how_many_places_are_possible():
     quality = PoseQuality(LIMITS)
     quality.observe(0.9)
-    quality.seek(candidates(2))
+    quality.follow_search(candidates(2))
     told = quality.judge(best(share=0.6))
     assert told.state == "GLOBAL_SEARCH"
-    assert told.reason == "2 places are possible, the best at x 2.0 m, y 1.0 m, 90 deg, where scans fit by 90%"
-    assert told.reliability == 0.6
-    quality.seek(candidates(1))
+    assert told.reason == "2 places are possible, the best at x 2.0 m, y 1.0 m, 90 deg, scan fit 90%"
+    assert told.confidence == 0.6
+    quality.follow_search(candidates(1))
     assert quality.judge(best()).reason.startswith("one place is possible, the best at x 2.0 m")
-    quality.seek(Candidates(np.zeros((0, 3)), np.zeros(0), np.nan, 0.0, False))
-    assert quality.judge(best()).reason == "no scan has told anything yet"
+    quality.follow_search(Candidates(np.zeros((0, 3)), np.zeros(0), np.nan, 0.0, False))
+    assert quality.judge(best()).reason == "no usable scan yet"
 
 
 @pytest.mark.parametrize(
-    "worse", [dict(fit=0.6), dict(doubted=True, behind=3.0, candidates=candidates())], ids=["fit", "behind"]
+    "worse", [dict(fit=0.6), dict(doubted=True, log_ratio=3.0, candidates=candidates())], ids=["fit", "behind"]
 )
 def test_each_sign_of_a_wrong_pose_makes_it_less_reliable(worse):
-    assert judgement([0.95], **worse).reliability < judgement([0.95], fit=0.95).reliability - 0.1
+    assert judgement([0.95], **worse).confidence < judgement([0.95], fit=0.95).confidence - 0.1
 
 
 def test_reliability_is_a_chance_and_falls_with_what_the_map_explains_and_with_other_clusters():
     values = [
-        judgement([used], best(share=share), fit=0.95).reliability
+        judgement([used], best(share=share), fit=0.95).confidence
         for used, share in [(1.0, 1.0), (0.7, 1.0), (0.3, 1.0), (0.3, 0.5), (0.0, 0.5)]
     ]
     assert all(0.0 <= value <= 1.0 for value in values) and values == sorted(values, reverse=True)
-    assert values[0] > 0.9 and judgement([]).reliability == 0.0
+    assert values[0] > 0.9 and judgement([]).confidence == 0.0
 
 
 def test_a_pose_that_is_more_likely_wrong_is_not_called_localized():
     """No sign alone is bad enough."""
     told = judgement([0.6], fit=0.85, usual=0.95, doubted=True)
-    assert 0.0 < told.reliability < 0.7 and told.state == "UNCERTAIN"
-    assert told.reason.startswith(f"all signs together make it right by {told.reliability:.0%} only; the map explains ")
+    assert 0.0 < told.confidence < 0.7 and told.state == "UNCERTAIN"
+    assert told.reason.startswith(f"the pose is right with a chance of only {told.confidence:.0%}; the map explains ")
     assert judgement([0.6], fit=0.95, usual=0.95).state == "LOCALIZED"  # scans fit as they always did here
     assert judgement([0.9], fit=0.93, usual=0.95, doubted=True).state == "LOCALIZED"
 

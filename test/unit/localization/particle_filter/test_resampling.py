@@ -77,7 +77,7 @@ def test_weights_that_many_particles_share_are_left_alone():
 @pytest.mark.parametrize("scale", [5.0, 100.0, 10000.0])
 def test_a_scan_that_one_particle_alone_explains_is_flattened_until_enough_count(seed, scale):
     log_w = scale * np.random.default_rng(seed).standard_normal(500)
-    weights = resampling.tempered(log_w, least_effective=20.0)
+    weights = resampling.tempered(log_w, min_effective=20.0)
     assert weights.sum() == pytest.approx(1.0)
     assert resampling.effective_count(resampling.normalised(log_w)) < 20.0  # the case is meant
     assert 20.0 <= resampling.effective_count(weights) < 22.0  # and no flatter than that
@@ -85,7 +85,7 @@ def test_a_scan_that_one_particle_alone_explains_is_flattened_until_enough_count
 
 
 def test_of_a_few_particles_half_have_to_count():
-    weights = resampling.tempered(np.array([0.0, -1e3, -2e3, -3e3]), least_effective=20.0)
+    weights = resampling.tempered(np.array([0.0, -1e3, -2e3, -3e3]), min_effective=20.0)
     assert resampling.effective_count(weights) == pytest.approx(2.0, rel=0.05)
     np.testing.assert_array_equal(resampling.tempered(np.array([-7.0])), [1.0])
 

@@ -46,4 +46,4 @@ def test_parameters_that_cannot_be_used_are_refused(given, text):
 
 
 def test_no_states_are_no_rescue():
-    assert load(rescue_states="").node.rescue_states.split() == []
+    assert load(rescue_states="").fixes.rescue_states.split() == []

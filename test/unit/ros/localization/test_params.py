@@ -112,9 +112,9 @@ def test_frames_of_old_launch_files_lose_their_slash():
 
 def test_the_same_seed_gives_the_same_numbers_and_a_negative_one_new_ones():
     fixed, _ = localization_params({"random_seed": 7}, "/n")
-    assert np.array_equal(fixed.node.rng.random(5), fixed.node.rng.random(5))
+    assert np.array_equal(fixed.rules.rng.random(5), fixed.rules.rng.random(5))
     free, _ = localization_params({"random_seed": -1}, "/n")
-    assert not np.array_equal(free.node.rng.random(5), free.node.rng.random(5))
+    assert not np.array_equal(free.rules.rng.random(5), free.rules.rng.random(5))
 
 
 def test_the_start_is_given_as_pose_and_covariance():

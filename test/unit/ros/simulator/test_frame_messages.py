@@ -13,9 +13,10 @@ from glass_nav.msg import TrueBeams
 from glass_nav.recording.bag_writer import BagWriter
 from glass_nav.recording.messages import TRUE_BEAMS
 from glass_nav.ros import conversions
-from glass_nav.ros.conversions import Mounting
 from glass_nav.ros.simulator import frame_messages
 from glass_nav.ros.simulator.frame_messages import FrameNames
+from glass_nav.sensing import scan_placement
+from glass_nav.sensing.mounting import Mounting
 from glass_nav.sensing.scan import scan_from_fields
 from glass_nav.simulation.lidar import TrueScan
 from glass_nav.simulation.simulation import Frame, OdometrySample
@@ -55,7 +56,7 @@ def test_a_scan_comes_back_through_the_conversion_of_the_localization(frame):
     msg = over_the_wire(frame_messages.scan_msg(frame.scan, 0.1, "laser"))
     assert isinstance(msg, LaserScan)
     assert (msg.header.frame_id, msg.scan_time) == ("laser", pytest.approx(0.1))
-    back = conversions.scan_from_msg(msg, Mounting(LASER, 0.2, False))
+    back = scan_placement.mounted(conversions.raw_scan_from_msg(msg), Mounting(LASER, 0.2))
     assert back.stamp_ns == STAMP_NS
     np.testing.assert_allclose(back.ranges_m, frame.scan.ranges_m)
     np.testing.assert_allclose(back.angles_rad, frame.scan.angles_rad, atol=1e-6)

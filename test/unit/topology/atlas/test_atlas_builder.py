@@ -118,7 +118,7 @@ def test_the_atlas_of_a_building_is_drawn_on_a_plane_and_is_the_one_shipped(name
 
 
 def test_a_map_without_a_way_has_no_atlas():
-    with pytest.raises(AtlasError, match="^no way of 2 m for a robot of 0.22 m radius in this map$"):
+    with pytest.raises(AtlasError, match="^no path of 2 m in this map for a robot of 0.22 m radius$"):
         atlas_builder.build(floor(3, 3, [(1, 1, 1.3, 2)]), "a", "a")
 
 

@@ -10,7 +10,7 @@ import made_atlases
 import numpy as np
 import pytest
 
-from glass_nav.topology.atlas import atlas_file, shipped_atlases
+from glass_nav.topology.atlas import atlas_file, atlas_npz, shipped_atlases
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 
 Data = Dict[str, Any]
@@ -18,7 +18,7 @@ SCHEMA = Path(__file__).parents[4] / "atlas" / "atlas.schema.json"
 
 
 def arrays(atlas: Atlas) -> Dict[str, np.ndarray]:
-    return atlas_file._arrays(atlas)
+    return atlas_npz.arrays_of(atlas)
 
 
 def example() -> Data:

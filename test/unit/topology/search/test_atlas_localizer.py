@@ -14,6 +14,7 @@ from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
 from glass_nav.topology.search import wake_up_trials
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search.atlas_robot import AtlasRobot, Surroundings, TrialParams
 from glass_nav.topology.search.matching import poses_at
 from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.vocabulary import SearchState
@@ -78,9 +79,7 @@ def test_what_the_detector_erred_about_does_not_go_into_the_statistics() -> None
 
 def test_one_candidate_is_only_tentative_until_new_edges_confirm_it() -> None:
     atlas = made_atlases.voronoi(60, 4)
-    robot = wake_up_trials.AtlasRobot(
-        wake_up_trials.Surroundings.of(atlas), wake_up_trials.TrialParams(noise_limit=0.0), np.random.default_rng(0)
-    )
+    robot = AtlasRobot(Surroundings.of(atlas), TrialParams(noise_limit=0.0), np.random.default_rng(0))
     localizer = AtlasLocalizer(atlas, SearchParams(confirm_edges=3))
     estimate = localizer.start(robot.wake_up(0))
     states, driven = [estimate.state], []
@@ -138,9 +137,7 @@ def quarters() -> Atlas:
 @pytest.mark.parametrize("seed", range(8))
 def test_a_symmetric_floor_is_ambiguous_with_exactly_its_four_places(seed: int) -> None:
     atlas = quarters()
-    trial = next(
-        iter(wake_up_trials.trials(atlas, SearchParams(), wake_up_trials.TrialParams(noise_limit=2.0), 1, seed))
-    )
+    trial = next(iter(wake_up_trials.trials(atlas, SearchParams(), TrialParams(noise_limit=2.0), 1, seed)))
     assert trial.outcome == SearchState.AMBIGUOUS and trial.truth_lost_at is None
     poses = poses_at(atlas, trial.estimate.dart, Meetpoint(1, 1.0))
     assert len(poses) == 4
@@ -156,7 +153,7 @@ def test_places_whose_difference_is_far_away_are_told_apart_by_driving_there() -
     r = [1.0] * count + [1.0] * (count - 1) + [2.0]
     ends = [(row + i, row + i + 1) for row in (0, count) for i in range(count - 1)]
     atlas = made_atlases.corridors(xy, r, ends)
-    trials = list(wake_up_trials.trials(atlas, SearchParams(), wake_up_trials.TrialParams(noise_limit=1.0), 30, 0))
+    trials = list(wake_up_trials.trials(atlas, SearchParams(), TrialParams(noise_limit=1.0), 30, 0))
     rows = [set((atlas.darts.node[trial.estimate.dart] >= count).tolist()) for trial in trials]
     # The first row alone is the same after half a turn.
     assert [trial.outcome for trial in trials] == [

@@ -58,7 +58,7 @@ def test_candidates_that_take_errors_of_the_detector_are_told_apart() -> None:
     localizer = AtlasLocalizer(atlas, SearchParams())
     localizer.start(Meetpoint(1, 0.9))
     localizer.update(Traversal(0, 14.0, 14.0), Meetpoint(2, 1.7))
-    assert "node   2    active with 1 error of the detector" in lines(localizer)
+    assert "node   2    active with 1 detection error" in lines(localizer)
     localizer.start(Meetpoint(1, 0.7))
     assert [line for line in lines(localizer) if "x  node: r" in line] == ["node   4  x  node: r 1.40 m"]
 

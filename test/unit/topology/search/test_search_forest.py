@@ -131,12 +131,12 @@ def test_a_search_that_began_at_no_meetpoint_begins_again_at_the_next() -> None:
 @pytest.mark.parametrize("seed", range(30))
 def test_errors_of_the_detector_never_cost_the_truth(seed: int) -> None:
     """Property: with up to two joined or split edges the truth stays, once errors are considered."""
-    from glass_nav.topology.search import wake_up_trials
+    from glass_nav.topology.search.atlas_robot import AtlasRobot, Surroundings, TrialParams
 
     rng = np.random.default_rng(seed)
     atlas = made_atlases.voronoi(60, seed)
-    exact = wake_up_trials.TrialParams(noise_limit=1.0, missed=0.1, spurious=0.1)
-    robot = wake_up_trials.AtlasRobot(wake_up_trials.Surroundings.of(atlas), exact, rng)
+    exact = TrialParams(noise_limit=1.0, missed=0.1, spurious=0.1)
+    robot = AtlasRobot(Surroundings.of(atlas), exact, rng)
     forest = forest_of(atlas)
     here = robot.wake_up()
     forest.begin(here)

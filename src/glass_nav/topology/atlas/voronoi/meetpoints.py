@@ -94,7 +94,7 @@ class Meetpoints:
         return sorted(set(self._at[kept]))
 
     def _move_end(self, edge: int, node: int, centre: np.ndarray) -> None:
-        """Let the line of an edge end at the centre instead of the node; points nearer to it than the node are cut off."""
+        """Let the line of an edge end at the centre, not at the node; points nearer to it than the node are cut off."""
         for side in (0, 1):
             if self.ends[edge][side] == node:
                 line = self.lines[edge][::-1] if side else self.lines[edge]

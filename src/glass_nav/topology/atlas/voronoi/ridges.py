@@ -10,7 +10,7 @@ from scipy.spatial import Delaunay
 
 from glass_nav.topology.atlas.voronoi.bounds import Bounds
 
-SEPARATION_CELLS = 3.5  # cells of one wall lie closer; nearer walls than this cannot be told from one
+SEPARATION_CELLS = 3.5  # cells of one wall lie closer; two walls closer than this look like one
 
 
 @dataclass(frozen=True)

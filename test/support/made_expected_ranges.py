@@ -10,7 +10,7 @@ NEVER = np.inf
 OBLIQUE = np.radians(45.0)  # neither head on, where panes answer, nor grazing, where they mirror
 
 
-def references(
+def expect(
     first=NEVER,
     mirrored=NEVER,
     second=NEVER,

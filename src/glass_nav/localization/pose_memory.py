@@ -1,19 +1,15 @@
-"""The last pose, kept for the next start of the node: on the parameter server, as AMCL does, and in ~pose_file."""
+"""When the last pose is kept for the next start: where a node keeps its parameters, as AMCL does, and in ~pose_file."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Optional
-
-import numpy as np
-import rospy
+from typing import Callable, Optional
 
 from glass_nav.geometry import se2
 from glass_nav.localization import saved_pose
 from glass_nav.localization.localizer import Estimate
 from glass_nav.localization.saved_pose import PoseFile, SavedPose
-from glass_nav.ros.log_throttle import LogThrottle
-from glass_nav.ros.rate_limiter import RateLimiter, period_s
+from glass_nav.rate_limiter import RateLimiter, period_s
 from glass_nav.vocabulary import LocalizationState
 
 QUIET_S = 30.0  # the file of a robot that stands is written no more often
@@ -21,13 +17,18 @@ MOVED_M, MOVED_RAD = 0.05, 0.05
 
 
 class PoseMemory:
-    """Keeps poses that may be believed: none while the robot is lost or being searched for."""
+    """Keeps poses that can be trusted: none while the robot is lost or being searched for."""
 
-    def __init__(self, file: PoseFile, log: LogThrottle) -> None:
+    def __init__(self, file: PoseFile, keep: Callable[[SavedPose], None], warn: Callable[[str], None]) -> None:
+        """Args:
+        file: where the pose is written.
+        keep: called with every pose that is due, whether or not the file needs it.
+        warn: called with a line if something fails with an OSError.
+        """
         self._path = file.path if file.pose_file else None
-        self._log = log
-        self._pace = RateLimiter()
-        self._last: Optional[SavedPose] = None  # the last one that may be believed
+        self._keep, self._warn = keep, warn
+        self._limiter = RateLimiter()
+        self._last: Optional[SavedPose] = None  # the last one that can be trusted
         self._written: Optional[SavedPose] = None  # what the file says
 
     def take(self, estimate: Estimate, map_digest: str, rate_hz: float, now_s: float) -> None:
@@ -42,8 +43,8 @@ class PoseMemory:
                 map_digest,
                 estimate.state,
             )
-            if rate_hz > 0.0 and self._pace.is_due(now_s, period_s(rate_hz)):
-                self._save(self._last, also_if_it_stands=False)
+            if rate_hz > 0.0 and self._limiter.is_due(now_s, period_s(rate_hz)):
+                self._save(self._last, even_if_it_stands=False)
         elif self._last is not None:  # the pose before it was lost is no start
             self._write(replace(self._last, state=estimate.state))
             self._last = None
@@ -51,25 +52,22 @@ class PoseMemory:
     def save(self) -> None:
         """The node ends."""
         if self._last is not None:
-            self._save(self._last, also_if_it_stands=True)
+            self._save(self._last, even_if_it_stands=True)
 
-    def _save(self, saved: SavedPose, also_if_it_stands: bool) -> None:
+    def _save(self, saved: SavedPose, even_if_it_stands: bool) -> None:
         try:
-            for name, value in zip(("x", "y", "a"), saved.map_from_base):
-                rospy.set_param(f"~initial_pose_{name}", float(value))
-            for name, value in zip(("xx", "yy", "aa"), np.diag(saved.covariance)):
-                rospy.set_param(f"~initial_cov_{name}", float(value))
+            self._keep(saved)
         except OSError as err:
-            self._log.warn(f"the pose is not saved: no parameter server ({err})", period_s=60.0)
-        if also_if_it_stands or self._is_news(saved):
+            self._warn(f"the pose is not saved: no parameter server ({err})")
+        if even_if_it_stands or self._is_news(saved):
             self._write(saved)
 
     def _is_news(self, saved: SavedPose) -> bool:
         if self._written is None or self._written.state != saved.state or self._written.map_digest != saved.map_digest:
             return True
-        way_m, turn_rad = se2.travelled(se2.compose(se2.inverse(self._written.map_from_base), saved.map_from_base))
+        path_m, turn_rad = se2.travelled(se2.compose(se2.inverse(self._written.map_from_base), saved.map_from_base))
         return bool(
-            way_m > MOVED_M
+            path_m > MOVED_M
             or turn_rad > MOVED_RAD
             or not 0.0 <= (saved.stamp_ns - self._written.stamp_ns) * 1e-9 < QUIET_S
         )
@@ -80,6 +78,6 @@ class PoseMemory:
         try:
             saved_pose.save(self._path, saved)
         except OSError as err:
-            self._log.warn(f"the pose is not saved in {self._path}: {err}", period_s=60.0)
+            self._warn(f"the pose is not saved in {self._path}: {err}")
         else:
             self._written = saved

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from glass_nav.ros.rate_limiter import RateLimiter, period_s
+from glass_nav.rate_limiter import RateLimiter, period_s
 
 
 def test_one_thing_in_a_period_goes_out():

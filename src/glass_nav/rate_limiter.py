@@ -1,16 +1,16 @@
-"""Things that are done now and then, by ROS time."""
+"""Limits how often a thing is done; the caller says what time it is."""
 
 from __future__ import annotations
 
 
 class RateLimiter:
-    """Lets pass one thing in a while; time that jumps back lets it pass."""
+    """Lets one thing pass per period; it also passes after time jumped back."""
 
     def __init__(self) -> None:
         self._last_s = 0.0
 
     def is_due(self, now_s: float, every_s: float) -> bool:
-        """Whether every_s has passed since it last was; it is noted as done then."""
+        """Whether every_s has passed since it was last due; True counts as done now."""
         if 0.0 <= now_s - self._last_s < every_s:
             return False
         self._last_s = now_s
@@ -18,5 +18,5 @@ class RateLimiter:
 
 
 def period_s(rate_hz: float) -> float:
-    """Of a rate as AMCL's parameters give it: <= 0 is no limit."""
+    """Of a rate as AMCL's parameters give it: <= 0 means no limit."""
     return 1.0 / rate_hz if rate_hz > 0.0 else 0.0

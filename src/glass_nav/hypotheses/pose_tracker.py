@@ -1,0 +1,84 @@
+"""Poses, odometry, scores -> the same poses further on, each place once, the best first.
+
+What everything shares that follows many poses at once: GlobalSearch, whose score is a log likelihood, and FollowedPoses,
+whose score is the mean share of the scans that the map explains. K poses.
+"""
+
+from __future__ import annotations
+
+from typing import Optional
+
+import numpy as np
+
+from glass_nav.geometry import angles, se2
+
+_SAME_CELL = np.array([0.3, 0.3, 0.15])  # poses in one cell are one [m, m, rad]
+_SAME_PLACE_M, _SAME_PLACE_RAD = 0.7, 0.25  # poses nearer than this are no rivals
+
+
+class PoseTracker:
+    """Carries poses by odometry and keeps the best of those that have become one; what a pose scored is its owner's."""
+
+    def __init__(self, max_behind: float, max_poses: int) -> None:
+        """Args:
+        max_behind: a pose whose score is further behind the best is dropped.
+        max_poses: that are kept.
+        """
+        self.poses = np.zeros((0, 3))  # (K, 3) map_from_base
+        self._max_behind, self._max_poses = max_behind, max_poses
+        self._odom_from_base: Optional[np.ndarray] = None
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    def carry(self, odom_from_base: np.ndarray) -> Optional[np.ndarray]:
+        """Move all poses by odometry since the last call.
+
+        Returns:
+            (3,) the step, in the robot's frame before it; None at the first call, which moves nothing.
+        """
+        before, self._odom_from_base = self._odom_from_base, np.array(odom_from_base, float)
+        if before is None:
+            return None
+        step = se2.compose(se2.inverse(before), odom_from_base)
+        self.poses = se2.compose(self.poses, step)
+        return step
+
+    def add(self, poses: np.ndarray) -> None:
+        """More poses (N, 3), behind those that are followed."""
+        self.poses = np.concatenate([self.poses, poses])
+
+    def keep_distinct(self, score: np.ndarray) -> np.ndarray:
+        """Of poses that have become one keep the best, of all of them those that have a chance, the best first.
+
+        Args:
+            score: (K,) of the poses, more is better.
+
+        Returns:
+            Indices of the poses that are kept, in their new order.
+        """
+        order = np.argsort(-score, kind="stable")
+        order = order[score[order] >= score[order[0]] - self._max_behind] if len(order) else order
+        chosen = order[first_of_each_cell(self.poses[order])][: self._max_poses]
+        self.poses = self.poses[chosen]
+        return chosen
+
+
+def same_place(poses: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    """(K,) bool: poses (K, 3) so near to a pose (3,) that they are no rivals of it."""
+    return (np.hypot(*(poses[:, :2] - pose[:2]).T) < _SAME_PLACE_M) & (
+        np.abs(angles.wrap(poses[:, 2] - pose[2])) < _SAME_PLACE_RAD
+    )
+
+
+def lead(pose: np.ndarray, score: float, poses: np.ndarray, scores: np.ndarray) -> float:
+    """By how much a pose (3,) is ahead of its best rival among poses (K, 3) with scores (K,); inf: it has none."""
+    return float(score - scores[~same_place(poses, pose)].max(initial=-np.inf))
+
+
+def first_of_each_cell(poses: np.ndarray) -> np.ndarray:
+    """Ascending indices of the poses (K, 3) that are the first in their cell, yaw wrapped."""
+    if not len(poses):  # numpy 1.17 cannot take unique rows of none
+        return np.zeros(0, np.int64)
+    cells = np.round(np.column_stack([poses[:, :2], angles.wrap(poses[:, 2])]) / _SAME_CELL).astype(np.int64)
+    return np.sort(np.unique(cells, axis=0, return_index=True)[1])
