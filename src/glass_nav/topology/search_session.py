@@ -35,6 +35,7 @@ class SessionParams:
     """How searches are begun, fed and reported."""
 
     check_map: bool = True  # refuse the atlas if another map is served than it was made from
+    end_without_atlas: bool = False  # when the atlas is refused, rather than wait for its map
     judge_by_scans: bool = True  # judge candidates by the scan at a meetpoint, where there are scans and a map
     search_at_start: bool = True  # with the first meetpoint; else when asked
     publish_initial_pose: bool = True
@@ -148,6 +149,11 @@ class SearchSession:
     def status(self) -> SearchStatus:
         """The last one."""
         return self._status
+
+    @property
+    def is_to_end(self) -> bool:
+        """Whether the node is to end: the atlas was refused, and nobody waits for its map."""
+        return self._p.end_without_atlas and self._status.state == SearchState.NO_ATLAS
 
     @property
     def localizer(self) -> Optional[AtlasLocalizer]:

@@ -242,7 +242,8 @@ def test_a_search_that_cannot_follow_it_to_a_meetpoint_is_asked_to_begin_anew_an
 
 
 def test_without_an_atlas_to_search_in_it_says_so_and_stands_until_a_search_waits():
-    robot = started()
+    robot = Robot()
+    robot.run_for(0.4)
     assert robot.phase == DriverPhase.SEEKING
     decided = robot.do(robot.driver.search_reports(SearchState.NO_ATLAS))
     line = "the search has no atlas of the map that is served: the robot does not drive for it"

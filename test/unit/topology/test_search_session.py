@@ -409,6 +409,14 @@ def test_an_atlas_of_a_map_that_differs_in_few_cells_is_used_with_a_warning() ->
     assert loaded.level == logging.WARNING and loaded.text.endswith(f"; it {warning}")
 
 
+@pytest.mark.parametrize("is_to_end", [False, True])
+def test_a_node_that_is_told_to_ends_where_its_atlas_is_refused(is_to_end: bool) -> None:
+    session = started(glass_office, end_without_atlas=is_to_end, judge_by_scans=False)
+    assert not session.is_to_end
+    session.map_served(served("glass_atrium"), "that of topic /map")
+    assert session.is_to_end == is_to_end
+
+
 def test_a_map_need_not_be_that_of_the_atlas_where_nobody_checks() -> None:
     session = started(glass_office, check_map=False, judge_by_scans=False)
     assert session.map_served(served("glass_atrium"), "that of topic /map") == []

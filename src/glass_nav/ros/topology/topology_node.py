@@ -56,7 +56,6 @@ from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.topology.observations import ObservationError
 from glass_nav.topology.search_session import Decision, GoalOutcome, SearchSession, SearchStatus
-from glass_nav.vocabulary import SearchState
 
 SERVICE_TIMEOUT_S = 30.0
 LAST_WORDS_S = 2.0  # by the wall clock, for others to hear the status
@@ -124,10 +123,9 @@ class TopologyNode:
                 self._carry_out(self._session.time_jumped_back(jump))
             for work in [*mail["commands"], *mail["reports"]]:
                 work()
-            status = self._session.status
-            if self._p.end_without_atlas and status.state == SearchState.NO_ATLAS:
+            if self._session.is_to_end:
                 ending.wait(LAST_WORDS_S)
-                raise AtlasError(status.reason)
+                raise AtlasError(self._session.status.reason)
 
     # -- events
 

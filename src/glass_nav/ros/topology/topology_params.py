@@ -18,7 +18,6 @@ class TopologyNodeParams:
     odom_frame_id: str = "odom"  # of the odometry by which scans are deskewed
     initial_pose_sigma_m: float = 0.25  # of initialpose
     initial_pose_sigma_rad: float = 0.17  # [rad] 10 degrees
-    end_without_atlas: bool = False  # when the atlas is refused, rather than wait for its map
 
     def __post_init__(self) -> None:
         for name in ("global_frame_id", "odom_frame_id"):
