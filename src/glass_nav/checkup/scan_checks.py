@@ -54,7 +54,7 @@ def check(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
             "scan-time-increment",
             f"{topic}: {fault}",
             "set time_increment to the seconds between two beams (scan_time / beams), or to 0 if unknown: "
-            "scans are not straightened as it is",
+            "scans are not deskewed as it is",
         )
 
 

@@ -5,7 +5,7 @@ pose; a cell is named by its flat index row * W + column. Ranges are exact: the 
 to the boundary of the cell it meets.
 
 What a ray meets: every occupied cell that it enters or, where it goes exactly through a corner between cells, that
-touches the corner on its way; so a wall of cells that only touch at their corners lets nothing through. A ray along a
+touches the corner; so a wall of cells that only touch at their corners lets nothing through. A ray along a
 grid line belongs to the cells above or to the right of it, as GridMap.cells() has it. A ray that starts in an occupied
 cell meets it at 0; one that starts outside the map meets what it enters.
 """
@@ -53,7 +53,7 @@ class SurfaceHits:
 
 @dataclass(frozen=True)
 class Paths:
-    """The four ways along each ray, (4, P, B): to the first surface, mirrored there, to the second and the third."""
+    """The four paths along each ray, (4, P, B): to the first surface, mirrored there, to the second and the third."""
 
     range_m: np.ndarray  # whole length, inf: none
     cos_incidence: np.ndarray  # |u . n| where it ends, 1 where nothing or no normal is
