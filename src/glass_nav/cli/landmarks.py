@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--glass-map",
         type=Path,
         metavar="MAP",
-        help="glass_map.yaml of glass_nav replay: walls that proved glassy hide no tag; without it all do",
+        help="glass_map.yaml of glass_nav replay: walls that proved to be glass hide no tag; without it all do",
     )
     plan.add_argument(
         "--spacing", type=float, default=0.5, metavar="M", help="of the places looked at, m (default 0.5)"
@@ -149,7 +149,7 @@ def _check_inside(arguments: argparse.Namespace, grid_map: GridMap, landmarks: L
 
 
 def _see_through(grid_map: GridMap, path: Optional[Path]) -> GridMap:
-    """The map without the walls that proved glassy."""
+    """The map without the walls that proved to be glass."""
     if path is None:
         return grid_map
     glass = map_file.load(path)

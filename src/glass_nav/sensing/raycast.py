@@ -43,7 +43,7 @@ class SurfaceHits:
     first_cell: np.ndarray  # int32 flat index of the cell met, -1: none
     second_cell: np.ndarray
     third_cell: np.ndarray
-    first_thickness_m: np.ndarray  # along the normal, along the ray where there is none; inf: not passed
+    first_thickness_m: np.ndarray  # along the normal, along the ray where the wall has no normal; inf: not passed
     second_thickness_m: np.ndarray
     normal_rad: np.ndarray  # of the first surface in map, towards the ray's origin; NaN: none
     linearity: np.ndarray  # of the first surface: 1 straight wall ... 0 no direction
@@ -66,7 +66,7 @@ class RayCaster:
     def __init__(self, grid_map: GridMap, backend: str = "exact", threads: int = 1, unknown: str = "pass") -> None:
         """Args:
             grid_map: cells of at least OCCUPIED_PERCENT end a ray.
-            backend: "exact" leaps over free squares; "mrpt" is MRPT's simulateScanRay with its known faults
+            backend: "exact" leaps by the chessboard distance; "mrpt" is MRPT's simulateScanRay with its known faults
                 corrected, slower, for comparison.
             threads: of each cast; the poses are dealt out to them. The results do not depend on it.
             unknown: "pass", unknown cells are like free ones; "stop", a ray that comes to one meets nothing (inf).

@@ -37,7 +37,7 @@ class SegmentCorrectionParams:
     iterations: int = 15  # T
     correct_orientation: bool = True
     least_constraint: float = 0.01  # share of the points' pull in a direction, below which it is left alone
-    outlier_m: float = 0.15  # a point further from its segment is none of the walls'
+    outlier_m: float = 0.15  # a point further from its segment belongs to no wall
     fit_scale_m: float = 0.05  # s: root of Emse that halves the combined quality
 
     def __post_init__(self) -> None:
