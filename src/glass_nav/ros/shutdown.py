@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import signal
 import sys
 import threading
@@ -30,6 +31,14 @@ def refuse_to_start(err: Exception, exit_code: int = 2) -> NoReturn:
     sys.exit(exit_code)
 
 
+def core_logs_to_rosout() -> None:
+    """What the core says by its loggers goes where rospy's lines go."""
+    core_log = logging.getLogger("glass_nav")
+    core_log.handlers = logging.getLogger("rosout").handlers
+    core_log.setLevel(logging.INFO)
+    core_log.propagate = False
+
+
 def run_node(name: str, make: Callable[[Dict[str, Any]], Any], bad_input: Tuple[Type[Exception], ...] = ()) -> None:
     """Start a node and run it until it is told to end.
 
@@ -40,6 +49,7 @@ def run_node(name: str, make: Callable[[Dict[str, Any]], Any], bad_input: Tuple[
     """
     rospy.init_node(name, disable_signals=True)
     ending = event_on_signals()
+    core_logs_to_rosout()
     try:
         node = make(rospy.get_param("~", {}))
     except (ValueError, *bad_input) as err:
