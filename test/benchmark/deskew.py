@@ -5,9 +5,9 @@
     python test/benchmark/deskew.py --turn-time 0.05 --seeds 2 --speed 1.0
 
 A robot drives the first path of each building; its lidar takes `--turn-time` from the first beam to the last one, and
-the scan says so. The same scans go through the filter straightened by odometry (which slips as the simulator's wheels
+the scan says so. The same scans go through the filter deskewed by odometry (which slips as the simulator's wheels
 do) and as they are; beside it those of a lidar that takes all beams at once. Prints rmse of position and heading at
-the stamps of the scans. Exit 1 if straightening makes the position or the heading worse over all buildings.
+the stamps of the scans. Exit 1 if deskewing makes the position or the heading worse over all buildings.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from glass_nav.simulation.path_follower import PathFollowerParams
 from glass_nav.simulation.simulation import Frame, Simulation
 from glass_nav.world.grid_map import GridMap
 
-WAYS = ("all at once", "as measured", "straightened")
+WAYS = ("all at once", "as measured", "deskewed")
 START_COVARIANCE = np.diag([0.1, 0.1, 0.05]) ** 2
 
 
@@ -48,7 +48,7 @@ def drive(name: str, turn_time_s: float, seed: int, speed_m_s: float, max_scans:
     return building_map.draw(building), [frame for frame, _ in zip(frames, range(max_scans))]
 
 
-def errors(grid_map: GridMap, frames: List[Frame], straighten: bool, seed: int) -> np.ndarray:
+def errors(grid_map: GridMap, frames: List[Frame], deskews: bool, seed: int) -> np.ndarray:
     """(S, 2) of position [m] and heading [rad]."""
     readings = {each.stamp_ns: each.odom_from_base for frame in frames for each in frame.odometry}
     odometry = Trajectory(np.array(sorted(readings)), np.array([readings[stamp_ns] for stamp_ns in sorted(readings)]))
@@ -56,7 +56,7 @@ def errors(grid_map: GridMap, frames: List[Frame], straighten: bool, seed: int) 
     localizer.set_pose(frames[0].map_from_base, START_COVARIANCE)
     off = []
     for frame in frames:
-        turns = straighten and frame.scan.time_increment_s > 0.0
+        turns = deskews and frame.scan.time_increment_s > 0.0
         scan = deskew.deskewed(frame.scan, odometry) if turns else frame.scan
         error = localizer.update(scan, frame.odom_from_base).map_from_base - frame.map_from_base
         off.append((np.hypot(error[0], error[1]), angles.wrap(error[2])))
@@ -84,10 +84,10 @@ def main() -> int:
         of_name: Dict[str, List[np.ndarray]] = {way: [] for way in WAYS}
         for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds):
             pace = (seed, arguments.speed, arguments.max_scans)
-            of_name[WAYS[0]].append(errors(*drive(name, 0.0, *pace), straighten=False, seed=seed))
+            of_name[WAYS[0]].append(errors(*drive(name, 0.0, *pace), deskews=False, seed=seed))
             grid_map, frames = drive(name, arguments.turn_time, *pace)
-            for way, straighten in ((WAYS[1], False), (WAYS[2], True)):
-                of_name[way].append(errors(grid_map, frames, straighten, seed))
+            for way, deskews in ((WAYS[1], False), (WAYS[2], True)):
+                of_name[way].append(errors(grid_map, frames, deskews, seed))
         line = f"{name:36s}"
         for way in WAYS:
             found[way] += of_name[way]
@@ -98,7 +98,7 @@ def main() -> int:
     print(f"{'all':36s}" + "".join(f"{whole[way][0]:>12.4f} /{whole[way][1]:6.3f}" for way in WAYS))
     worse = bool(np.any(whole[WAYS[2]] > whole[WAYS[1]]))
     position, heading = whole[WAYS[2]] / whole[WAYS[1]]
-    print(f"straightened, the position is {position:.2f} times as far off as measured, the heading {heading:.2f} times")
+    print(f"deskewed, the position is {position:.2f} times as far off as measured, the heading {heading:.2f} times")
     return 1 if worse else 0
 
 

@@ -28,8 +28,8 @@ import numpy as np
 sys.path.append(str(Path(__file__).resolve().parent))
 
 import drives
-from glass_nav.driving import edge_report
-from glass_nav.driving.local_map import LocalMap
+from glass_nav.driving.edge_tracking import edge_report
+from glass_nav.driving.edge_tracking.local_map import LocalMap
 from glass_nav.geometry import se2
 from glass_nav.sensing.scan import Scan
 from glass_nav.simulation import building_file, lidar

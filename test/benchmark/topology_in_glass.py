@@ -25,7 +25,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from glass_nav.replay import replay_topology
-from glass_nav.driving.passing import PassingObserver, PassingParams
+from glass_nav.driving.edge_tracking.passing import PassingObserver, PassingParams
 from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings
 from glass_nav.simulation.simulation import Simulation
 from glass_nav.topology.atlas import atlas_file, shipped_atlases

@@ -32,7 +32,7 @@ import numpy as np
 from wired_robot import WiredRobot
 
 from glass_nav.driving.driver_params import DriveParams
-from glass_nav.driving.edge_driver import Arrival
+from glass_nav.driving.edge_tracking.edge_driver import Arrival
 from glass_nav.driving.route import RoutePlanner
 from glass_nav.geometry import angles, se2
 from glass_nav.localization.localizer import Localizer

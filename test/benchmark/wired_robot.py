@@ -16,7 +16,7 @@ from glass_nav.driving import decisions
 from glass_nav.driving.decisions import Action
 from glass_nav.driving.driver import Driver
 from glass_nav.driving.driver_params import DriveParams
-from glass_nav.driving.edge_driver import Arrival
+from glass_nav.driving.edge_tracking.edge_driver import Arrival
 from glass_nav.driving.input_watch import Odometry
 from glass_nav.driving.place_goals import PlaceGoal
 from glass_nav.geometry import se2

@@ -7,7 +7,7 @@ from typing import Callable, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from glass_nav.driving.edge_driver import Arrival, EdgeDriver, EdgeDriverParams
+from glass_nav.driving.edge_tracking.edge_driver import Arrival, EdgeDriver, EdgeDriverParams
 from glass_nav.geometry import se2
 from glass_nav.sensing.scan import Scan, scan_from_fields
 from glass_nav.simulation import lidar

@@ -9,7 +9,7 @@ from typing import Optional, Union
 
 import numpy as np
 
-from glass_nav.driving.edge_driver import Arrival
+from glass_nav.driving.edge_tracking.edge_driver import Arrival
 from glass_nav.driving.tasks import Ending
 from glass_nav.log_line import LogLine
 from glass_nav.vocabulary import DriverPhase

@@ -27,8 +27,8 @@ from glass_nav.driving.decisions import (
     TraversalReport,
 )
 from glass_nav.driving.driver_params import DriveParams
-from glass_nav.driving.edge_driver import Arrival, EdgeDriver
 from glass_nav.driving.edge_names import rank_from_words
+from glass_nav.driving.edge_tracking.edge_driver import Arrival, EdgeDriver
 from glass_nav.driving.input_watch import InputNames, InputWatch, Odometry
 from glass_nav.driving.meetpoint_stay import MeetpointStay
 from glass_nav.driving.place_goals import PlaceGoal, PlaceTasks, TaskTo

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from glass_nav.driving.edge_driver import EdgeDriverParams
+from glass_nav.driving.edge_tracking.edge_driver import EdgeDriverParams
 from glass_nav.driving.recovery import RecoveryParams
 from glass_nav.driving.route_follower import RouteFollowerParams
 

@@ -7,7 +7,7 @@ from typing import Optional
 
 import numpy as np
 
-from glass_nav.driving.edge_driver import Arrival
+from glass_nav.driving.edge_tracking.edge_driver import Arrival
 
 REPORT_AGAIN_S = 2.0  # from one report to the next, while a search waits for one
 MOVED_M = 0.3  # farther from where it arrived the robot no longer stands there

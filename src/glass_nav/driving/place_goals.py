@@ -8,7 +8,7 @@ from typing import Callable, Optional
 import numpy as np
 
 from glass_nav.driving.driver_params import DriveParams
-from glass_nav.driving.edge_driver import EdgeDriver
+from glass_nav.driving.edge_tracking.edge_driver import EdgeDriver
 from glass_nav.driving.route import RoutePlanner
 from glass_nav.driving.tasks import GoTask, Task
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError

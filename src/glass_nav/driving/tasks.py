@@ -14,7 +14,7 @@ import numpy as np
 
 from glass_nav.driving import braking, recovery, velocity
 from glass_nav.driving.base_limits import BaseLimits
-from glass_nav.driving.edge_driver import Arrival, EdgeDriver
+from glass_nav.driving.edge_tracking.edge_driver import Arrival, EdgeDriver
 from glass_nav.driving.recovery import Recovery, RecoveryParams, Stall
 from glass_nav.driving.route import Route, RouteError, RoutePlanner
 from glass_nav.driving.route_follower import RouteFollower, RouteFollowerParams

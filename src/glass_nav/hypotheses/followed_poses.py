@@ -53,7 +53,7 @@ class Standing:
     map_from_base: np.ndarray  # (3,) at the last scan
     places: int  # that it is judged by
     share: float  # of the beams explained, mean over the places
-    lead: float  # of that share over the next best pose; inf: there is none
+    lead: float  # of that share over the next best pose; inf: no other pose
     share_now: float  # of the last scan
     lead_now: float  # of that share over all other poses; negative: one of them explains more
 

@@ -7,8 +7,8 @@ true place may have been missed (people, wheels that slipped). A place is found 
 
 The formulation is ours. Evidence is the log likelihood of Thrun, Burgard, Fox, Probabilistic Robotics (2005), sec. 6.4,
 much flattened: scans taken close to each other have the same errors, and so has a map that has changed since.
-Therefore evidence grows with the distance driven, not with the number of scans, and it tells places apart by
-differences of decimetres. A particle filter finds a place only if a particle falls near it; here every place is tried,
+Therefore evidence grows with the distance driven, not with the number of scans, and it distinguishes places
+by differences of decimetres. A particle filter finds a place only if a particle falls near it; here every place is tried,
 and places that look alike remain candidates until a scan distinguishes them. K candidates, B beams.
 """
 
@@ -116,7 +116,7 @@ class GlobalSearch:
         """One more scan; a scan with too few returns only moves the candidates.
 
         Args:
-            scan: a lidar's turn.
+            scan: one revolution of a lidar.
             odom_from_base: (3,) odometry at its stamp.
             bearings: from the robot's pose at the scan, each with the landmarks that they are of.
         """

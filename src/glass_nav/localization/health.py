@@ -34,7 +34,7 @@ ENTRIES = ("pose", "scans", "beams", "timing", "map")
 
 
 class LocalizationHealth:
-    """The entries about one situation; some tell of the time since the last report."""
+    """The entries about one situation; some cover the time since the last report."""
 
     def __init__(self, warn_deviations: np.ndarray, counts: ScanCounts) -> None:
         """Args:
@@ -52,7 +52,7 @@ class LocalizationHealth:
         self._wall_s.append(wall_s)
 
     def report(self, now: Situation) -> Dict[str, Health]:
-        """All entries by name; what they tell of the time since the last report starts over."""
+        """All entries by name; those that cover the time since the last report start over."""
         entries = {
             "pose": self._pose(now),
             "scans": self._scans(now),

@@ -124,7 +124,9 @@ class InitialPoses:
         try:
             odom_from_then = self._odometry_at(guess.stamp_ns)
         except ValueError as err:
-            _log.warning(f"initialpose of {guess.stamp_ns * 1e-9:.3f} s taken as of now: {err}")
+            _log.warning(
+                f"initialpose of {guess.stamp_ns * 1e-9:.3f} s taken as of now: no odometry at its stamp ({err})"
+            )
             return guess.map_from_base
         return se2.compose(guess.map_from_base, se2.compose(se2.inverse(odom_from_then), odom_from_base))
 

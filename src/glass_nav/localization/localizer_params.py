@@ -24,10 +24,10 @@ from glass_nav.localization.particle_filter.resampling import ParticleCount
 class Schedule:
     """When a scan moves the particles; the names and meanings are AMCL's."""
 
-    update_min_d: float = 0.1  # way since the last update [m]
+    update_min_d: float = 0.1  # distance since the last update [m]
     update_min_a: float = 0.1  # turn since the last update [rad]
     resample_interval: int = 1  # updates between resamplings
-    selective_resampling: bool = False  # only when fewer than half of the particles count
+    selective_resampling: bool = False  # only when the effective count is below half
     raycast_threads: int = 1
 
     def __post_init__(self) -> None:
@@ -41,10 +41,10 @@ class Schedule:
 
 @dataclass(frozen=True)
 class LaserLimits:
-    """Ranges that are looked at; the names and meanings are AMCL's."""
+    """Ranges that are used; the names and meanings are AMCL's."""
 
-    laser_min_range: float = -1.0  # [m] nearer ranges are no answers; < 0: as the scan says
-    laser_max_range: float = -1.0  # [m] farther ones neither; < 0: as the scan says
+    laser_min_range: float = -1.0  # [m] nearer ranges are ignored; < 0: the limit of the scan
+    laser_max_range: float = -1.0  # [m] farther ranges are ignored; < 0: the limit of the scan
 
     def __post_init__(self) -> None:
         for name in ("laser_min_range", "laser_max_range"):

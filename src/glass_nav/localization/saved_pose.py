@@ -1,7 +1,7 @@
-"""The last pose of a robot in a file, for the next start: and whether it may still be believed then.
+"""The last pose of a robot in a file, for the next start, and whether it is still valid then.
 
-A pose is worth as much as what ties it to the present: the map it is of, the time since, and odometry, which says how
-the robot has moved, or that it began anew when the robot was switched on.
+It is valid if the map is the same, it is not too old, and odometry either continues from it or began anew when the
+robot was switched on.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from glass_nav.geometry import se2
 from glass_nav.vocabulary import LocalizationState
 
 _MIN_DEVIATION = np.array([0.1, 0.1, 0.05])  # [m, m, rad] of a start: somebody may have leant against the robot
-_DEVIATION_PER_M = np.array([0.1, 0.1, 0.05])  # of odometry while nobody looked
+_DEVIATION_PER_M = np.array([0.1, 0.1, 0.05])  # of odometry while the node did not run
 _AT_ORIGIN_M, _AT_ORIGIN_RAD = 0.3, 0.3  # odometry that began anew and has hardly moved
 _SLACK_M = 0.1  # of odometry over any time
 _CLOCK_SLACK_S = 1.0
 
 
 class SavedPoseError(ValueError):
-    """A pose file that cannot be believed; the text says why."""
+    """A pose file that cannot be used; the text says why."""
 
 
 @dataclass(frozen=True)
 class PoseFile:
-    """Where the pose is kept, and how long it holds."""
+    """Where the pose is kept, and how long it is valid."""
 
     pose_file: str = ""  # "": none
     pose_file_max_age_s: float = 604800.0  # [s] a week
@@ -53,9 +53,9 @@ class PoseFile:
 
 @dataclass(frozen=True)
 class SavedPose:
-    """A pose, and what it needs to be believed later."""
+    """A pose, and what decides whether it is still valid later."""
 
-    stamp_ns: int  # of the scan that it was worked out from
+    stamp_ns: int  # of the scan that it was estimated from
     map_from_base: np.ndarray  # (3,)
     covariance: np.ndarray  # (3, 3) of x [m], y [m], yaw [rad]
     odom_from_base: np.ndarray  # (3,) of odometry then
@@ -64,7 +64,7 @@ class SavedPose:
 
 
 def save(path: Path, saved: SavedPose) -> None:
-    """Write the file, whole or not at all: a robot that is switched off meanwhile still has the one before.
+    """Write the file, atomically: a robot that is switched off meanwhile still has the previous one.
 
     Raises:
         OSError: it cannot be written.
@@ -126,7 +126,7 @@ def load(path: Path) -> SavedPose:
 def resumed(
     saved: SavedPose, now_ns: int, map_digest: str, odom_from_base: np.ndarray, limits: PoseFile
 ) -> Tuple[np.ndarray, np.ndarray, str]:
-    """Where the robot is now: pose (3,), covariance (3, 3), and in words why that is believed.
+    """Where the robot is now: pose (3,), covariance (3, 3), and in words why it is valid.
 
     Args:
         saved: what was written.
@@ -136,7 +136,7 @@ def resumed(
         limits: how long and how far a pose holds.
 
     Raises:
-        SavedPoseError: it is not to be believed.
+        SavedPoseError: it is not valid.
     """
     age_s = (now_ns - saved.stamp_ns) * 1e-9
     if saved.state not in (LocalizationState.LOCALIZED, LocalizationState.UNCERTAIN):

@@ -176,7 +176,7 @@ def _base_frame(tree: FrameTree, odometry: OdometrySource, options: LogOptions) 
 
 
 def _check_laser(bag: Bag, scan_topic: str, tree: FrameTree, base_frame: str, options: LogOptions) -> None:
-    """Refuse at once a bag that does not say where the laser is: every scan would be refused."""
+    """Reject at once a bag that does not say where the laser is: every scan would be rejected."""
     if options.laser_pose is not None:
         return
     for _, message in bag.messages(scan_topic):

@@ -183,7 +183,7 @@ def _rotate(q: Quaternion, v: Vector) -> Vector:
 
 def _slerp(a: Quaternion, b: Quaternion, share: float) -> Quaternion:
     dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
-    sign = -1.0 if dot < 0.0 else 1.0  # q and -q are one rotation: take the shorter way
+    sign = -1.0 if dot < 0.0 else 1.0  # q and -q are one rotation: take the shorter arc
     angle = math.acos(min(abs(dot), 1.0))
     if angle < 1e-6:
         return a

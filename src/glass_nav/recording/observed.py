@@ -1,4 +1,4 @@
-"""What a robot says, before anything is chosen or refused: for those who look for what is wrong with it.
+"""All messages of a robot before anything is chosen or rejected: for whoever looks for faults.
 
 The same whether it was read from a bag or heard on a running robot.
 """
@@ -54,7 +54,7 @@ class HeardOdometry:
 
 @dataclass
 class Observed:
-    """Everything heard, by topic where it has one, in the order in which it came."""
+    """Everything received, by topic where there is one, in the order of arrival."""
 
     name: str  # of the log, or of the robot
     topics: Dict[str, str] = field(default_factory=dict)  # topic -> type

@@ -171,7 +171,7 @@ class _Entries:
         end = int(self._ends[index])
         part = slice(end - int(log["beams"][index]), end)
         first_rad, step_rad = float(log["first_angle_rad"][index]), float(log["angle_step_rad"][index])
-        # What MRPT calls invalid came back with nothing; it does not tell "nothing met" from "failed".
+        # MRPT calls a beam without an answer invalid; it does not distinguish "nothing met" from "failed".
         ranges_m = np.where(log["valid"][part] != 0, log["ranges_m"][part].astype(float), np.inf)
         return RawScan(
             stamp_ns=int(log["stamps_ns"][index]),

@@ -25,7 +25,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Refusal:
-    """A scan of the log that cannot be used. Never dropped in silence: the replay counts them."""
+    """A scan of the log that cannot be used. It is never dropped silently: the replay counts it."""
 
     stamp_ns: int
     reason: str  # without the stamp, so that equal reasons can be counted
@@ -40,7 +40,9 @@ class BeamTruth:
 
     stamp_ns: int
     case: np.ndarray  # (B,) uint8: 0..4
-    crossing_m: Optional[np.ndarray]  # (B,) range of the first pane passed or mirrored at, NaN: none; None: not told
+    crossing_m: Optional[
+        np.ndarray
+    ]  # (B,) range of the first pane passed or mirrored at, NaN: none; None: not recorded
 
 
 @dataclass
@@ -71,16 +73,16 @@ class Recording:
 
 @dataclass(frozen=True)
 class LogOptions:
-    """What to take from a log; None: found by itself, and said in the notes."""
+    """What to read from a log; None: chosen automatically and noted."""
 
     scan_topic: Optional[str] = None
     odom_topic: Optional[str] = None
     base_frame: Optional[str] = None
     odom_frame: Optional[str] = None
     laser_pose: Optional[Tuple[float, float, float]] = None  # base_from_laser instead of tf's
-    ground_truth: Optional[str] = None  # a topic, a file or "tf:FRAME"; "none": do not look for one
-    true_beams: Optional[str] = None  # a topic; "none": do not look for one
-    deskew: bool = True  # make up for the robot's motion while the lidar turned, where the log tells
+    ground_truth: Optional[str] = None  # a topic, a file or "tf:FRAME"; "none": none is looked for
+    true_beams: Optional[str] = None  # a topic; "none": none is looked for
+    deskew: bool = True  # where the log has the time between beams
 
 
 def trajectory_from_samples(stamps_ns: "List[int]", poses: "List[Tuple[float, float, float]]") -> Trajectory:

@@ -1,6 +1,6 @@
-"""What the filter made of a log -> a ROS 1 bag, for rviz and PlotJuggler: topics, types and frames of the running node.
+"""The results of a replay -> a ROS 1 bag for rviz and PlotJuggler: topics, types and frames of the running node.
 
-It stands by itself: map, tf from map to the laser, the scans. Stamps are those of the scans, map -> odom included, so
+The bag is complete: it has the map, tf from map to laser, and the scans. Stamps are those of the scans, map -> odom included, so
 that nothing lies ahead of its data. Not compressed: the player of ROS cannot read what rosbags compresses by lz4.
 B beams, P particles, H rows and W columns of the map.
 """
@@ -19,7 +19,7 @@ from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
 
 NODE = "/glass_localization"
-SHOWN = 500  # particles at most: the cloud is for the eye
+MAX_SHOWN = 500  # particles: the cloud is only for display
 _FLOAT32 = 7  # of sensor_msgs/PointField
 
 
@@ -65,7 +65,7 @@ class ResultBag(MessageWriter):
         residual_m: np.ndarray,
         weight: np.ndarray,
     ) -> None:
-        """One turn of a lidar, what its beams met (B,), and where each is cut (B,), as measured by the lidar."""
+        """One scan, the cases of its beams (B,), and where each is cut (B,), as measured by the lidar."""
         frame = scan.lidar or "laser"
         if frame not in self._mounted:
             self._mounted.add(frame)
@@ -133,12 +133,12 @@ class ResultBag(MessageWriter):
         )
 
     def pose(self, stamp_ns: int, map_from_base: np.ndarray, covariance: np.ndarray, particles: np.ndarray) -> None:
-        """The pose (3,) with its covariance (3, 3) of x, y, yaw, and the particles (P, 3), of which some are shown."""
+        """The pose (3,), its covariance (3, 3) of x, y, yaw, and some of the particles (P, 3)."""
         spatial = np.zeros((6, 6))
         spatial[np.ix_([0, 1, 5], [0, 1, 5])] = covariance
         pose = self._new("geometry_msgs/PoseWithCovariance", pose=self._pose(map_from_base), covariance=spatial.ravel())
         self._send("/amcl_pose", stamp_ns, header=self._header(stamp_ns, self._map), pose=pose)
-        shown = particles[:: max(1, -(-len(particles) // SHOWN))]
+        shown = particles[:: max(1, -(-len(particles) // MAX_SHOWN))]
         self._send(
             "/particlecloud",
             stamp_ns,
@@ -164,7 +164,7 @@ class ResultBag(MessageWriter):
         self._send("/ground_truth", stamp_ns, header=self._header(stamp_ns, self._map), pose=self._pose(map_from_base))
 
     def glass_map(self, stamp_ns: int, grid_map: GridMap, glass: np.ndarray) -> None:
-        """How glassy each wall cell proved so far: (H, W) int8, percent, -1 unknown."""
+        """Probability of glass of each wall cell so far: (H, W) int8 [percent], -1 unknown."""
         self._grid(NODE + "/glass_map", stamp_ns, grid_map, glass)
 
     def _grid(self, topic: str, stamp_ns: int, grid_map: GridMap, cells: np.ndarray) -> None:

@@ -1,6 +1,6 @@
 """glass_nav replay --topology: which nodes of an atlas a recorded robot drove through, and which of them it saw.
 
-The robot's eyes are those of the driver (driving/passing.py), which knows no map; they are compared with the atlas
+The robot's eyes are those of the driver (driving/edge_tracking/passing.py), which knows no map; they are compared with the atlas
 where the robot truly was.
 """
 
@@ -11,8 +11,8 @@ from typing import List, Optional
 
 import numpy as np
 
-from glass_nav.driving.local_graph import in_sight
-from glass_nav.driving.passing import PassingObserver
+from glass_nav.driving.edge_tracking.local_graph import in_sight
+from glass_nav.driving.edge_tracking.passing import PassingObserver
 from glass_nav.evaluation.metrics import passed_nodes
 from glass_nav.evaluation.metrics.passed_nodes import KnownNodes, Passing, SeenNode, TopologyScore
 from glass_nav.evaluation.metrics.replay_result import ReplayResult

@@ -1,4 +1,4 @@
-"""Directions in which landmarks were seen, N of them, and from where on the robot's way each was taken."""
+"""Directions in which landmarks were seen, N of them, and where on the robot's path each was taken."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class LandmarkBearing:
 
 @dataclass(frozen=True, eq=False)
 class LandmarkBearings:
-    """Bearings to different landmarks, all told with regard to one pose of the robot: base at stamp_ns.
+    """Bearings to different landmarks, all relative to one pose of the robot: base at stamp_ns.
 
     A sensor that turns for a minute takes each bearing from another place. `base_from_sensor` holds these places as
     odometry has them, so whoever uses the bearings need not know whether the robot moved.
@@ -79,7 +79,7 @@ class LandmarkBearings:
         )
 
     def seen_from(self, stamp_ns: int, later_from_base: np.ndarray) -> "LandmarkBearings":
-        """The same bearings told with regard to the robot's pose at another time, by odometry between the two (3,)."""
+        """The same bearings relative to the robot's pose at another time, by odometry between the two (3,)."""
         return replace(self, stamp_ns=stamp_ns, base_from_sensor=se2.compose(later_from_base, self.base_from_sensor))
 
 
@@ -105,10 +105,10 @@ def standing(
 
 @dataclass(frozen=True)
 class OdometryDrift:
-    """How unsure odometry is of the way between two bearings."""
+    """How uncertain odometry is between two bearings."""
 
-    bearing_drift_per_m: float = 0.02  # [m/m] of the way, in position
-    bearing_drift_rad_per_m: float = 0.01  # [rad/m] of the way, in heading
+    bearing_drift_per_m: float = 0.02  # [m/m] of the distance, in position
+    bearing_drift_rad_per_m: float = 0.01  # [rad/m] of the distance, in heading
     bearing_drift_per_rad: float = 0.02  # [rad/rad] of the turn, in heading
 
     def __post_init__(self) -> None:
@@ -129,12 +129,12 @@ def collected(
         bearings: N >= 1, of different landmarks, by ascending stamp.
         odom_from_base: (N, 3) odometry at the stamp of each.
         base_from_sensor: (3,) where the sensor sits, its x axis where angles are 0.
-        drift: makes sigma of older bearings larger, by the way and the turns between them and the last one.
+        drift: makes sigma of older bearings larger, by the distance and the turns between them and the last one.
     """
     odom_from_base = np.asarray(odom_from_base, float)
     last = odom_from_base[-1]
     step = odom_from_base[1:] - odom_from_base[:-1]
-    since = np.zeros((len(bearings), 2))  # way [m] and turn [rad] from each stamp to the last one
+    since = np.zeros((len(bearings), 2))  # distance [m] and turn [rad] from each stamp to the last one
     since[:-1] = np.cumsum(
         np.stack([np.hypot(step[:, 0], step[:, 1]), np.abs(angles.wrap(step[:, 2]))], axis=-1)[::-1], axis=0
     )[::-1]

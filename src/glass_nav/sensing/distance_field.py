@@ -2,7 +2,7 @@
 
 The "likelihood field" of Thrun, Burgard, Fox, Probabilistic Robotics (2005), sec. 6.4, as a
 distance with its gradient. Wherever a beam ends, near some wall is good: it asks neither which wall
-nor what was passed on the way, so glass does not mislead it much, and does not teach it anything.
+nor what the beam passed, so glass hardly misleads it, and is no information to it.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class DistanceField:
         """Distance and its gradient at points of the frame map.
 
         Args:
-            x_m, y_m: (...) coordinates; outside the grid the distance grows with the way to it.
+            x_m, y_m: (...) coordinates; outside the grid the distance to the grid is added.
 
         Returns:
             distance [m] and its derivatives along x and y of the frame map, each (...).

@@ -5,7 +5,7 @@ pose; a cell is named by its flat index row * W + column. Ranges are exact: the 
 to the boundary of the cell it meets.
 
 What a ray meets: every occupied cell that it enters or, where it goes exactly through a corner between cells, that
-touches the corner on its way; so a wall of cells that only touch at their corners lets nothing through. A ray along a
+touches the corner; so a wall of cells that only touch at their corners lets nothing through. A ray along a
 grid line belongs to the cells above or to the right of it, as GridMap.cells() has it. A ray that starts in an occupied
 cell meets it at 0; one that starts outside the map meets what it enters.
 """
@@ -43,7 +43,7 @@ class SurfaceHits:
     first_cell: np.ndarray  # int32 flat index of the cell met, -1: none
     second_cell: np.ndarray
     third_cell: np.ndarray
-    first_thickness_m: np.ndarray  # along the normal, along the ray where there is none; inf: not passed
+    first_thickness_m: np.ndarray  # along the normal, along the ray where the wall has no normal; inf: not passed
     second_thickness_m: np.ndarray
     normal_rad: np.ndarray  # of the first surface in map, towards the ray's origin; NaN: none
     linearity: np.ndarray  # of the first surface: 1 straight wall ... 0 no direction
@@ -53,7 +53,7 @@ class SurfaceHits:
 
 @dataclass(frozen=True)
 class Paths:
-    """The four ways along each ray, (4, P, B): to the first surface, mirrored there, to the second and the third."""
+    """The four paths along each ray, (4, P, B): to the first surface, mirrored there, to the second and the third."""
 
     range_m: np.ndarray  # whole length, inf: none
     cos_incidence: np.ndarray  # |u . n| where it ends, 1 where nothing or no normal is
@@ -66,7 +66,7 @@ class RayCaster:
     def __init__(self, grid_map: GridMap, backend: str = "exact", threads: int = 1, unknown: str = "pass") -> None:
         """Args:
             grid_map: cells of at least OCCUPIED_PERCENT end a ray.
-            backend: "exact" leaps over free squares; "mrpt" is MRPT's simulateScanRay with its known faults
+            backend: "exact" leaps by the chessboard distance; "mrpt" is MRPT's simulateScanRay with its known faults
                 corrected, slower, for comparison.
             threads: of each cast; the poses are dealt out to them. The results do not depend on it.
             unknown: "pass", unknown cells are like free ones; "stop", a ray that comes to one meets nothing (inf).

@@ -28,7 +28,7 @@ class Scan:
     """Ranges along the beams of one lidar, and where that lidar sits on the robot."""
 
     stamp_ns: int  # time of the data [ns]
-    ranges_m: np.ndarray  # (B,) along each beam; REP 117 for what is no range
+    ranges_m: np.ndarray  # (B,) along each beam, REP 117
     angles_rad: np.ndarray  # (B,) direction of each beam in the laser's frame
     range_min_m: float
     range_max_m: float

@@ -42,8 +42,8 @@ class RawScan:
     angle_increment_rad: float
     range_min_m: float
     range_max_m: float
-    time_increment_s: float = 0.0  # from each beam to the next; 0: not told
-    scan_time_s: float = 0.0  # from each sweep to the next; 0: not told
+    time_increment_s: float = 0.0  # from each beam to the next; 0: not known
+    scan_time_s: float = 0.0  # from each sweep to the next; 0: not known
 
     @property
     def timing_fault(self) -> Optional[str]:
@@ -52,7 +52,7 @@ class RawScan:
 
     @property
     def sweep_ns(self) -> int:
-        """From its first beam to its last one; 0 where that is not told, or cannot be true."""
+        """From its first beam to its last one; 0 if that is not known, or cannot be true."""
         if self.timing_fault is not None:
             return 0
         return deskew.sweep_ns(len(self.ranges_m), self.time_increment_s)

@@ -1,6 +1,6 @@
 """Scans of one or several lidars, from their arrival until they can be placed.
 
-Lidars are told apart by their frames, as in AMCL, whatever topics their scans come on. Of the scans of one lidar the
+Lidars are distinguished by their frames, as in AMCL, whatever topics their scans come on. Of the scans of one lidar the
 newest that has its transforms wins, so that its stamps only ascend. Times in seconds are of the clock that the caller
 reads.
 """

@@ -58,7 +58,7 @@ def extract(
     """All segments of a scan.
 
     Args:
-        scan: a lidar's turn, its beams in any direction of turn.
+        scan: one sweep of a lidar, its beams in either direction.
         params: what makes a segment.
         used: (B,) bool: the beams to look at, of those that answered; None: all. Mirrored ones draw walls that are not
             there.

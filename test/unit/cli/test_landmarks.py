@@ -71,7 +71,7 @@ def test_finer_steps_make_better_positions(room, capsys):
     assert median("0.5") < median("2")
 
 
-def test_walls_that_proved_glassy_hide_no_tag(room, capsys):
+def test_walls_that_proved_to_be_glass_hide_no_tag(room, capsys):
     def in_sight(*options: str) -> int:
         assert plan(room, "--add", "0", *options) == 0
         return int(capsys.readouterr().out.split("in sight of ")[1].split("%")[0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glass_nav.driving.edge_driver import Arrival
+from glass_nav.driving.edge_tracking.edge_driver import Arrival
 from glass_nav.driving.meetpoint_stay import MeetpointStay
 from glass_nav.topology.observations import Meetpoint
 

@@ -9,7 +9,7 @@ import pytest
 from made_buildings import t_corridor
 
 from glass_nav.driving.driver_params import DriveParams
-from glass_nav.driving.edge_driver import EdgeDriver
+from glass_nav.driving.edge_tracking.edge_driver import EdgeDriver
 from glass_nav.driving.place_goals import PlaceGoal, PlaceTasks
 from glass_nav.driving.tasks import GoTask, Moment
 from glass_nav.simulation import building_map

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from glass_nav.driving.base_limits import BaseLimits
-from glass_nav.driving.edge_driver import EdgeDriver
+from glass_nav.driving.edge_tracking.edge_driver import EdgeDriver
 from glass_nav.driving.recovery import RecoveryParams
 from glass_nav.driving.tasks import EdgeTask, Moment
 from glass_nav.geometry import angles

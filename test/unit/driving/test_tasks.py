@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from glass_nav.driving.base_limits import BaseLimits
-from glass_nav.driving.edge_driver import EdgeDriver
+from glass_nav.driving.edge_tracking.edge_driver import EdgeDriver
 from glass_nav.driving.recovery import RecoveryParams
 from glass_nav.driving.route import RoutePlanner
 from glass_nav.driving.route_follower import RouteFollowerParams

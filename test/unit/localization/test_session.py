@@ -65,7 +65,7 @@ class FakeLocalizer:
             "why",
             0.9,
             True,
-            reliability=0.9,
+            confidence=0.9,
         )
 
 

@@ -89,7 +89,7 @@ class BeamClassifier:
         return case_votes.as_seen_from(cases, scan.ranges_m, expected, self.residuals, self._params.vote)
 
     def learn(self, scan: Scan, expected: ExpectedRanges) -> None:
-        """Where beams end in walls, and which walls let them pass; `expected` is of a pose that is believed."""
+        """Where beams end in walls, and which walls let them pass; `expected` is of a trusted pose."""
         with np.errstate(invalid="ignore"):
             across = (scan.ranges_m - expected.line_m[0]) * expected.cos_incidence[0, 0] + expected.face_m
         met = np.isfinite(across)

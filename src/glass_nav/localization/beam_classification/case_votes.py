@@ -4,7 +4,7 @@ Seed document glass_localization.txt, sec. III.A, eq. (1) and steps 3 and 4: eac
 votes for the reference nearest to the measured range, and the case with the highest vote wins. What the
 document leaves open (it breaks off at step 1) is ours: the gate, ties, and the soft vote, in which a
 sample votes with shares, and the more the better it explains the whole scan; in which the chance of each
-case before the beam is looked at follows from how glassy its walls proved and from the physics of a pane;
+case before the beam is looked at follows from the probability of glass and the physics of a pane;
 and in which neighbouring beams pull each other. N samples, B beams.
 """
 
@@ -281,7 +281,7 @@ def _chance_of_a_mirror(expected: ExpectedRanges, max_range_m: float, gain: floa
 def _pulled(share: np.ndarray, answered: np.ndarray, pull: float) -> np.ndarray:
     """(5, B) shares after neighbouring beams have pulled each other: mean field of a chain, a few rounds.
 
-    Neighbours mostly meet the same wall the same way; a single beam that fits a farther wall mostly does so by chance.
+    Neighbours mostly meet the same wall at the same incidence; a single beam that fits a farther wall mostly does so by chance.
     """
     log_share = np.log(share + 1e-6)
     belief = share

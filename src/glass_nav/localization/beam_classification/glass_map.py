@@ -30,7 +30,7 @@ def crossings(
 ) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The evidence of a scan about walls: cell, incidence and passed of GlassMap.learn().
 
-    Only beams for which all samples agree: a wall that stands in the beam's way from each of them was passed, not
+    Only beams for which all samples agree: a wall that the beam crosses from each of them was passed, not
     missed at its edge. The incidence of a cell without a normal is NaN.
 
     Args:

@@ -1,7 +1,7 @@
 """How far off will a position from bearings be?  Step angle -> limits of the error, covariance, sigma over a map.
 
 Seed document landmark_bearings.txt (Tsukiyama 2009), sec. 3: an emitter that turns in steps reads the angle between two
-landmarks wrong by up to one step; Tables 1 and 2 are the position errors of one triple at the limits and half way to
+landmarks wrong by up to one step; Tables 1 and 2 are the position errors of one triple at the limits and halfway to
 them. To first order every error of a bearing moves the position the more, the farther the landmarks are, the narrower
 they stand and the nearer the robot is to the circle through them. M points, N landmarks.
 """
@@ -35,9 +35,9 @@ def limits_of_error(landmarks_m: np.ndarray, point_m: np.ndarray, step_rad: floa
         last two.
     """
     landmarks_m = np.asarray(landmarks_m, float)
-    way = landmarks_m - point_m
+    sight_m = landmarks_m - point_m
     first, second = np.meshgrid(np.array(STEPS) * step_rad, np.array(STEPS) * step_rad, indexing="ij")
-    direction = np.arctan2(way[:, 1], way[:, 0]) + np.stack([-first, np.zeros_like(first), second], axis=-1)
+    direction = np.arctan2(sight_m[:, 1], sight_m[:, 0]) + np.stack([-first, np.zeros_like(first), second], axis=-1)
     poses, _ = inscribed_circles.intersect(np.broadcast_to(landmarks_m, (25, 3, 2)), direction.reshape(25, 3))
     return np.hypot(*(poses[:, :2] - point_m).T).reshape(5, 5)
 
@@ -50,12 +50,12 @@ def covariance(landmarks: LandmarkMap, map_from_base: np.ndarray, sigma_rad: flo
     Raises:
         ValueError: the landmarks do not fix the pose.
     """
-    way = landmarks.positions_m - map_from_base[:2]
+    sight_m = landmarks.positions_m - map_from_base[:2]
     seen = bearing_model.sightings(
-        bearings.standing(landmarks.ids, np.arctan2(way[:, 1], way[:, 0]), sigma_rad), landmarks
+        bearings.standing(landmarks.ids, np.arctan2(sight_m[:, 1], sight_m[:, 0]), sigma_rad), landmarks
     )
-    by_pose = bearing_model.jacobian(seen, np.asarray(map_from_base, float), way)
-    information = (by_pose / bearing_model.variances(seen, way)[:, None]).T @ by_pose
+    by_pose = bearing_model.jacobian(seen, np.asarray(map_from_base, float), sight_m)
+    information = (by_pose / bearing_model.variances(seen, sight_m)[:, None]).T @ by_pose
     if np.linalg.matrix_rank(information) < 3:
         raise ValueError(
             f"{len(landmarks)} landmarks do not fix the pose at x {map_from_base[0]:.2f} m, "
@@ -79,9 +79,9 @@ def information_sums(
     Returns:
         (M, N, 6): weight, weighted gradient gx, gy of the bearing by x and y, and gx gx, gx gy, gy gy; 0 where hidden.
     """
-    way = positions_m - points_m[:, None]
-    range2 = np.maximum((way**2).sum(axis=-1), 1e-4)
-    gradient = np.stack([way[..., 1], -way[..., 0]], axis=-1) / range2[..., None]
+    sight_m = positions_m - points_m[:, None]
+    range2 = np.maximum((sight_m**2).sum(axis=-1), 1e-4)
+    gradient = np.stack([sight_m[..., 1], -sight_m[..., 0]], axis=-1) / range2[..., None]
     weight = np.where(visible, 1.0 / (sigma_rad**2 + place_sigma_m**2 / range2), 0.0)
     gx, gy = gradient[..., 0], gradient[..., 1]
     return np.stack([weight, weight * gx, weight * gy, weight * gx * gx, weight * gx * gy, weight * gy * gy], axis=-1)

@@ -58,7 +58,7 @@ def intersect(landmarks_m: np.ndarray, angles_rad: np.ndarray) -> Tuple[np.ndarr
 
 
 def off_circle(landmarks_m: np.ndarray, angles_rad: np.ndarray, sigma_rad: np.ndarray) -> np.ndarray:
-    """How clearly the bearings tell the robot from one on the circle (or line) through the three landmarks.
+    """How clearly the bearings distinguish the robot from one on the circle (or line) through the three landmarks.
 
     On that circle, and nowhere else, the angle at which the robot sees two of them equals the inscribed angle at the
     third (modulo pi), and the two circles of intersect() are one. The difference is counted in its standard deviations.

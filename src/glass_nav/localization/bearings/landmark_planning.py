@@ -3,7 +3,7 @@
 Points are places of the map where a robot may stand; a landmark is seen from one if its range and view allow it and no
 wall stands between. Each point costs its expected standard deviation, as far as CAP_M; a point without three landmarks
 costs CAP_M and as much again for each that is missing, so that the first tag of three is worth something too. The
-best place for another tag is where the mean cost falls most; the next one is looked for with that tag in place.
+best place for another tag is where the mean cost falls most; the next one is searched with that tag in place.
 Taken for granted: a sensor that looks all round, and that a tag can hang on everything that is occupied on the map.
 M points, N landmarks, K candidates.
 """
@@ -24,7 +24,7 @@ from glass_nav.world.landmark_map import RANGE_M, VIEW_RAD, LandmarkMap
 
 CAP_M = 1.0
 CLEARANCE_M = 0.25  # of a point from walls: a robot has a body
-NORMAL_CELLS = 4  # around a wall cell that tell to which side it is free
+NORMAL_CELLS = 4  # around a wall cell that decide which side of it is free
 OFF_WALL_M = 0.05  # a tag sticks out of its wall
 TILTS_RAD = np.radians([0.0, 45.0, -45.0])  # a tag may be tilted against its wall, to look along a corridor
 WALL_SLACK_CELLS = 3.0  # a tag on a wall is hidden by that wall's own cells otherwise
@@ -53,9 +53,7 @@ def points(grid_map: GridMap, spacing_m: float) -> np.ndarray:
     chosen[every // 2 :: every, every // 2 :: every] = True
     rows, columns = np.nonzero(free & chosen)
     if not len(rows):
-        raise ValueError(
-            f"the map has no free place {CLEARANCE_M:g} m away from walls, looked for every {spacing_m:g} m"
-        )
+        raise ValueError(f"the map has no free place {CLEARANCE_M:g} m away from walls, searched every {spacing_m:g} m")
     return grid_map.centres(rows, columns)
 
 
@@ -65,9 +63,9 @@ def visible(walls: RayCaster, landmarks: LandmarkMap, points_m: np.ndarray) -> n
     point, landmark = np.nonzero(seen)
     if not len(point):
         return seen
-    way = landmarks.positions_m[landmark] - points_m[point]
-    distance = np.hypot(way[:, 0], way[:, 1])
-    rays = np.column_stack([points_m[point], np.arctan2(way[:, 1], way[:, 0])])
+    sight_m = landmarks.positions_m[landmark] - points_m[point]
+    distance = np.hypot(sight_m[:, 0], sight_m[:, 1])
+    rays = np.column_stack([points_m[point], np.arctan2(sight_m[:, 1], sight_m[:, 0])])
     free_m = walls.cast(rays, np.zeros(1), float(distance.max()) + 1.0)[:, 0]
     seen[point, landmark] = free_m >= distance - WALL_SLACK_CELLS * walls.grid_map.resolution_m
     return seen

@@ -32,7 +32,7 @@ _DRIVEN_M = 1e-9  # sensor places nearer to each other than this are one
 _ROUNDS = 8  # of the triples of a robot that drives
 _STEPS, _HALVINGS = 20, 6  # of the least squares
 _SMALL_STEP = 1e-11  # [m, rad] that ends them
-_ONE_PLACE = 16.3  # chi-square of 3 degrees of freedom at 0.999: two fits that tell the same place
+_ONE_PLACE = 16.3  # chi-square of 3 degrees of freedom at 0.999: two fits of the same place
 _CLEARLY_WORSE = 9.0  # of two chi-squares: odds of 90 to 1
 _RANGE_SHARE, _VIEW_SLACK_RAD = 1.25, np.radians(15.0)  # by which a tag may surpass what its map says
 
@@ -45,7 +45,7 @@ class TriangulationError(ValueError):
 class TriangulationLimits:
     """When a pose from bearings is refused."""
 
-    min_off_circle_sigmas: float = 3.0  # how clearly a triple must tell the robot from one on its circle
+    min_off_circle_sigmas: float = 3.0  # how clearly a triple must distinguish the robot from one on its circle
     max_position_sigma_m: float = 0.5  # along the worst direction
     max_misfit_chance: float = 0.001  # of right bearings that are taken for contradictory
 
@@ -162,10 +162,10 @@ def average(
 
 
 def carried_along(fix: Fix, stamp_ns: int, base_from_later: np.ndarray, drift: OdometryDrift = OdometryDrift()) -> Fix:
-    """The fix at a later stamp, by what odometry (3,) says of the way since; less sure by its drift."""
+    """The fix at a later stamp, moved by odometry's step (3,) since; less certain by its drift."""
     pose = se2.compose(fix.map_from_base, base_from_later)
     dx, dy = pose[:2] - fix.map_from_base[:2]
-    by_fix = np.array([[1.0, 0.0, -dy], [0.0, 1.0, dx], [0.0, 0.0, 1.0]])  # an error of the heading swings the way
+    by_fix = np.array([[1.0, 0.0, -dy], [0.0, 1.0, dx], [0.0, 0.0, 1.0]])  # an error of the heading swings the step
     way_m, turn_rad = float(np.hypot(dx, dy)), abs(float(angles.wrap(base_from_later[2])))
     heading = drift.bearing_drift_rad_per_m * way_m + drift.bearing_drift_per_rad * turn_rad
     more = np.diag(np.square([drift.bearing_drift_per_m * way_m] * 2 + [heading]))
@@ -306,7 +306,7 @@ def _without_one(
     misfit: np.ndarray,
     limits: TriangulationLimits,
 ) -> Fix:
-    """Leave one bearing out, if there is only one place to be found that way."""
+    """Leave one bearing out, if that leaves only one place."""
     rivals: List[Tuple[_Fit, np.ndarray]] = []
     open_ids: List[str] = []  # of which the others leave the place open: they cannot be cleared, nor convicted
     for number, name in enumerate(bearings.ids):
@@ -353,12 +353,12 @@ def _objection(
     x, y = fit.pose[:2]
     if hidden.any():
         number = int(np.argmax(hidden))
-        way = -bearing_model.lines_of_sight(seen, fit.pose)[number]
-        off = np.abs(angles.wrap(np.arctan2(way[1], way[0]) - landmarks.facing_rad[seen.number[number]]))
+        sight_m = -bearing_model.lines_of_sight(seen, fit.pose)[number]
+        off = np.abs(angles.wrap(np.arctan2(sight_m[1], sight_m[0]) - landmarks.facing_rad[seen.number[number]]))
         aside = "" if np.isnan(off) else f" and {np.degrees(off):.0f} degrees off its direction"
         return (
             f"the bearings of {_listed(bearings.ids)} lead to x {x:.2f} m, y {y:.2f} m, from where "
-            f"{bearings.ids[number]} cannot be seen: it would be {np.hypot(*way):.1f} m away{aside}"
+            f"{bearings.ids[number]} cannot be seen: it would be {np.hypot(*sight_m):.1f} m away{aside}"
         )
     sigma_m = float(np.sqrt(max(_largest(fit.covariance[:2, :2]), 0.0)))
     if not sigma_m <= limits.max_position_sigma_m:

@@ -3,7 +3,7 @@
 Seed document segment_localization.txt, after MacKenzie and Dudek, Precise positioning using model-based maps (ICRA
 1994). Each end point of a beam belongs to the segment nearest to it; it pulls the robot across that segment's line,
 the nearer the harder, and the neighbourhood c in which points have a say shrinks: c(t) = c(0) (1 - t / T). The
-document's formulas are lost in the transcript; the sigmoid c^m / (d^m + c^m) with m = 2 is told in words.
+document's formulas are lost in the transcript; the sigmoid c^m / (d^m + c^m) with m = 2 is given in words.
 
 `method: document` moves by the weighted mean of the perpendicular displacements, all points together. How to correct
 the orientation the document only asks; ours (`correct_orientation`) turns the robot after each move by the weighted
@@ -37,7 +37,7 @@ class SegmentCorrectionParams:
     iterations: int = 15  # T
     correct_orientation: bool = True
     least_constraint: float = 0.01  # share of the points' pull in a direction, below which it is left alone
-    outlier_m: float = 0.15  # a point further from its segment is none of the walls'
+    outlier_m: float = 0.15  # a point further from its segment belongs to no wall
     fit_scale_m: float = 0.05  # s: root of Emse that halves the combined quality
 
     def __post_init__(self) -> None:
@@ -72,15 +72,15 @@ class SegmentCorrection:
     before: SegmentQuality  # at the pose given
     after: SegmentQuality  # at the corrected one
     free: np.ndarray  # (K, 3) orthonormal directions of x [m], y [m], yaw [lever m] that no segment constrains
-    lever_m: float  # length that makes of yaw a way, for free; 0: no points
+    lever_m: float  # length that turns yaw into a distance, for free; 0: no points
 
     @property
     def free_heading_rad(self) -> Optional[float]:
         """Along which direction of the map the position is not constrained, in [0, pi); None: no or every direction."""
-        ways = self.free[:, :2]
-        if len(self.free) != 1 or float(np.hypot(*ways[0])) < 0.5:
+        shifts = self.free[:, :2]
+        if len(self.free) != 1 or float(np.hypot(*shifts[0])) < 0.5:
             return None
-        return float(np.mod(np.arctan2(ways[0, 1], ways[0, 0]), np.pi))
+        return float(np.mod(np.arctan2(shifts[0, 1], shifts[0, 0]), np.pi))
 
 
 class SegmentCorrector:

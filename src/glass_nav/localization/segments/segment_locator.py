@@ -1,10 +1,10 @@
-"""One scan, rough pose -> corrected pose, by the beams that ended at walls: segments and cases take turns.
+"""One scan, rough pose -> corrected pose, by the beams that ended at walls: segments and cases alternate.
 
-What a beam met is told at a pose (case_votes.py), and the pose is corrected by beams whose case is known
-(segment_correction.py), so each needs the other. First all beams pull, from the rough pose and others around it, and
-the end where most points lie near walls counts; then only those of case 1, 3 and 4 pull, told anew at each pose that
-this leads to. A mirrored beam (2) or one that is not understood (0) ends nowhere on the map and must
-not pull; one that passed panes pulls on the wall behind. Unlike the particle filter this remembers no glass. B beams.
+Beams are classified at a pose (case_votes.py), and a pose is corrected by beams of known case (segment_correction.py),
+so each needs the other. First all beams pull, from the rough pose and others around it, and the result with the most
+points near walls counts. Then only beams of case 1, 3 and 4 pull, classified anew at each corrected pose. A mirrored
+(2) or uncertain beam (0) ends nowhere on the map and must not pull; one that passed panes pulls on the wall behind.
+Unlike the particle filter this learns no glass. B beams.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import numpy as np
 from geometry_msgs.msg import Pose, Quaternion, Vector3
 from visualization_msgs.msg import Marker, MarkerArray
 
-from glass_nav.driving.edge_driver import EdgeDriver
+from glass_nav.driving.edge_tracking.edge_driver import EdgeDriver
 from glass_nav.geometry import se2
 from glass_nav.ros import conversions
 from glass_nav.ros.packed_markers import PackedMarkerArray, colour, points_marker

@@ -9,7 +9,7 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped, Twist
 
 from glass_nav.driving.decisions import DriveStatus, GoalEnd
-from glass_nav.driving.edge_driver import Arrival
+from glass_nav.driving.edge_tracking.edge_driver import Arrival
 from glass_nav.driving.place_goals import PlaceGoal
 from glass_nav.msg import DriverStatus, GotoNodeGoal, GotoNodeResult, TopologyStatus, TraverseEdgeResult
 from glass_nav.msg import EdgeTraversal as EdgeTraversalMsg

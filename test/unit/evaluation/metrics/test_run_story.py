@@ -60,8 +60,8 @@ def test_a_good_run_is_told_as_one():
     assert (story.grade, story.headline) == ("good", "The robot knew where it was, and it was right")
     assert story.sentences == [
         "It drove 99 m in 1 min 39 s and used 100 scans (1 more were rejected).",
-        "Half of its poses were within 2.0 cm and 0.0° of the ground truth, 95 % within 2.0 cm; it was never more than "
-        "2.0 cm off.",
+        "Half of its poses were within 2.0 cm and 0.0° of the ground truth, 95 % within 2.0 cm; the error never "
+        "exceeded 2.0 cm.",
         "It never doubted its pose.",
     ]
     assert [(each.name, each.value) for each in story.figures] == [

@@ -28,7 +28,7 @@ def test_points_are_free_apart_and_clear_of_walls():
     points = landmark_planning.points(room(), 0.5)
     assert (points.min(axis=0) > [1.3, 2.3]).all() and (points.max(axis=0) < [12.7, 9.7]).all()
     assert np.unique(np.round(np.diff(np.unique(points[:, 0])), 6)).tolist() == [0.5]
-    with pytest.raises(ValueError, match="^the map has no free place 0.25 m away from walls, looked for every 0.5 m$"):
+    with pytest.raises(ValueError, match="^the map has no free place 0.25 m away from walls, searched every 0.5 m$"):
         landmark_planning.points(room(4, 4), 0.5)
 
 

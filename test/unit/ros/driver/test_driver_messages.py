@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from glass_nav.driving.decisions import Action, DriveStatus, GoalEnd
-from glass_nav.driving.edge_driver import Arrival
+from glass_nav.driving.edge_tracking.edge_driver import Arrival
 from glass_nav.driving.tasks import Ending
 from glass_nav.msg import DriverStatus, GotoNodeGoal, TopologyStatus
 from glass_nav.msg import Meetpoint as MeetpointMsg

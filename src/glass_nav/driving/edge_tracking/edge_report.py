@@ -12,7 +12,7 @@ from typing import List, Sequence
 
 import numpy as np
 
-from glass_nav.driving.local_graph import Branch
+from glass_nav.driving.edge_tracking.local_graph import Branch
 from glass_nav.geometry import angles, se2, segments
 from glass_nav.topology.atlas import atlas_builder
 from glass_nav.topology.atlas.edge_views import EdgeViews, ViewParams

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from made_buildings import scan_at, t_corridor
 
-from glass_nav.driving.local_map import LocalMap, LocalMapParams
-from glass_nav.driving.local_pose import LocalPose
+from glass_nav.driving.edge_tracking.local_map import LocalMap, LocalMapParams
+from glass_nav.driving.edge_tracking.local_pose import LocalPose
 from glass_nav.geometry import angles, se2
 from glass_nav.sensing.scan import Scan
 

@@ -17,10 +17,10 @@ from typing import Dict, List, Optional
 
 import numpy as np
 
-from glass_nav.driving import edge_report, local_graph
-from glass_nav.driving.local_graph import LocalGraph
-from glass_nav.driving.local_map import LocalMap, LocalMapParams
-from glass_nav.driving.local_pose import LocalPose
+from glass_nav.driving.edge_tracking import edge_report, local_graph
+from glass_nav.driving.edge_tracking.local_graph import LocalGraph
+from glass_nav.driving.edge_tracking.local_map import LocalMap, LocalMapParams
+from glass_nav.driving.edge_tracking.local_pose import LocalPose
 from glass_nav.geometry import se2
 from glass_nav.sensing.scan import Scan
 from glass_nav.topology.atlas.voronoi_graph import VoronoiParams

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from made_buildings import CONTROL_S, T_MEETPOINT, T_R_M, Drive, glass_t, t_corridor, turned_to, walled
 
-from glass_nav.driving import edge_driver
-from glass_nav.driving.edge_driver import EdgeDriver
+from glass_nav.driving.edge_tracking import edge_driver
+from glass_nav.driving.edge_tracking.edge_driver import EdgeDriver
 from glass_nav.geometry import se2
 from glass_nav.simulation import building_file, lidar, shipped_buildings
 from glass_nav.simulation.building import Building, Pane, Thing, box

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from made_buildings import scan_at, walled
 
-from glass_nav.driving.local_map import LocalMap, LocalMapParams
+from glass_nav.driving.edge_tracking.local_map import LocalMap, LocalMapParams
 from glass_nav.sensing.scan import Scan
 from glass_nav.simulation.building import Building, Pane, Person, Wall, box
 from glass_nav.simulation.lidar import LidarModel

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from glass_nav.driving.local_map import LocalMapParams
-from glass_nav.driving.passing import PassedNode, PassingObserver, PassingParams
+from glass_nav.driving.edge_tracking.local_map import LocalMapParams
+from glass_nav.driving.edge_tracking.passing import PassedNode, PassingObserver, PassingParams
 from glass_nav.geometry import se2
 from glass_nav.simulation import lidar
 from glass_nav.simulation.building import Building, Pane, Wall

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from drawn_floors import floor
 
-from glass_nav.driving.local_graph import LocalGraph, direction_at_end
+from glass_nav.driving.edge_tracking.local_graph import LocalGraph, direction_at_end
 from glass_nav.topology.atlas.voronoi_graph import VoronoiParams
 
 W = 2.0

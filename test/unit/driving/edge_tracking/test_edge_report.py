@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from drawn_floors import floor
 
-from glass_nav.driving import edge_report
-from glass_nav.driving.edge_report import Node, Trace
-from glass_nav.driving.local_graph import Branch
+from glass_nav.driving.edge_tracking import edge_report
+from glass_nav.driving.edge_tracking.edge_report import Node, Trace
+from glass_nav.driving.edge_tracking.local_graph import Branch
 from glass_nav.geometry import se2
 from glass_nav.topology.atlas import atlas_builder
 from glass_nav.world.grid_map import GridMap

@@ -1,0 +1,105 @@
+"""Scans, odometry -> the map and the Voronoi graph around the robot, its pose in them, and what it may run into.
+
+All is in the frame local: odom without its drift, see local_pose.py.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Optional
+
+import numpy as np
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from glass_nav.driving.edge_tracking import local_graph
+from glass_nav.driving.edge_tracking.local_graph import LocalGraph
+from glass_nav.driving.edge_tracking.local_map import LocalMap, LocalMapParams
+from glass_nav.driving.edge_tracking.local_pose import LocalPose
+from glass_nav.geometry import se2
+from glass_nav.sensing.scan import Scan
+from glass_nav.topology.atlas.voronoi_graph import VoronoiParams
+from glass_nav.world.grid_map import GridMap
+
+_GRAPH_PERIOD_NS = 300_000_000  # between two graphs
+_SEEN_M = 0.12  # a wall of the map beside a point of the scan is the same
+_NEAR_M = 2.0  # obstacles further away are not braked for
+
+
+class Surroundings:
+    """Take in every scan by see(); renew the graph, or only the walls, whenever is_due."""
+
+    def __init__(self, map_params: LocalMapParams, graph_params: VoronoiParams) -> None:
+        self._map, self._at = LocalMap(map_params), LocalPose()
+        self._graph_params = local_graph.params_beside(graph_params)
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._map.clear()
+        self._at.clear()
+        self.grid: Optional[GridMap] = None  # the last map; None before the first
+        self.graph: Optional[LocalGraph] = None  # of that map
+        self.scans = 0  # so many were seen
+        self.scan: Optional[Scan] = None  # the last one
+        self.pose = np.zeros(3)  # at that scan
+        self.stamp_ns = 0
+        self._renewed_ns = 0
+        self._points_m = np.zeros((0, 2))  # of the last scan
+        self._walls_m = np.zeros((0, 2))  # of the map near the robot
+
+    def see(self, scan: Scan, odom_from_base: np.ndarray) -> None:
+        """Take in a scan, with odometry's pose (3,) at its stamp."""
+        self.pose, self.stamp_ns = self._at.correct(scan, odom_from_base), scan.stamp_ns
+        self._map.add(scan, self.pose)
+        self.scans += 1
+        self.scan = scan
+        self._points_m = _steady_points(scan, self.pose)
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the next graph is."""
+        return self.stamp_ns - self._renewed_ns >= _GRAPH_PERIOD_NS
+
+    def renew_graph(self) -> LocalGraph:
+        """The graph as it is seen now."""
+        self.grid = self._map.grid_around(self.pose[:2])
+        self.graph = LocalGraph(self.grid, self._graph_params)
+        self._renewed_ns = self.stamp_ns
+        self._at.know(self._map.walls())
+        self._note_walls(self.grid)
+        return self.graph
+
+    def renew_walls(self) -> None:
+        """Only the walls: no graph is needed now."""
+        self._renewed_ns = self.stamp_ns
+        walls = self._map.walls()
+        self._at.know(walls)
+        self._note_walls(walls)
+
+    def _note_walls(self, grid: GridMap) -> None:
+        reach = int(_NEAR_M / grid.resolution_m)
+        row, column = (int(index) for index in grid.cells(self.pose[:2]))
+        top, left = max(row - reach, 0), max(column - reach, 0)
+        rows, columns = np.nonzero(grid.occupied[top : row + reach, left : column + reach])
+        self._walls_m = grid.centres(rows + top, columns + left)
+
+    def local_from_base(self, odom_from_base: np.ndarray) -> np.ndarray:
+        """(3,) pose of the robot where odometry has it at that pose (3,)."""
+        return self._at.now(odom_from_base)
+
+    def obstacles_m(self, pose: np.ndarray) -> np.ndarray:
+        """(K, 2) what stands near the robot at a pose (3,), in its frame: the last scan, the walls of the map."""
+        points, walls = (
+            among[np.abs(among - pose[:2]).max(axis=1) < _NEAR_M] for among in (self._points_m, self._walls_m)
+        )
+        if len(points) and len(walls):  # what the scan shows now it shows better than the cells do
+            walls = walls[cKDTree(points).query(walls, distance_upper_bound=_SEEN_M)[0] > _SEEN_M]
+        return se2.transform_points(se2.inverse(pose), np.concatenate([points, walls]))
+
+
+def _steady_points(scan: Scan, local_from_base: np.ndarray) -> np.ndarray:
+    """(K, 2) end points of the beams, without single ones that stick out."""
+    ranges_m = np.where(scan.answered, scan.ranges_m, np.inf)
+    points = replace(scan, ranges_m=ndimage.median_filter(ranges_m, 3, mode="nearest")).points_in_base()
+    return se2.transform_points(local_from_base, points[np.isfinite(points).all(axis=1)])
