@@ -53,13 +53,13 @@ def main(arguments: argparse.Namespace) -> None:
     """
     params = search_params.load(arguments.params)
     path = shipped_atlases.find(arguments.atlas)
-    atlas = atlas_file.load(path)
+    atlas, warning = atlas_file.load(path), ""
     if arguments.map is not None:
         try:
-            atlas.refuse_other_map(map_file.load(arguments.map).fingerprint, str(arguments.map))
+            warning = atlas.check_map(map_file.load(arguments.map), str(arguments.map))
         except AtlasError as err:
             raise AtlasError(f"{path}: {err}") from err
-    print(f"{path}: in order")
+    print(f"{path}: in order" + (f", but it {warning}" if warning else ""))
     for line in summary(atlas):
         print(f"  {line}")
     count = len(atlas.darts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import signal
 import sys
 import threading
@@ -30,21 +31,32 @@ def refuse_to_start(err: Exception, exit_code: int = 2) -> NoReturn:
     sys.exit(exit_code)
 
 
+def core_logs_to_rosout() -> None:
+    """What the core says by its loggers goes where rospy's lines go."""
+    core_log = logging.getLogger("glass_nav")
+    core_log.handlers = logging.getLogger("rosout").handlers
+    core_log.setLevel(logging.INFO)
+    core_log.propagate = False
+
+
 def run_node(name: str, make: Callable[[Dict[str, Any]], Any], bad_input: Tuple[Type[Exception], ...] = ()) -> None:
     """Start a node and run it until it is told to end.
 
     Args:
         name: of the node, unless it is renamed.
         make: the node from its private parameters, as they are given; ValueError ends it with exit code 2.
-        bad_input: exceptions of make() that end it with exit code 3.
+        bad_input: exceptions of make() and of its run() that end it with exit code 3.
     """
     rospy.init_node(name, disable_signals=True)
     ending = event_on_signals()
+    core_logs_to_rosout()
     try:
         node = make(rospy.get_param("~", {}))
     except (ValueError, *bad_input) as err:
         refuse_to_start(err, 3 if isinstance(err, bad_input) else 2)
     try:
         node.run(ending)
+    except bad_input as err:
+        refuse_to_start(err, 3)
     finally:
         rospy.signal_shutdown("ended")

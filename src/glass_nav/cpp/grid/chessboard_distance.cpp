@@ -13,7 +13,7 @@ std::vector<std::uint8_t> squares(const std::vector<std::uint8_t>& blocked, int 
                                   bool minus_y) {
   std::vector<std::uint8_t> edge(blocked.size());
   const std::vector<std::uint8_t> outside(width, kMost);
-  const std::uint8_t* ahead = outside.data();  // the row that is nearer to the border the ray runs to
+  const std::uint8_t* ahead = outside.data();  // the row nearer to the border that the ray runs to
   for (int i = 0; i < height; ++i) {
     const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(minus_y ? i : height - 1 - i) * width;
     int next = kMost, diagonal = kMost;

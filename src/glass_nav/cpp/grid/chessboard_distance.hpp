@@ -1,4 +1,4 @@
-/// How far a ray may leap from each cell of a grid.
+/// How far a ray may skip ahead from each cell of a grid.
 #pragma once
 
 #include <array>
@@ -9,8 +9,8 @@ namespace glass_nav {
 
 /// Edge of the largest free square that starts in each cell and spreads in the direction of a ray.
 ///
-/// That is the chessboard distance to the nearest blocked cell, of those alone that lie ahead: a ray runs within one
-/// quadrant and never meets what is beside or behind it, and past a wall it leaps about twice as far. One byte per cell
+/// That is the chessboard distance to the nearest blocked cell among those that lie ahead: a ray stays within one
+/// quadrant and never meets what is beside or behind it, so past a wall it skips about twice as far. One byte per cell
 /// and quadrant: 0 blocked, 255 means 255 or more. Outside the grid nothing is blocked.
 class ChessboardDistance {
  public:

@@ -1,4 +1,4 @@
-/// The first occupied cell on each of many rays: the short way for the plain case.
+/// The first occupied cell on each of many rays: the fast path for the plain case.
 #pragma once
 
 #include <algorithm>
@@ -13,15 +13,15 @@
 
 namespace glass_nav {
 
-/// Leaps as ExactRayMarcher does and finds the same, bit for bit, with a fraction of the arithmetic and of the state.
+/// Skips ahead as ExactRayMarcher does, with the same result to the last bit but a fraction of the arithmetic and
+/// state.
 ///
-/// It may be that short because it decides only what is beyond doubt: rays that start in the grid and come to no corner
-/// between cells. A ray that crosses two grid lines within a ten-millionth of a cell is begun anew as a GridWalk, which
-/// knows about corners.
+/// It handles only the clear case: rays that start in the grid and pass no corner between cells. A ray that crosses two
+/// grid lines within a ten-millionth of a cell starts again as a GridWalk, which handles corners.
 ///
-/// Coordinates are fixed-point, with kPointBits bits behind the point: the cell is what is before the point, and the
-/// bits behind it tell whether a grid line is near. They are kNudge too large, so that a coordinate which has just
-/// crossed a line is always beyond it, whatever the rounding.
+/// Coordinates are fixed-point numbers with kPointBits fractional bits: the integer part is the cell, the fraction
+/// tells whether a grid line is near. They are kNudge too large, so that a coordinate that has just crossed a line is
+/// always beyond it, whatever the rounding.
 class FirstHits {
  public:
   explicit FirstHits(const GridCells& cells)
@@ -60,7 +60,7 @@ class FirstHits {
         } else {
           found(lane.index, lane.t, step == Step::hit ? static_cast<std::int32_t>(lane.cell) : -1);
         }
-        if (!fill(lane)) lane = lanes[--busy];  // its turn comes in the next round
+        if (!fill(lane)) lane = lanes[--busy];  // it is processed in the next round
       }
     }
     decide(doubtful, t_max, found);
@@ -80,7 +80,7 @@ class FirstHits {
     std::size_t index;
   };
 
-  /// One coordinate of an origin: as it is, for rays towards +, and turned over, for those towards -.
+  /// One coordinate of an origin: as it is for rays towards +, mirrored for those towards -.
   struct AxisOrigin {
     AxisOrigin() = default;
     AxisOrigin(double origin, int size)
@@ -92,10 +92,10 @@ class FirstHits {
 
   struct Origin {
     AxisOrigin x, y;
-    bool plain = false;  // otherwise rays from here are left to GridWalk
+    bool plain = false;  // otherwise GridWalk follows the rays from here
   };
 
-  /// One coordinate of a ray, turned over so that it never decreases; its t are those of GridWalk to the last bit.
+  /// One coordinate of a ray, mirrored so that it never decreases; its t are those of GridWalk to the last bit.
   struct Axis {
     void begin(const AxisOrigin& origin, double direction, bool turned) {
       const double absolute = std::abs(direction);
@@ -123,7 +123,7 @@ class FirstHits {
     double t;  // where the ray entered the present cell
     const std::uint8_t* free_square;
     std::ptrdiff_t cell;                    // flat index of the present cell
-    std::ptrdiff_t cell_0, step_x, step_y;  // that of the cell which is (0, 0) after turning over, and from it on
+    std::ptrdiff_t cell_0, step_x, step_y;  // that of the cell which is (0, 0) after mirroring, and steps from it
     std::size_t index;
     Ray ray;
   };
@@ -144,7 +144,7 @@ class FirstHits {
     lane.t = 0.0;
     lane.free_square = cells_.chessboard_distance->towards(minus_x, minus_y);
     lane.cell = origin.y.cell[0] * width + origin.x.cell[0];
-    // Products, not branches: the signs of directions are as good as random.
+    // Products, not branches: the signs of directions are unpredictable.
     lane.cell_0 = minus_x * (width - 1) + minus_y * (height - 1) * width;
     lane.step_x = 1 - 2 * minus_x;
     lane.step_y = (1 - 2 * minus_y) * width;
@@ -152,7 +152,7 @@ class FirstHits {
     lane.ray = ray;
   }
 
-  /// Looks at the present cell and leaps on.
+  /// Checks the present cell and skips ahead.
   Step advance(Lane& lane, double t_max) const {
     const int edge = lane.free_square[lane.cell];
     if (edge == 0) return cells_.occupied(static_cast<std::int32_t>(lane.cell)) ? Step::hit : Step::end;

@@ -17,7 +17,7 @@
 namespace glass_nav {
 
 enum class Backend {
-  exact,  // leaps from free square to free square, exact to the cell boundary
+  exact,  // skips from free square to free square, exact to the cell boundary
   mrpt,   // COccupancyGridMap2D::simulateScanRay says where to look; see MrptRayMarcher
 };
 
@@ -34,11 +34,11 @@ struct RayBatch {
   int threads;  // 1: the caller's thread, no OpenMP
 };
 
-/// What ends a surface, and what is taken for one.
+/// What counts as one surface, and where it ends.
 struct SurfaceLimits {
   double max_thickness_m;  // along the normal; a thicker run ends the ray
   double min_linearity;    // below it a cell has no normal
-  double min_gap_m;        // a shorter free gap on the ray does not part two surfaces
+  double min_gap_m;        // a shorter free gap on the ray does not separate two surfaces
 };
 
 /// Where the results of cast_surfaces go: arrays of pose_count * angle_count.
@@ -48,12 +48,12 @@ struct SurfaceArrays {
   double* thickness_m[2];       // of the first and the second; inf where the ray was not followed through
   double* normal_rad;           // of the first, facing the origin of the ray; NaN where none
   double* linearity;            // of the first
-  double* mirrored_m;           // path by way of the first surface; inf where none
+  double* mirrored_m;           // path mirrored at the first surface; inf where none
   std::int32_t* mirrored_cell;  // where that ends; -1 where none
 };
 
-/// Where the results of cast_paths go: arrays of pose_count * angle_count for each way that a beam may take: to the
-/// first surface, mirrored there, and to the second and the third.
+/// Where the results of cast_paths go: arrays of pose_count * angle_count for each path that a beam may take: to the
+/// first surface, mirrored there, and to the second and third.
 struct PathArrays {
   double* range_m[4];     // whole length; inf where none
   double* cos[4];         // of the incidence where it ends; 1 without a normal
@@ -64,7 +64,7 @@ struct PathArrays {
 class GridRaycaster {
  public:
   /// @param occupancy  height * width, row by row, 0 .. 100 percent or -1 unknown
-  /// @param occupied_percent  from here on a cell ends a beam
+  /// @param occupied_percent  a cell this occupied ends a beam
   /// @param unknown_stops  a ray ends, without a hit, at the first unknown cell; otherwise it passes
   GridRaycaster(const std::int8_t* occupancy, int height, int width, double resolution_m, int occupied_percent,
                 Backend backend, bool unknown_stops);
@@ -83,7 +83,7 @@ class GridRaycaster {
   void cast_paths(const RayBatch& batch, const double* reach_m, const SurfaceLimits& limits,
                   const PathArrays& out) const;
 
-  /// What simulateScanRay itself answers, faults included, asked to look to max_range_m: for comparison only.
+  /// What simulateScanRay itself answers up to max_range_m, faults included: for comparison only.
   void simulate_scan_ray_raw(const RayBatch& batch, double* range_m) const;
 
   /// Computed when first asked for; any thread may ask.

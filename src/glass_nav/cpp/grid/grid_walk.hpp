@@ -1,4 +1,4 @@
-/// One ray on its way through the cells of a grid.
+/// One ray on its path through the cells of a grid.
 #pragma once
 
 #include <algorithm>
@@ -16,9 +16,9 @@ struct Ray {
 
 /// The walk of one ray from cell to cell.
 ///
-/// The axes are turned over where needed so that every ray runs towards +x and +y; `cell()` turns back. The place on
-/// the ray is kept as the cell entered (whole numbers) and the exact parameter t at which the ray crossed into it:
-/// nothing is summed up, so a walk of ten thousand cells is as exact as its first step.
+/// The axes are mirrored where needed so that every ray runs towards +x and +y; `cell()` mirrors back. The position on
+/// the ray is kept as the cell entered (integers) and the exact parameter t at which the ray crossed into it: nothing
+/// accumulates, so a walk of ten thousand cells is as exact as its first step.
 class GridWalk {
  public:
   // Two crossings this close [cells] are one corner: far above the rounding of the sums that place a pose on a map
@@ -29,7 +29,7 @@ class GridWalk {
 
   GridWalk() : GridWalk({0.0, 0.0, 1.0, 0.0}, 1, 1, 0.0) {}  // to be assigned to
 
-  /// Stands in the cell of the origin, or, if that is outside the grid, in the first cell that the ray enters.
+  /// Starts in the cell of the origin, or, if that is outside the grid, in the first cell that the ray enters.
   GridWalk(const Ray& ray, int width, int height, double t_max)
       : x_axis_(ray.x, ray.dx, width), y_axis_(ray.y, ray.dy, height), t_max_(t_max) {
     cell_ = (x_axis_.turned ? width - 1 : 0) + (y_axis_.turned ? (height - 1) * width : 0);
@@ -55,12 +55,12 @@ class GridWalk {
 
   /// Goes on to the first cell beyond the square of `cells` that starts in the present one and lies ahead.
   ///
-  /// What is in the square must be of no interest; 1 steps into the very next cell.
+  /// The square must hold nothing of interest; 1 steps into the very next cell.
   void leap(int cells) {
     const double tx = x_axis_.crossing(x_axis_.cell + cells);
     const double ty = y_axis_.crossing(y_axis_.cell + cells);
-    // Which axis is crossed first is as good as random: a branch on it would be guessed wrong every other time, so
-    // both coordinates go the same way and only their bounds differ.
+    // Which axis is crossed first is unpredictable: a branch on it would be mispredicted half of the time, so both
+    // coordinates take the same code and only their bounds differ.
     t_ = std::min(tx, ty);
     crossed_x_ = tx < ty;
     const double off_x = x_axis_.follow(t_, cells, crossed_x_);
@@ -83,7 +83,7 @@ class GridWalk {
   }
 
  private:
-  /// One coordinate of the walk, turned over so that it never decreases.
+  /// One coordinate of the walk, mirrored so that it never decreases.
   struct Axis {
     Axis(double origin, double direction, int cells) : size(cells) {
       if (std::abs(direction) < kAxisParallel) direction = 0.0;
@@ -102,7 +102,7 @@ class GridWalk {
     double crossing(int ahead) const { return (ahead - start) * per_speed; }
 
     /// Goes to the cell at t, which is `cells` ahead if that boundary is the one crossed, and nearer otherwise:
-    /// rounding has no say in it. Returns how far the coordinate is from the nearest boundary [cells]; 1 and more if
+    /// rounding does not matter. Returns how far the coordinate is from the nearest boundary [cells]; 1 and more if
     /// crossed.
     double follow(double t, int cells, int crossed) {
       const double coordinate = start + t * speed;
@@ -155,7 +155,7 @@ class GridWalk {
   double t_max_;
   double t_ = 0.0;
   double off_boundary_ = 1.0;  // distance from the nearest corner of the cell where it was entered
-  std::int32_t cell_;          // flat index of the cell that is (0, 0) after turning over
+  std::int32_t cell_;          // flat index of the cell that is (0, 0) after mirroring
   std::int32_t step_x_, step_y_;
   bool crossed_x_ = false;
 };

@@ -29,7 +29,7 @@ struct GridCells {
     return chessboard_distance->towards(false, false)[cell] == 0 && !occupied(cell);
   }
 
-  /// The occupied cell that the ray meets where the walk stands: its own or one beside the corner; -1 none. Where the
+  /// The occupied cell that the ray meets at the present step: its own or one beside the corner; -1 none. Where the
   /// ray leaves the grid at a corner there is still one beside it.
   template <class Ignored>
   std::int32_t met(const GridWalk& walk, const Ignored& ignored) const {
@@ -46,21 +46,21 @@ struct Search {
   GridWalk walk;
 };
 
-/// For rays that take every occupied cell as it comes.
+/// For rays that ignore no occupied cell.
 struct NothingIgnored {
   bool operator()(std::int32_t) const { return false; }
   bool operator()(std::size_t, std::int32_t) const { return false; }
 };
 
-/// Leaps from free square to free square; exact.
+/// Skips from free square to free square; exact.
 class ExactRayMarcher {
  public:
   explicit ExactRayMarcher(const GridCells& cells) : cells_(cells) {}
 
   /// Walks on along many rays, each to the next occupied cell that is not ignored.
   ///
-  /// Several at a time: while one waits for the cell it leapt to to come from memory, the others go on. Half as long
-  /// for scattered poses as one ray after the other.
+  /// Several at a time: while one waits for its next cell to come from memory, the others go on. For scattered poses
+  /// this takes half as long as one ray after the other.
   ///
   /// @param start    start(i), called once for every i < count in order: the Search to go on with
   /// @param ignored  ignored(i, cell): cells that ray i passes
@@ -80,19 +80,19 @@ class ExactRayMarcher {
         Lane& lane = lanes[i];
         const std::int32_t met =
             step(lane.walk, lane.free_square, [&](std::int32_t cell) { return ignored(lane.ray, cell); });
-        if (met == kOnTheWay) continue;
+        if (met == kContinues) continue;
         found(lane.ray, lane.walk, met);
         if (next < count) {
           fill(lane);
         } else {
-          lane = lanes[--busy];  // its turn comes in the next round
+          lane = lanes[--busy];  // it is processed in the next round
         }
       }
     }
   }
 
  private:
-  static constexpr std::int32_t kOnTheWay = -2;
+  static constexpr std::int32_t kContinues = -2;
   static constexpr std::size_t kLanes = 16;
 
   struct Lane {
@@ -101,7 +101,7 @@ class ExactRayMarcher {
     std::size_t ray = 0;
   };
 
-  /// Looks at the present cell and leaps on. Returns the cell met, -1 where the ray ends, or kOnTheWay.
+  /// Checks the present cell and skips ahead. Returns the cell met, -1 where the ray ends, or kContinues.
   template <class Ignored>
   std::int32_t step(GridWalk& walk, const std::uint8_t* free_square, const Ignored& ignored) const {
     if (!walk.inside()) return cells_.met(walk, ignored);
@@ -113,19 +113,20 @@ class ExactRayMarcher {
     }
     walk.leap(std::max(edge, 1));
     __builtin_prefetch(free_square + walk.cell());  // may lie outside: a prefetch does not fault
-    return kOnTheWay;
+    return kContinues;
   }
 
   GridCells cells_;
 };
 
-/// Asks simulateScanRay how far it is free, then looks at the cells on the way itself.
+/// Asks simulateScanRay how far the ray is free, then checks the cells on the path itself.
 ///
-/// What simulateScanRay (MRPT 2.1 to 2.14) does wrong, and what happens here:
+/// Faults of simulateScanRay (MRPT 2.1 to 2.14), and their remedies here:
 /// - it samples every 0.8 cell and reports the sample, up to 0.8 cell late: the walk gives the cell boundary;
 /// - between two samples it slips through corners of cells, and so through thin walls: the walk visits every cell up
 ///   to the reported range;
-/// - its steps are rounded to 1/1024 cell, so long rays drift aside and hit what the true ray passes: if the walk finds
+/// - its steps are rounded to 1/1024 cell, so long rays drift sideways and hit what the true ray passes: if the walk
+/// finds
 ///   nothing where it reported a hit, it is asked again from there on;
 /// - it makes max_range / resolution steps, so it stops at 0.8 max_range: it is given 1 / 0.8 of the range;
 /// - with a threshold of 0.5 an unknown cell ends the ray as invalid: unknown cells pass its threshold here, and the

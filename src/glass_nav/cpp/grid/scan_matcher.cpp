@@ -40,7 +40,7 @@ std::int32_t ScanMatcher::sum(const Pooled& scores, const std::vector<Offset>& p
   return total;
 }
 
-/// The best position in the square, if it is better than `best` is; what cannot be is not looked at.
+/// The best position in the square, if it is better than `best` is; a square whose bound is lower is skipped.
 void ScanMatcher::descend(const std::vector<Offset>& points, const Square& square, int level, Square& best) const {
   if (level == 0) {
     if (square.bound > best.bound) best = square;

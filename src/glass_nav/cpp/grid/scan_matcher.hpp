@@ -1,4 +1,4 @@
-/// Where on a grid, and turned how, do the end points of a scan lie best? Everywhere is looked at, by branch and bound.
+/// At which position and heading on a grid do the end points of a scan fit best? All are searched, by branch and bound.
 #pragma once
 
 #include <array>
@@ -15,8 +15,8 @@ struct Match {
 };
 
 /// Correlative scan matching after Olson (2009), with the bounds of Hess, Kohler, Rapp, Andor (2016): the score of a
-/// square of positions is at most that of the best cells which its points can reach. Unlike there, not one best
-/// place is wanted but many different ones: each square of kBlock cells gives its best position for each heading.
+/// square of positions is at most that of the best cells which its points can reach. Unlike there, the result
+/// is not one best place but many different ones: each square of kBlock cells gives its best position for each heading.
 class ScanMatcher {
  public:
   static constexpr int kLevels = 3;
@@ -33,7 +33,8 @@ class ScanMatcher {
                             std::size_t heading_count, std::size_t keep) const;
 
  private:
-  /// Best value in the squares of 2^level cells that start at each cell, those over the left and lower border too.
+  /// Best value in the squares of 2^level cells that start at each cell, including those across the left and lower
+  /// border.
   struct Pooled {
     int width = 0, height = 0, border = 0;
     std::vector<std::uint8_t> best;
@@ -53,7 +54,7 @@ class ScanMatcher {
     std::int32_t bound;  // of the summed scores within
     std::int32_t heading, row, column;
 
-    bool operator<(const Square& other) const {  // equal bounds: the order in which they were made
+    bool operator<(const Square& other) const {  // equal bounds: in the order of creation
       if (bound != other.bound) return bound < other.bound;
       if (heading != other.heading) return heading > other.heading;
       if (row != other.row) return row > other.row;

@@ -21,7 +21,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 struct SurfaceRules {
   double max_thickness;  // along the normal; a thicker run ends the ray
   double min_linearity;  // below it a cell has no normal
-  double min_gap;        // a shorter free gap on the ray does not part two surfaces
+  double min_gap;        // a shorter free gap on the ray does not separate two surfaces
 };
 
 struct Surfaces {
@@ -64,12 +64,12 @@ class SurfaceFinder {
     for (std::size_t k = 0; k < 3 && !going.empty(); ++k) {
       seek_surface(k, going, searches, surfaces);
       if (k == 0) mirror(going, searches, surfaces);
-      if (k < 2) pass_surface(k, going, searches, surfaces);  // what is behind the third is nobody's business
+      if (k < 2) pass_surface(k, going, searches, surfaces);  // nothing behind the third is needed
     }
     for (std::size_t i = 0; i < count; ++i) found(i, surfaces[i], searches[i].ray);
   }
 
-  /// How flatly the ray and its mirrored path met what they met.
+  /// The incidence at the end of the ray and of its mirrored path.
   Incidences incidences(const Surfaces& at, const Ray& ray) const {
     Incidences result;
     if (at.cell[0] < 0) return result;
@@ -194,7 +194,7 @@ class SurfaceFinder {
     return {-normal.x, -normal.y, normal.linearity, -normal.offset};
   }
 
-  /// Leaves the run of occupied cells in which the walk stands, gaps too short to count included.
+  /// Leaves the run of occupied cells in which the walk stands, including gaps too short to count.
   ///
   /// Returns its length along the ray. inf if it is longer than max_length, or the ray ends in it.
   double pass_run(GridWalk& walk, double max_length) const {

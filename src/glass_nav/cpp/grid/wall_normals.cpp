@@ -69,7 +69,7 @@ class Patch {
   Patch(const std::vector<std::uint8_t>& boundary, int width, int height)
       : boundary_(boundary), width_(width), height_(height) {}
 
-  /// All cells within the radius. Each counts the same: this fit is to see corners and posts.
+  /// All cells within the radius. Each has the same weight: this fit must see corners and posts.
   Line shape_at(int x, int y) {
     Moments moments;
     collect(x, y, WallNormals::kRadiusCells, [](int, int) { return true; });
@@ -78,8 +78,8 @@ class Patch {
   }
 
   /// The same wall over a longer stretch. Twice the length makes the staircase of cells a third as steep; the weight
-  /// falls off towards the ends, so that no step there tilts the line. What sticks out, as the posts of a glass wall
-  /// do, is left out of a second fit.
+  /// falls off towards the ends, so that no step there tilts the line. Cells that stick out, such as posts of a glass
+  /// wall, are excluded from a second fit.
   Line refined(int x, int y, const Line& shape) {
     collect(x, y, WallNormals::kStretchCells, [&](int dx, int dy) { return shape.distance(dx, dy) <= kBesideLine; });
     const Line all = line_of(found_.size() + 1.0, shape);
@@ -102,9 +102,9 @@ class Patch {
     return moments.weight > 0.0 ? Line(moments) : other;
   }
 
-  static constexpr int kBridge = 2;           // cells; a gap of one missing cell does not part a wall
+  static constexpr int kBridge = 2;           // cells; a gap of one missing cell does not divide a wall
   static constexpr double kBesideLine = 2.5;  // cells from the line: both faces of a wall three cells thick
-  static constexpr double kSticksOut = 0.8;   // a cell so far from a thin wall is none of it
+  static constexpr double kSticksOut = 0.8;   // a cell this far from a thin wall is not part of it
   static constexpr int kReach = WallNormals::kStretchCells;
   static constexpr int kSide = 2 * kReach + 1;
 
@@ -137,7 +137,7 @@ class Patch {
 };
 
 WallNormals::Normal normal_at(int x, int y, Patch& patch) {
-  constexpr double kWorthRefining = 0.7;  // below it there is no line to be beside
+  constexpr double kWorthRefining = 0.7;  // below it there is no line to refine
   const Line shape = patch.shape_at(x, y);
   if (shape.linearity == 0.0) return kNone;
   const Line line = shape.linearity < kWorthRefining ? shape : patch.refined(x, y, shape);

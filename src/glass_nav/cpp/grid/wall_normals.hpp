@@ -1,4 +1,4 @@
-/// Which way the walls of a grid face.
+/// The normals of the walls of a grid.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ class WallNormals {
   static constexpr int kStretchCells = 16;
 
   struct Normal {
-    float x, y;       // unit vector, x >= 0: the sign is the ray's business; NaN where there is none
+    float x, y;       // unit vector, x >= 0: the caller orients it to the ray; NaN where there is none
     float linearity;  // 1 - smaller / larger principal variance: 1 straight wall, 0 no direction at all
     float offset;     // from the centre of the cell to the line of the wall, along (x, y) [cells]; NaN where none is
   };

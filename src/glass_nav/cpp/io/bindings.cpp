@@ -29,11 +29,11 @@ py::array_t<double> table(const std::vector<std::array<double, N>>& rows) {
   return out;
 }
 
-py::dict readRawlog(const std::string& path) {
+py::dict read_rawlog(const std::string& path) {
   glass_nav::Rawlog log;
   {
     py::gil_scoped_release released;
-    log = glass_nav::readRawlog(path);
+    log = glass_nav::read_rawlog(path);
   }
   py::dict out;
   out["stamps_ns"] = array(log.stamps_ns);
@@ -54,11 +54,11 @@ py::dict readRawlog(const std::string& path) {
   return out;
 }
 
-py::dict readGridMap(const std::string& path) {
+py::dict read_grid_map(const std::string& path) {
   glass_nav::GridFile grid;
   {
     py::gil_scoped_release released;
-    grid = glass_nav::readGridMap(path);
+    grid = glass_nav::read_grid_map(path);
   }
   py::dict out;
   const std::array<py::ssize_t, 2> shape{grid.rows, grid.columns};  // by the constructor: pybind11 2.4 has no reshape
@@ -72,6 +72,6 @@ py::dict readGridMap(const std::string& path) {
 }  // namespace
 
 PYBIND11_MODULE(_mrpt_io, module) {
-  module.def("read_rawlog", &readRawlog, py::arg("path"));
-  module.def("read_grid_map", &readGridMap, py::arg("path"));
+  module.def("read_rawlog", &read_rawlog, py::arg("path"));
+  module.def("read_grid_map", &read_grid_map, py::arg("path"));
 }

@@ -29,7 +29,7 @@ class CountingStream : public mrpt::io::CStream {
   explicit CountingStream(mrpt::io::CStream& source) : source_(source) {}
   std::size_t Read(void* buffer, std::size_t count) override {
     std::size_t got = source_.Read(buffer, count);
-    if (got > count) got = 0;  // zlib's -1 for damaged data, by way of an unsigned number
+    if (got > count) got = 0;  // zlib's -1 for damaged data, converted to unsigned
     total_ += got;
     ran_out_ = ran_out_ || got < count;
     return got;
@@ -76,15 +76,15 @@ void open(mrpt::io::CFileGZInputStream& file, const std::string& path) {
 }
 
 // MRPT counts 100 ns since 1601; 0 is "no time".
-std::int64_t unixNanoseconds(const mrpt::system::TTimeStamp& stamp) {
+std::int64_t unix_nanoseconds(const mrpt::system::TTimeStamp& stamp) {
   constexpr std::int64_t kTicksTo1970 = 116444736000000000LL;
   const std::int64_t ticks = static_cast<std::int64_t>(stamp.time_since_epoch().count());
   return stamp == INVALID_TIMESTAMP || ticks < kTicksTo1970 ? -1 : (ticks - kTicksTo1970) * 100;
 }
 
-void addScan(Rawlog& log, const mrpt::obs::CObservation2DRangeScan& scan) {
+void add_scan(Rawlog& log, const mrpt::obs::CObservation2DRangeScan& scan) {
   const std::size_t beams = scan.getScanSize();
-  log.stamps_ns.push_back(unixNanoseconds(scan.timestamp));
+  log.stamps_ns.push_back(unix_nanoseconds(scan.timestamp));
   log.beams.push_back(static_cast<std::int64_t>(beams));
   for (std::size_t i = 0; i < beams; ++i) {
     log.ranges_m.push_back(scan.getScanRange(i));
@@ -102,7 +102,7 @@ void addScan(Rawlog& log, const mrpt::obs::CObservation2DRangeScan& scan) {
   log.odometry_index.push_back(static_cast<std::int64_t>(log.odometry.size()) - 1);
 }
 
-void addOdometry(Rawlog& log, std::int64_t stamp_ns, const mrpt::poses::CPose2D& pose) {
+void add_odometry(Rawlog& log, std::int64_t stamp_ns, const mrpt::poses::CPose2D& pose) {
   log.odometry_stamps_ns.push_back(stamp_ns);
   log.odometry.push_back({pose.x(), pose.y(), pose.phi()});
 }
@@ -125,17 +125,17 @@ bool movement(const mrpt::obs::CActionCollection& actions, mrpt::poses::CPose2D&
   return false;
 }
 
-void addObservation(Rawlog& log, const mrpt::obs::CObservation& observation) {
+void add_observation(Rawlog& log, const mrpt::obs::CObservation& observation) {
   ++log.objects[observation.GetRuntimeClass()->className];
   if (const auto* scan = dynamic_cast<const mrpt::obs::CObservation2DRangeScan*>(&observation))
-    addScan(log, *scan);
+    add_scan(log, *scan);
   else if (const auto* odometry = dynamic_cast<const mrpt::obs::CObservationOdometry*>(&observation))
-    addOdometry(log, unixNanoseconds(odometry->timestamp), odometry->odometry);
+    add_odometry(log, unix_nanoseconds(odometry->timestamp), odometry->odometry);
 }
 
 }  // namespace
 
-Rawlog readRawlog(const std::string& path) {
+Rawlog read_rawlog(const std::string& path) {
   mrpt::io::CFileGZInputStream file;
   open(file, path);
   CountingStream stream(file);
@@ -162,14 +162,14 @@ Rawlog readRawlog(const std::string& path) {
       if (movement(*actions, increment)) {
         log.paired = true;
         odometry = odometry + increment;
-        addOdometry(log, -1, odometry);
+        add_odometry(log, -1, odometry);
       }
     } else if (const auto frame = std::dynamic_pointer_cast<mrpt::obs::CSensoryFrame>(object)) {
       ++log.objects["CSensoryFrame"];
       for (const auto& observation : *frame)
-        if (observation) addObservation(log, *observation);
+        if (observation) add_observation(log, *observation);
     } else if (const auto observation = std::dynamic_pointer_cast<mrpt::obs::CObservation>(object)) {
-      addObservation(log, *observation);
+      add_observation(log, *observation);
     } else {
       ++log.objects[object->GetRuntimeClass()->className];
     }
@@ -181,7 +181,7 @@ Rawlog readRawlog(const std::string& path) {
   return log;
 }
 
-GridFile readGridMap(const std::string& path) {
+GridFile read_grid_map(const std::string& path) {
   mrpt::io::CFileGZInputStream file;
   open(file, path);
   CountingStream stream(file);

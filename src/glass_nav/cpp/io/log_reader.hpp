@@ -35,7 +35,7 @@ struct Rawlog {
 
 // Reads what can be read; a file cut short gives what it holds, with `broken` set.
 // Throws std::invalid_argument if the file cannot be opened or does not start with an MRPT object.
-Rawlog readRawlog(const std::string& path);
+Rawlog read_rawlog(const std::string& path);
 
 struct GridFile {
   std::int64_t rows = 0, columns = 0;
@@ -44,6 +44,6 @@ struct GridFile {
 };
 
 // Throws std::invalid_argument if the file is not one whole COccupancyGridMap2D.
-GridFile readGridMap(const std::string& path);
+GridFile read_grid_map(const std::string& path);
 
 }  // namespace glass_nav

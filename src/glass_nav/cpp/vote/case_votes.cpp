@@ -37,7 +37,8 @@ void count_case_votes(const Offers& offers, const Chances& chances, double* shar
         if (!std::isfinite(offers.range_m[at])) continue;
         const double cos = std::max(offers.cos[at], chances.min_cos);
         double end_m = offers.range_m[at] + chances.depth_share * offers.thickness_m[at] / cos;
-        if (path == kMirrored) end_m += 2.0 * first_depth * offers.cos[kFirst * plane + i];  // so much deeper a mirror
+        if (path == kMirrored)
+          end_m += 2.0 * first_depth * offers.cos[kFirst * plane + i];  // a mirror lies that much deeper
         const double across = (z - end_m) * cos;
         if (!(std::abs(across) <= chances.gate_m)) continue;
         const double sigmas = across / chances.sigma_m;
@@ -63,7 +64,7 @@ void count_case_votes(const Offers& offers, const Chances& chances, double* shar
   for (std::size_t b = 0; b < beams; ++b) {
     double sum = 0.0;
     for (std::size_t row = 0; row <= kPaths; ++row) sum += share[row * beams + b];
-    if (!(sum > 0.0)) {  // no answer, nothing to vote on
+    if (!(sum > 0.0)) {  // no answer: nothing to vote on
       share[b] = 1.0;
       continue;
     }

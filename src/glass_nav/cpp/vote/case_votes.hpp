@@ -9,7 +9,7 @@ namespace glass_nav {
 
 constexpr std::size_t kPaths = 4;  // to the first surface, mirrored there, to the second and the third
 
-/// What the samples offer and the beams measured. Row-major arrays of kPaths * samples * beams, or beams.
+/// Expected and measured ranges. Row-major arrays of kPaths * samples * beams, or beams.
 struct Offers {
   std::size_t samples, beams;
   const double* measured_m;  // beams; not finite: no answer
@@ -21,11 +21,11 @@ struct Offers {
 /// How a beam may end.
 struct Chances {
   const double* prior;  // (kPaths + 1) * beams: of the cases in the order of the paths; last, see gone
-  double nothing;       // to meet what is on no map
-  double depth_share;   // of the thickness of a wall: where in it beams end
+  double nothing;       // prior of meeting something that is on no map
+  double depth_share;   // of the thickness of a wall: how deep in it beams end
   double sigma_m;       // around that, across the wall
-  double gate_m;        // farther across from a reference a beam does not belong to it
-  double min_cos;       // a surface seen flatter counts as one seen like that
+  double gate_m;        // a beam that ends farther from a reference, across the wall, does not belong to it
+  double min_cos;       // lower bound of cos: a surface seen at a smaller angle counts as one at this
   double temper;        // of a sample's evidence
 };
 

@@ -22,7 +22,6 @@ Parameters: LocalizationNodeParams and LocalizerParams; explained in config/loca
 
 from __future__ import annotations
 
-import logging
 import sys
 import threading
 import time
@@ -319,10 +318,7 @@ def main(name: str = "glass_localization") -> None:
         )
         sys.exit(2)
     ending = shutdown.event_on_signals()
-    core_log = logging.getLogger("glass_nav")
-    core_log.handlers = logging.getLogger("rosout").handlers
-    core_log.setLevel(logging.INFO)
-    core_log.propagate = False
+    shutdown.core_logs_to_rosout()
     given: Dict[str, Any] = rospy.get_param("~", {})
     unknown: List[str] = []
     if name == "amcl":

@@ -45,11 +45,9 @@ from glass_nav.simulation.landmark_scanner import ScannerModel
 from glass_nav.simulation.path_follower import PathFollower, PathFollowerParams
 from glass_nav.simulation.robot import RobotParams
 from glass_nav.simulation.simulation import CONTROL_S, Frame, Simulation
+from glass_nav.simulation.steering import Audience, Pace, Steering
 
-COMMAND_TIMEOUT_NS = 500_000_000  # a robot whose driver fell silent stops
 ANSWER_WAIT_S = 1.0  # as fast as it can: so long for map -> odom of a scan, by the wall clock
-START_WAIT_S = 30.0  # for the first map -> odom, before the path begins without
-BEHIND_S = 1.0  # of the wall clock: more is not made up for
 
 
 @dataclass(frozen=True)
@@ -127,18 +125,16 @@ class SimulatorNode:
         """
         self._p = p
         drive = _drive(p)
-        self._simulation, self._follower = drive.simulation, drive.follower
+        self._simulation = drive.simulation
+        self._steering = Steering(drive.follower, p.repeat_path, wait_for_answer=p.give_initial_pose)
         self._names = FrameNames(p.global_frame_id, p.odom_frame_id, p.base_frame_id, p.laser_frame_id)
         self._log = LogThrottle()
         self._inbox = Mailbox(commands=1)
         self._newcomers = Mailbox(publish=10)  # to one node each that has begun to listen to initialpose
-        self._command, self._command_until_ns = np.zeros(3), 0
         self._blocked = False
-        self._driving = False
         self._answers = 0  # transforms map -> odom; counted by the thread of tf
         self._answers_used, self._answering = 0, False
-        self._began_s = self._paced_s = time.monotonic()
-        self._paced_ns = self._simulation.stamp_ns  # simulated time that was due at _paced_s
+        self._began_s = time.monotonic()
         self._next_scan_ns = self._simulation.stamp_ns
 
         self._clock = rospy.Publisher("/clock", Clock, queue_size=100, tcp_nodelay=True)
@@ -173,7 +169,7 @@ class SimulatorNode:
         )
         self._blocked_flag.publish(Bool(False))
         self._publish_reading()
-        self._paced_s = time.monotonic()
+        pace = Pace(simulation.stamp_ns, time.monotonic())
         while not (rospy.is_shutdown() or ending.is_set()):
             if simulation.stamp_ns >= self._next_scan_ns:
                 self._next_scan_ns += round(simulation.scan_period_s * 1e9)
@@ -183,22 +179,16 @@ class SimulatorNode:
             left_s = (self._next_scan_ns - simulation.stamp_ns) * 1e-9
             simulation.move(min(CONTROL_S, left_s), self._wanted_velocity())
             self._publish_reading()
-            self._keep_pace(ending)
+            self._keep_pace(pace, ending)
 
-    def _keep_pace(self, ending: threading.Event) -> None:
-        """Wait until the simulated time is due by the monotonic clock."""
+    def _keep_pace(self, pace: Pace, ending: threading.Event) -> None:
         factor = self._p.speed_factor
-        if factor == 0.0 and self._follower is not None and not self._driving:
+        if factor == 0.0 and self._steering.waits:
             factor = 1.0  # whoever it waits for needs the processor
-        now_s = time.monotonic()
-        if factor == 0.0:
-            self._paced_ns, self._paced_s = self._simulation.stamp_ns, now_s
-            return
-        wait_s = self._paced_s + (self._simulation.stamp_ns - self._paced_ns) * 1e-9 / factor - now_s
+        wait_s = pace.wait_s(self._simulation.stamp_ns, factor, time.monotonic())
         if wait_s > 0.0:
             ending.wait(wait_s)
-        elif wait_s < -BEHIND_S:
-            self._paced_s -= wait_s
+        elif wait_s < 0.0:
             self._log.warn(f"slower than ~speed_factor {factor:g} asks for: behind by {-wait_s:.1f} s", 30.0)
 
     # -- callbacks of other threads: they store
@@ -214,37 +204,13 @@ class SimulatorNode:
     # -- commands
 
     def _wanted_velocity(self) -> np.ndarray:
-        """(3,) by who steers: cmd_vel while it is fresh, else the path."""
         for msg in self._inbox.take(timeout_s=0.0)["commands"]:
             try:
-                self._command = frame_messages.velocity_from_msg(msg)
-                self._command_until_ns = self._simulation.stamp_ns + COMMAND_TIMEOUT_NS
+                self._steering.take(frame_messages.velocity_from_msg(msg), self._simulation.stamp_ns)
             except ValueError as err:
                 self._log.warn(f"cmd_vel refused: {err}")
-        if self._simulation.stamp_ns < self._command_until_ns:
-            return self._command
-        if self._follower is None or not self._may_drive():
-            return np.zeros(3)
-        if self._follower.done and self._p.repeat_path:
-            self._follower = self._follower.back()
-        return self._follower.command(self._simulation.map_from_base)
-
-    def _may_drive(self) -> bool:
-        """A path begins once somebody follows it: else they would miss its start."""
-        if not self._driving:
-            if self._p.give_initial_pose:
-                overdue = time.monotonic() - self._began_s > START_WAIT_S
-                self._driving = self._answers > 0 or overdue
-                if overdue and not self._answers:
-                    rospy.logwarn(
-                        f"the path begins without a localization: no transform {self._names.map} -> "
-                        f"{self._names.odom} for {START_WAIT_S:g} s"
-                    )
-            else:
-                self._driving = self._scans.get_num_connections() > 0
-            if self._driving:
-                rospy.loginfo(f"driving {self._follower.length_m:.1f} m" if self._follower else "driving")
-        return self._driving
+        audience = Audience(self._answers, self._scans.get_num_connections(), time.monotonic() - self._began_s)
+        return self._steering.velocity(self._simulation.stamp_ns, self._simulation.map_from_base, audience)
 
     # -- output
 
