@@ -355,6 +355,13 @@ class TopologyNode(unittest.TestCase):
         self.assertIn(line, printed)
         self.assertNotIn("Traceback", printed)
 
+    def test_where_it_is_told_to_end_without_an_atlas_another_map_ends_it(self) -> None:
+        wrong = map_file.load(REPO / "maps" / "glass_atrium" / "map.yaml")
+        self.maps.publish(conversions.msg_from_map(wrong, rospy.Time.now(), "map"))
+        self.check_end(
+            3, "was made from another map than that of topic /map", "_atlas:=glass_office", "_end_without_atlas:=true"
+        )
+
     def test_without_an_atlas_it_does_not_start(self) -> None:
         self.check_end(2, "~atlas must be a file, a folder or the name of a shipped atlas, got ''")
 

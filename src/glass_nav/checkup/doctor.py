@@ -236,7 +236,7 @@ def _opposite(with_map: bool, lidar: str, link: str) -> Finding:
         "turns-opposite",
         f"{link} turns the other way than the scans",
         f"either {lidar} is mounted upside down and tf does not say so (add roll 180 deg), or odometry's "
-        "yaw has the wrong sign; with --map the doctor tells which",
+        "yaw has the wrong sign; with --map the doctor finds out which",
     )
 
 

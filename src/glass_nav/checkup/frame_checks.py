@@ -1,4 +1,4 @@
-"""The tree of frames: is there one way from odom over the base to the lidar, at every scan, and only one?"""
+"""The tree of frames: is there exactly one path from odom over the base to the lidar, at every scan?"""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def check_mounting(lidar: str, base: str, base_from_laser: frames.Transform) -> 
         yield Finding(
             "lidar-tilted",
             f"by tf {base} -> {lidar} the lidar is tilted by {math.degrees(math.acos(min(abs(up), 1.0))):.0f} deg",
-            "mount it level, or correct its roll and pitch in the URDF: beyond 20 deg scans are refused",
+            "mount it level, or correct its roll and pitch in the URDF: beyond 20 deg scans are rejected",
         )
 
 

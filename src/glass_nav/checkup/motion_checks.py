@@ -33,7 +33,7 @@ class Moves:
 
 
 def measure(points_m: Sequence[np.ndarray], odom_from_laser: np.ndarray) -> Moves:
-    """Pairs of scans with some motion, measured both ways.
+    """Pairs of scans with some motion, measured by scans and by odometry.
 
     Args:
         points_m: of each scan, (B, 2) finite end points in the lidar's frame.
@@ -74,7 +74,7 @@ def _pairs(odom_from_laser: np.ndarray) -> List[Tuple[int, int]]:
             continue
         at = int(enough[0])
         chosen = turning if turn[at] >= _TURN_RAD else straight
-        overlaps = bool(chosen) and first < (chosen[-1][0] + chosen[-1][1]) // 2  # tells the same once more
+        overlaps = bool(chosen) and first < (chosen[-1][0] + chosen[-1][1]) // 2  # holds nothing new
         if way_m[at] <= _MAX_M and turn[at] <= _MAX_RAD and not overlaps:
             chosen.append((first, first + 1 + at))
     return [
@@ -101,7 +101,7 @@ class Ratio:
 
 
 def way_ratio(moves: Moves) -> Ratio:
-    """Of the ways between scans without much turn."""
+    """Of the distances between scans with little turn."""
     by_odometry, by_scans = _straight(moves)
     return _ratio(np.hypot(by_scans[:, 0], by_scans[:, 1]) / np.hypot(by_odometry[:, 0], by_odometry[:, 1]))
 

@@ -15,7 +15,7 @@ MAX_SCANS = 400  # whose ranges are looked at, spread over the log
 _MIN_SCANS = 20
 _FEW = 0.05  # share of beams or scans that may be odd
 _LONGEST_M = 500.0  # no 2D lidar sees farther
-_PILED = 30.0  # a range so many times as frequent as its neighbours is a code
+_PILED = 30.0  # a range this many times as frequent as its neighbours is a code
 _NARROW = 0.03  # share of the beams: some at the edge of the view do no harm
 _ROBOT_M, _STILL_M, _ALIVE_M = 0.6, 0.03, 0.2  # beams that end on the robot: how near, how still, while others change
 
@@ -146,7 +146,7 @@ def _limits(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
             "scan-limits",
             f"{topic}: {len(bad)} of {len(scans)} scans have range_min {bad[0].range_min_m:g} and range_max "
             f"{bad[0].range_max_m:g} m",
-            "set both from the lidar's data sheet, 0 <= range_min < range_max; such scans are refused",
+            "set both from the lidar's data sheet, 0 <= range_min < range_max; such scans are rejected",
         )
     elif max(scan.range_max_m for scan in scans) > _LONGEST_M:
         yield Finding(
@@ -157,7 +157,7 @@ def _limits(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
 
 
 def _repeats(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
-    """The very same ranges again: noise never does that."""
+    """Exactly the same ranges again, which noise does not produce."""
     same = [
         bool(np.isfinite(now.ranges_m).any()) and before.ranges_m.tobytes() == now.ranges_m.tobytes()
         for before, now in zip(scans[:-1], scans[1:])
@@ -166,7 +166,7 @@ def _repeats(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
         yield Finding(
             "scan-repeats",
             f"{topic}: {sum(same)} of {len(same)} scans repeat the ranges of the one before",
-            "the driver sends old data again, or two nodes publish the topic: rostopic info tells",
+            "the driver sends old data again, or two nodes publish the topic: see rostopic info",
         )
 
 

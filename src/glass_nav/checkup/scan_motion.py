@@ -50,7 +50,7 @@ class EarlierScan:
         self._field = DistanceField(GridMap(cells, CELL_M, np.array([low[0], low[1], 0.0])), max_distance_m=0.5)
 
     def motion_to(self, points_m: np.ndarray, reach_m: float, reach_rad: float) -> Optional[Motion]:
-        """How the lidar moved until it saw points (B, 2); None where the scans do not tell.
+        """How the lidar moved until it saw points (B, 2); None where the scans do not show it.
 
         Args:
             points_m: finite end points in the later lidar's frame.

@@ -65,13 +65,13 @@ def _order(topic: str, stamps_ns: np.ndarray) -> Iterator[Finding]:
         yield Finding(
             "scan-gaps",
             f"{topic}: {len(gaps)} gaps of up to {gaps.max():.1f} s in scans that otherwise come every {usual:.3f} s",
-            "look for drops on the way (rostopic hz on the robot, `dropped` in rosbag info, a USB lidar "
+            "look for dropped messages (rostopic hz on the robot, `dropped` in rosbag info, a USB lidar "
             "that reconnects); the robot is placed by odometry alone meanwhile",
         )
 
 
 def check_clocks(scan_delays_s: np.ndarray, odometry_delays_s: np.ndarray) -> Iterator[Finding]:
-    """Scans and odometry that tell different times.
+    """Scans and odometry with different clocks.
 
     Args:
         scan_delays_s, odometry_delays_s: from stamps to arrival, of each message.

@@ -1,4 +1,4 @@
-"""glass_nav atlas check: is the file in order, and what cannot be told apart in it?"""
+"""glass_nav atlas check: is the file valid, and which places are indistinguishable?"""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from glass_nav.topology.search import distinguishability
 from glass_nav.topology.search.distinguishability import Distinguishability
 from glass_nav.world import map_file
 
-HELP = "validate an atlas, and say what cannot be told apart"
+HELP = "validate an atlas, and list places that are indistinguishable"
 DESCRIPTION = """Checks every rule of an atlas, then sends a robot without errors through the search from everywhere:
 which places are indistinguishable from which, and how many edges a robot needs at most and on average."""
 
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=MAX_STARTS,
         metavar="N",
-        help=f"from so many places at most, spread over the atlas (default {MAX_STARTS})",
+        help=f"maximum number of starts, spread over the atlas (default {MAX_STARTS})",
     )
 
 
@@ -53,13 +53,13 @@ def main(arguments: argparse.Namespace) -> None:
     """
     params = search_params.load(arguments.params)
     path = shipped_atlases.find(arguments.atlas)
-    atlas = atlas_file.load(path)
+    atlas, warning = atlas_file.load(path), ""
     if arguments.map is not None:
         try:
-            atlas.refuse_other_map(map_file.load(arguments.map).fingerprint, str(arguments.map))
+            warning = atlas.check_map(map_file.load(arguments.map), str(arguments.map))
         except AtlasError as err:
             raise AtlasError(f"{path}: {err}") from err
-    print(f"{path}: in order")
+    print(f"{path}: in order" + (f", but it {warning}" if warning else ""))
     for line in summary(atlas):
         print(f"  {line}")
     count = len(atlas.darts)
@@ -89,7 +89,7 @@ def summary(atlas: Atlas) -> List[str]:
 
 
 def verdict(atlas: Atlas, found: Distinguishability) -> List[str]:
-    """What can be told apart, and by how many edges."""
+    """What can be distinguished, and after how many edges."""
     tried = len(found.starts)
     of = "everywhere" if tried == len(atlas.darts) else f"{tried} of {len(atlas.darts)} places"
     lines = (

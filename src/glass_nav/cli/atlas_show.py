@@ -70,8 +70,10 @@ def _map(atlas: Atlas, path: Optional[Path]) -> Optional[GridMap]:
     """The map that was given, or the one of the package that has the fingerprint of the atlas' map, or none."""
     if path is not None:
         grid_map = map_file.load(path)
-        if atlas.source.sha256 and grid_map.fingerprint != atlas.source.sha256:
-            raise AtlasError(f"{path}: the atlas {atlas.name} was made from another map, {atlas.source.name}")
+        try:
+            atlas.check_map(grid_map, "this")
+        except AtlasError as err:
+            raise AtlasError(f"{path}: the atlas {atlas.name} {err}") from err
         return grid_map
     building = shipped_buildings.shipped().get(atlas.source.name)
     if building is None:

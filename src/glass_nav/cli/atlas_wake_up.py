@@ -16,8 +16,8 @@ from glass_nav.topology.search.atlas_robot import TrialParams
 
 HELP = "try out how robots that wake up in an atlas fare"
 DESCRIPTION = """Simulated robots wake up anywhere in an atlas, report what they measure (with errors as large as
-the tolerances say) and drive as the search tells them. Writes metrics.json: shares of robots that were confirmed at
-the right place, that were told a wrong one, that are ambiguous, that are lost and that were still searching; the
+the tolerances say) and drive as the search asks. Writes metrics.json: shares of robots that were confirmed at
+the right place or at a wrong one, that are ambiguous, that are lost and that were still searching; the
 edges they drove; the CPU time of the slowest step."""
 
 
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=1.0,
         metavar="X",
-        help="errors are so many times as large as the tolerances say (default 1)",
+        help="factor between the errors and those that the tolerances assume (default 1)",
     )
     parser.add_argument(
         "--elsewhere",

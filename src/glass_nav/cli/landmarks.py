@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--glass-map",
         type=Path,
         metavar="MAP",
-        help="glass_map.yaml of glass_nav replay: walls that proved to be glass hide no tag; without it all do",
+        help="glass_map.yaml of glass_nav replay: walls of glass hide no tag; without it all walls do",
     )
     plan.add_argument(
         "--spacing", type=float, default=0.5, metavar="M", help="of the places looked at, m (default 0.5)"
@@ -149,7 +149,7 @@ def _check_inside(arguments: argparse.Namespace, grid_map: GridMap, landmarks: L
 
 
 def _see_through(grid_map: GridMap, path: Optional[Path]) -> GridMap:
-    """The map without the walls that proved to be glass."""
+    """The map without its walls of glass."""
     if path is None:
         return grid_map
     glass = map_file.load(path)
@@ -182,7 +182,7 @@ def _as_map(suggestions: List[Suggestion], landmarks: LandmarkMap) -> LandmarkMa
         number += 1
     count = len(suggestions)
     positions_m = np.array([each.position_m for each in suggestions], float).reshape(-1, 2)
-    facing_deg = np.rint(np.degrees([each.facing_rad for each in suggestions]))  # nobody hangs a tag more exactly
+    facing_deg = np.rint(np.degrees([each.facing_rad for each in suggestions]))  # no tag is hung more exactly
     return LandmarkMap(
         tuple(names),
         np.round(positions_m, 2),

@@ -98,7 +98,7 @@ def usage_error(arguments: argparse.Namespace) -> Optional[str]:
 
 
 def main(arguments: argparse.Namespace) -> None:
-    """Load, correct, draw, tell.
+    """Load, correct, draw, print.
 
     Raises:
         RecordingError, MapError, ValueError, OSError: bad input, or a scan that fits nowhere near; one line.
@@ -202,7 +202,7 @@ def free_in_words(found: SegmentCorrection) -> str:
         return "x, y and yaw: the walls constrain nothing"
     heading = found.free_heading_rad
     if heading is not None:
-        return f"the way along {np.degrees(heading):.0f} deg of the map: not corrected"
+        return f"the direction {np.degrees(heading):.0f} deg of the map: not corrected"
     names = [name for name, weight in zip(("x", "y", "yaw"), np.linalg.norm(found.free, axis=0)) if weight > 0.3]
     return f"{len(found.free)} of 3 directions, of {', '.join(names)}: not corrected"
 

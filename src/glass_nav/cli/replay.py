@@ -18,7 +18,7 @@ from glass_nav.replay.replay_options import ReplayOptions
 
 HELP = "run the localization on a recorded log"
 DESCRIPTION = """Runs the localization on a recorded log, every scan of it, and writes metrics.json,
-trajectory.tum, per_scan.csv, beam_cases.npz, worst_scans.npz, glass_map.yaml (how glassy each wall cell proved)
+trajectory.tum, per_scan.csv, beam_cases.npz, worst_scans.npz, glass_map.yaml (probability of glass of each wall cell)
 and trajectory.png; where the log has the truth about its beams, as
 simulated ones do, also the scores of the cases and cases.png. Needs no roscore."""
 
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=replay_topology.FROM_MAP,
         metavar="ATLAS",
-        help="also tell which nodes of an atlas the robot passed, and which of them it saw with lidar "
+        help="also list the nodes of an atlas that the robot passed, and which of them it detected with lidar "
         "and odometry alone, as the driver does: a table, topology.csv and topology.png; an atlas "
         f"file, its folder, a shipped one's name, or {replay_topology.FROM_MAP}: made from "
         "the map, as without a value at the end of the line",
@@ -91,7 +91,7 @@ def main(arguments: argparse.Namespace) -> bool:
 
 
 def run(options: ReplayOptions, outputs: Outputs) -> Dict[str, Any]:
-    """One replay, told as it goes; its figures.
+    """One replay, with its progress and figures printed.
 
     Raises:
         RecordingError, MapError, AtlasError, ParamError, ValueError, OSError: bad input; one line.
@@ -107,7 +107,7 @@ def run(options: ReplayOptions, outputs: Outputs) -> Dict[str, Any]:
         progress.finish()
     topology = replay.write(result)
     for reason, count in result.refusals.most_common():
-        _say(f"{count} scans refused: {reason}")
+        _say(f"{count} scans rejected: {reason}")
     passed = None if topology is None else topology.metrics()
     print("\n".join(replay_table.run_lines(result) + replay_table.topology_lines(passed)))
     print(f"written to {outputs.folder}" + ("" if outputs.bag is None else f" and {outputs.bag}"))

@@ -1,4 +1,4 @@
-"""glass_nav report: one run told to a person, as one HTML file with its pictures inside."""
+"""glass_nav report: one run as one HTML file with its pictures inside."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from glass_nav.replay.replay_files import Outputs
 from glass_nav.replay.replay_options import ReplayOptions
 from glass_nav.world import map_file
 
-HELP = "tell one run as an HTML file with pictures"
+HELP = "one run as an HTML file with pictures"
 DESCRIPTION = """Writes report.html, one file that needs no network and holds its pictures, and the same pictures as
-PNG files: the way over the map by state, what the beams met over time, how glassy each wall proved, errors,
+PNG files: the path over the map by state, what the beams met over time, the probability of glass, errors,
 reliability against the truth, places possible until one was left, update time, and the ten worst scans. Takes the
 folder that `glass_nav replay --out` wrote, or a log, which is replayed first (all options but --map and --out are for
 that)."""
@@ -99,7 +99,7 @@ def _options(arguments: argparse.Namespace) -> ReplayOptions:
 
 
 def _glass(folder: Path, shape: "tuple[int, ...]") -> Optional[np.ndarray]:
-    """How glassy each wall of the map proved in that run; None: not known, or of another map."""
+    """The probability of glass of each wall cell after that run; None: not known, or of another map."""
     if not (folder / "glass_map.yaml").exists():
         return None
     glass = map_file.load(folder / "glass_map.yaml").occupancy

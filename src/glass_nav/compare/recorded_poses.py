@@ -16,7 +16,7 @@ from glass_nav.replay import prepared_replay
 from glass_nav.replay.prepared_replay import PreparedReplay
 from glass_nav.replay.replay_options import ReplayOptions
 
-CARRY_NS = 100_000_000  # a recorded pose may be so much older or newer than the scans' odometry
+CARRY_NS = 100_000_000  # a recorded pose may be this much older or newer than the scans' odometry
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def find(options: ReplayOptions, source: str, step_done: Callable[[], None]) -> 
 
 
 def carried(poses: Trajectory, odometry: Trajectory, stamps_ns: np.ndarray) -> "Tuple[np.ndarray, np.ndarray]":
-    """Poses that come now and then, carried on by odometry: the newest map_from_odom holds, as tf hands it out.
+    """Sparse poses, propagated by odometry: the newest map_from_odom holds, as in tf.
 
     Args:
         poses: map_from_base, N of them.

@@ -23,6 +23,7 @@ from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.observations import turn_name
 from glass_nav.vocabulary import SEARCH_IS_OVER, LocalizationState, Outcome, SearchState
 
+SEARCH_ENDED = (*SEARCH_IS_OVER, SearchState.NO_ATLAS)  # nothing more will come
 RIGHT_M, RIGHT_RAD = 0.5, 0.35  # a pose that is handed over so near is right
 REQUESTS = 3  # for a node, where the driver has not heard of the localization yet
 LISTED = 8  # candidates in a row
@@ -130,7 +131,7 @@ class WakeUpDemo:
     def _search(self) -> Optional[SearchNews]:
         """How the last search ended; None if it did not."""
         for searches_left in reversed(range(self._p.searches)):
-            if not self._wait(lambda: self._state in SEARCH_IS_OVER, simulated_s=self._p.search_limit_s):
+            if not self._wait(lambda: self._state in SEARCH_ENDED, simulated_s=self._p.search_limit_s):
                 if not self._robot.is_ending():
                     self._robot.say(f"the search did not end within {self._p.search_limit_s:g} s")
                 return None

@@ -167,23 +167,34 @@ class Driver:
         self._edge.see(scan, odom_from_base)
         return True
 
-    def search_reports(self, state: SearchState) -> None:
-        """The search in the atlas reports its state."""
+    def search_reports(self, state: SearchState) -> List[Decision]:
+        """The search in the atlas reports its state; the robot does not drive for a search without an atlas."""
         if state == SearchState.WAITING and self._search != SearchState.WAITING:
             self._seeking.succeeds()  # somebody asks anew
-        self._search = state
+        began, self._search = state != self._search, state
+        if began and self._search_is(SearchState.NO_ATLAS):
+            why = "the search has no atlas of the map that is served"
+            self._log(f"{why}: the robot does not drive for it", logging.ERROR)
+            if self._job is None:
+                self._say(DriverPhase.FAILED, why)
+            elif self._job.action is None:
+                self._finish(self._job, Ending(Outcome.REFUSED, why))
+        return self._decided()
 
     def localization_reports(self, state: LocalizationState, reason: str) -> None:
         """The localization reports its state."""
         self._inputs.take_localization(state, reason, self._now_s)
 
-    def map_served(self, grid_map: GridMap, name: str) -> None:
+    def map_served(self, grid_map: GridMap, name: str) -> List[Decision]:
         """A map is served; name is for people, as "that of topic /map".
 
         Raises:
             AtlasError: the atlas is of another map; goals in it are refused from now on.
         """
-        self._places.map_served(grid_map, name)
+        warning = self._places.map_served(grid_map, name)
+        if warning:
+            self._log(f"the atlas {warning}", logging.WARNING)
+        return self._decided()
 
     def turn_choice(self, rank: int, name: str, stamp_ns: int) -> List[Decision]:
         """The search says by which edge to leave the meetpoint of a stamp; 0: where the robot stands.
@@ -420,6 +431,8 @@ class Driver:
         if arrival is not None:
             if waits and self._stay.is_report_due(self._now_s):
                 self._report(arrival)
+        elif self._search_is(SearchState.NO_ATLAS):
+            return
         elif self._rules.seek_at_start and self._seeking.is_due(waits, self._search_is(*IN_SEARCH)):
             self._seeking.seeks()
             self._begin(_Job(self._edge_task(None), "~seek_at_start"))

@@ -51,21 +51,24 @@ class PlaceTasks:
         self._map_fault = ""
         self._planner: Optional[RoutePlanner] = None
 
-    def map_served(self, grid_map: GridMap, name: str) -> None:
+    def map_served(self, grid_map: GridMap, name: str) -> str:
         """A map is served: straight drives go where it is free.
 
         Args:
             grid_map: it.
             name: for people, as "that of topic /map".
 
+        Returns:
+            A warning where the atlas is of a map that differs in a few cells, else "".
+
         Raises:
             AtlasError: the atlas is of another map; goals are refused from now on.
         """
         self._map, self._planner, self._map_fault = grid_map, None, ""
         if self._atlas is None:
-            return
+            return ""
         try:
-            self._atlas.refuse_other_map(grid_map.fingerprint, name)
+            return self._atlas.check_map(grid_map, name)
         except AtlasError as err:
             self._map_fault = f"the atlas {err}"
             raise AtlasError(f"goto_node cannot be used: {self._map_fault}") from err

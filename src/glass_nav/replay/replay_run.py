@@ -112,7 +112,7 @@ class _Scores:
 
 
 class _WorstScans:
-    """The worst scan of each part of the log: farthest off, or least reliable where nobody knows. One part of it is in
+    """The worst scan of each part of the log: largest error, or least reliable without a ground truth. One part of it is in
     memory at a time: all scans of a long log would not fit.
     """
 

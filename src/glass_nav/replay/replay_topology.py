@@ -6,6 +6,7 @@ where the robot truly was.
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import List, Optional
 
@@ -43,7 +44,9 @@ def atlas_of(given: str, map_path: Path, grid_map: GridMap) -> Atlas:
     if given == FROM_MAP:
         return atlas_builder.build(grid_map, map_file.name_of(map_path), map_file.name_of(map_path))[0]
     atlas = atlas_file.load(shipped_atlases.find(given))
-    atlas.refuse_other_map(grid_map.fingerprint, str(map_path))
+    warning = atlas.check_map(grid_map, str(map_path))
+    if warning:
+        logging.getLogger(__name__).warning("the atlas %s %s", given, warning)
     return atlas
 
 

@@ -28,14 +28,14 @@ class Window:
             raise ValueError(f"--max-scans must be >= 1, got {self.max_scans}")
 
     def expected(self, scan_count: int) -> int:
-        """About how many of so many scans: for a progress bar."""
+        """About how many of `scan_count` scans: for a progress bar."""
         count = -(-scan_count // self.every)
         return count if self.max_scans is None else min(count, self.max_scans)
 
     def of(self, entries: Iterable[Entry]) -> Iterator[Entry]:
-        """The entries of that part; refused scans within it are kept, to be counted."""
+        """The entries of that part; rejected scans within it are kept, to be counted."""
         first_ns: Optional[int] = None
-        since_s = 0.0  # of the last scan that could be read: the stamp of a refused one may be its fault
+        since_s = 0.0  # of the last scan that could be read: the stamp of a rejected one may be wrong
         seen = taken = 0
         for entry in entries:
             if isinstance(entry, Refusal):

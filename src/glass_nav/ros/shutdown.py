@@ -45,7 +45,7 @@ def run_node(name: str, make: Callable[[Dict[str, Any]], Any], bad_input: Tuple[
     Args:
         name: of the node, unless it is renamed.
         make: the node from its private parameters, as they are given; ValueError ends it with exit code 2.
-        bad_input: exceptions of make() that end it with exit code 3.
+        bad_input: exceptions of make() and of its run() that end it with exit code 3.
     """
     rospy.init_node(name, disable_signals=True)
     ending = event_on_signals()
@@ -56,5 +56,7 @@ def run_node(name: str, make: Callable[[Dict[str, Any]], Any], bad_input: Tuple[
         refuse_to_start(err, 3 if isinstance(err, bad_input) else 2)
     try:
         node.run(ending)
+    except bad_input as err:
+        refuse_to_start(err, 3)
     finally:
         rospy.signal_shutdown("ended")

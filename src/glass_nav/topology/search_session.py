@@ -35,6 +35,7 @@ class SessionParams:
     """How searches are begun, fed and reported."""
 
     check_map: bool = True  # refuse the atlas if another map is served than it was made from
+    end_without_atlas: bool = False  # when the atlas is refused, rather than wait for its map
     judge_by_scans: bool = True  # judge candidates by the scan at a meetpoint, where there are scans and a map
     search_at_start: bool = True  # with the first meetpoint; else when asked
     publish_initial_pose: bool = True
@@ -136,7 +137,7 @@ class SearchSession:
         self._read_atlas = read_atlas
         self._p, self._search_params = p, search
         self._explanation = ServedExplanation()
-        self._map: Optional[Tuple[str, str]] = None  # fingerprint of the map that is served, and its name for people
+        self._map: Optional[Tuple[GridMap, str]] = None  # that is served, and its name for people
         self._localizer: Optional[AtlasLocalizer] = None
         self._status = SearchStatus(SearchState.NO_ATLAS, "no atlas was read yet")
         self._goal: Optional[Goal] = None
@@ -148,6 +149,11 @@ class SearchSession:
     def status(self) -> SearchStatus:
         """The last one."""
         return self._status
+
+    @property
+    def is_to_end(self) -> bool:
+        """Whether the node is to end: the atlas was refused, and nobody waits for its map."""
+        return self._p.end_without_atlas and self._status.state == SearchState.NO_ATLAS
 
     @property
     def localizer(self) -> Optional[AtlasLocalizer]:
@@ -210,11 +216,11 @@ class SearchSession:
             self._explanation.take(grid_map)
         if not self._p.check_map:
             return []
-        self._map = grid_map.fingerprint, name
+        self._map = grid_map, name
         try:
             if self._localizer is not None:
-                self._localizer.atlas.refuse_other_map(*self._map)
-                return []
+                warning = self._localizer.atlas.check_map(*self._map)
+                return [LogLine(f"the atlas {warning}", logging.WARNING)] if warning else []
             return [self._load(), self._await_meetpoint("there is another map")]
         except (ValueError, OSError) as err:
             self._localizer = None
@@ -270,14 +276,16 @@ class SearchSession:
     def _load(self) -> LogLine:
         """Raises what reading raises, and AtlasError if the atlas is of another map than the one that is served."""
         found_at, atlas = self._read_atlas()
+        warning = ""
         if self._map is not None:
             try:
-                atlas.refuse_other_map(*self._map)
+                warning = atlas.check_map(*self._map)
             except AtlasError as err:
                 raise AtlasError(f"{found_at}: {err}") from err
         scans = (self._explanation.shares, self._explanation) if self._p.judge_by_scans else (None, None)
         self._localizer = AtlasLocalizer(atlas, self._search_params, *scans)
-        return LogLine(f"{found_at}: {len(atlas.nodes)} nodes, {len(atlas.edges)} edges")
+        text = f"{found_at}: {len(atlas.nodes)} nodes, {len(atlas.edges)} edges"
+        return LogLine(f"{text}; it {warning}", logging.WARNING) if warning else LogLine(text)
 
     def _await_meetpoint(self, why: str) -> SearchStatus:
         return self._show(SearchState.WAITING, f"the next meetpoint begins a search: {why}")

@@ -38,16 +38,20 @@ class GridMap:
         if np.shape(self.map_from_grid) != (3,) or not np.all(np.isfinite(self.map_from_grid)):
             raise ValueError(f"a map needs an origin of x, y, yaw, all finite, got {self.map_from_grid}")
 
-    @cached_property
-    def fingerprint(self) -> str:
-        """SHA-256 of cells and place, in hex: equal for the map in a file and for the same one out of a message.
+    @property
+    def place(self) -> str:
+        """Where the cells are: rows, columns, resolution, x, y, yaw.
 
         The resolution counts to a micrometre (messages carry it as float32), the origin to a millimetre.
         """
-        place = f"{self.occupancy.shape[0]} {self.occupancy.shape[1]} {self.resolution_m:.6f} " + " ".join(
+        return f"{self.occupancy.shape[0]} {self.occupancy.shape[1]} {self.resolution_m:.6f} " + " ".join(
             f"{round(float(value), 3) + 0.0:.3f}" for value in self.map_from_grid
         )
-        digest = hashlib.sha256(place.encode())
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """SHA-256 of cells and place, in hex: equal for the map in a file and for the same one out of a message."""
+        digest = hashlib.sha256(self.place.encode())
         digest.update(np.ascontiguousarray(self.occupancy).tobytes())
         return digest.hexdigest()
 

@@ -88,7 +88,7 @@ def test_in_a_hallway_it_says_which_way_is_not_corrected(room, capsys):
     out = capsys.readouterr().out
     left = told(out) - true
     assert abs(left[1]) < 0.02 and abs(left[2]) < 0.01 and left[0] == pytest.approx(0.3, abs=0.01)
-    assert "the way along 0 deg of the map: not corrected" in out or "the way along 180 deg" in out
+    assert "the direction 0 deg of the map: not corrected" in out or "the direction 180 deg" in out
 
 
 def test_a_log_gives_the_scan_with_that_index(small_bag, capsys):

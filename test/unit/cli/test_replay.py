@@ -156,7 +156,7 @@ def test_a_bad_scan_is_counted_and_said(run, room_bag, tmp_path, changes, reason
     assert figures(tmp_path)["scans"] == 19
     assert figures(tmp_path)["scans_refused"] == 1
     assert figures(tmp_path)["refusals"] == {reason: 1}
-    assert f"glass_nav replay: 1 scans refused: {reason}\n" in err
+    assert f"glass_nav replay: 1 scans rejected: {reason}\n" in err
 
 
 @pytest.mark.parametrize(
@@ -397,7 +397,7 @@ def test_a_log_with_the_truth_about_its_beams_has_its_cases_scored(run, room_bag
     assert result["scan_surfaces"]["others"] == 20 * 60
     assert result["scan_surfaces"]["scans"] == 20
     lines = out.splitlines()
-    assert any(line.startswith(f"cases told      {cases['accuracy']:.3f} of 1200 beams right, ") for line in lines)
+    assert any(line.startswith(f"reported cases  {cases['accuracy']:.3f} of 1200 beams correct, ") for line in lines)
     assert any(line.startswith("  1 first surface ") and line.endswith(f"{cases['f1'][1]:.3f}") for line in lines)
     assert any(
         line.startswith("scan_surfaces   - of 0 beams that passed or were mirrored at a pane cut within 0.15 m of it, ")
@@ -447,7 +447,7 @@ def test_the_truth_is_not_looked_at_when_it_is_not_wanted(run, room_bag, tmp_pat
     code, out, _ = run(room_bag(**TRUE_BEAMS).write(), "--true-beams", "none")
     assert code == 0
     assert figures(tmp_path)["cases"] is figures(tmp_path)["scans_with_true_cases"] is None
-    assert "cases told" not in out
+    assert "reported cases" not in out
     assert not (tmp_path / "out" / "cases.png").exists()
 
 

@@ -62,7 +62,7 @@ def test_a_log_becomes_one_page_that_asks_no_address_for_anything(run, room_bag,
     drawn = PICTURES - {"glass.png"} | WORST | {"candidates.png", "confusion.png"}  # no wall was proved so early
     assert drawn | {"report.html", "per_scan.csv"} <= files
     assert out.endswith("written to out/report.html\n")
-    assert "It began without a guess; up to " in out
+    assert "It started without an initial pose; up to " in out
     (tmp_path / "elsewhere").mkdir()
     shutil.move(str(tmp_path / "out" / "report.html"), str(tmp_path / "elsewhere" / "report.html"))  # all inside
     page = browser.opened(tmp_path / "elsewhere" / "report.html", tmp_path)
@@ -118,7 +118,7 @@ def test_without_a_ground_truth_it_is_said_that_nobody_knows(run, room_bag, room
         0.01,
     )
     assert code == 0
-    assert "There is no ground truth: how far off it was nobody knows." in out
+    assert "There is no ground truth, so the errors are unknown." in out
     assert PICTURES | WORST <= {file.name for file in (tmp_path / "out").iterdir()}
 
 

@@ -242,6 +242,13 @@ def test_a_search_that_takes_too_long_is_drawn_as_it_stands(tmp_path: Path) -> N
     assert robot.lines[-2:] == ["the search did not end within 20 s", f"picture: {tmp_path / 'wakeup.png'}"]
 
 
+def test_without_an_atlas_of_the_map_the_demo_ends_at_once() -> None:
+    robot = Robot()
+    robot.events = [robot.wakes_up, robot.says(SearchState.NO_ATLAS)]
+    assert not run(robot)
+    assert robot.lines[-1] == "NO_ATLAS: why" and not robot.goals and robot.wall_s() < 5.0
+
+
 def test_a_demo_that_is_ended_is_silent_about_the_search() -> None:
     robot = Robot()
     robot.events = [robot.wakes_up]

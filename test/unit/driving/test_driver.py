@@ -39,6 +39,7 @@ from glass_nav.simulation.simulation import Simulation
 from glass_nav.topology.atlas import atlas_builder
 from glass_nav.topology.atlas.atlas import AtlasError
 from glass_nav.vocabulary import DriverPhase, LocalizationState, Outcome, SearchState
+from glass_nav.world.grid_map import GridMap
 
 CONTROL_S = 0.05
 QUICK = RecoveryParams(recovery_wait_s=0.5, recovery_back_off_m=0.1, recovery_turn_rad=0.5)
@@ -240,6 +241,32 @@ def test_a_search_that_cannot_follow_it_to_a_meetpoint_is_asked_to_begin_anew_an
     assert len(only(robot.run_for(0.2), MeetpointReport)) == 1
 
 
+def test_without_an_atlas_to_search_in_it_says_so_and_stands_until_a_search_waits():
+    robot = Robot()
+    robot.run_for(0.4)
+    assert robot.phase == DriverPhase.SEEKING
+    decided = robot.do(robot.driver.search_reports(SearchState.NO_ATLAS))
+    line = "the search has no atlas of the map that is served: the robot does not drive for it"
+    assert LogLine(line, logging.ERROR) in decided
+    robot.run_for(2.0)
+    assert robot.phase == DriverPhase.FAILED and not robot.command.any()
+    assert robot.driver.status.reason == "~seek_at_start: the search has no atlas of the map that is served"
+    assert robot.driver.search_reports(SearchState.NO_ATLAS) == []
+    robot.driver.search_reports(SearchState.WAITING)
+    robot.run_for(0.2)
+    assert robot.phase == DriverPhase.SEEKING
+
+
+def test_without_an_atlas_to_search_in_a_robot_that_stands_fails_and_one_with_a_goal_goes_on():
+    robot = standing()
+    robot.do(robot.driver.search_reports(SearchState.NO_ATLAS))
+    assert robot.driver.status.reason == "the search has no atlas of the map that is served"
+    robot = standing()
+    robot.do(robot.driver.traverse_edge(""))
+    robot.do(robot.driver.search_reports(SearchState.NO_ATLAS))
+    assert robot.driver.status.task == "traverse_edge"
+
+
 def test_moved_away_from_its_meetpoint_it_stands_at_none_and_seeks_one_only_for_a_search_that_waits():
     robot = standing()
     robot.carried_m = np.array([0.5, 0.0, 0.0])
@@ -408,6 +435,17 @@ def test_what_cannot_be_a_goal_is_refused():
     robot = started()
     (end,) = only(robot.do(robot.driver.goto_node(PlaceGoal(99))), GoalEnd)
     assert end.ending == Ending(Outcome.REFUSED, "node 99: the atlas t has nodes 0 to 3")
+
+
+def test_a_map_that_differs_in_few_cells_is_used_with_a_warning():
+    robot = started()
+    grid_map = copy.deepcopy(floor()[1])
+    row, column = np.argwhere(grid_map.free)[0]
+    grid_map.occupancy[row, column] = 100
+    changed = GridMap(grid_map.occupancy, grid_map.resolution_m, grid_map.map_from_grid)
+    (line,) = robot.do(robot.driver.map_served(changed, "that of topic /map"))
+    assert line.level == logging.WARNING
+    assert line.text.startswith("the atlas was made from t, which differs from that of topic /map in 1 of ")
 
 
 def test_another_map_is_not_that_of_the_atlas():

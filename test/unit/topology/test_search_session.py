@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, List, Optional, Tuple
 
@@ -391,6 +392,29 @@ def test_an_atlas_of_another_map_is_refused_until_its_map_comes() -> None:
     assert session.status.reason == "the next meetpoint begins a search: there is another map"
     assert session.map_served(served("glass_office"), "that of topic /map") == []
     assert states(session.reload_atlas()) == [SearchState.WAITING]
+
+
+def test_an_atlas_of_a_map_that_differs_in_few_cells_is_used_with_a_warning() -> None:
+    session = started(glass_office, judge_by_scans=False)
+    grid_map = served("glass_office")
+    row, column = np.argwhere(grid_map.free)[0]
+    occupancy = grid_map.occupancy.copy()
+    occupancy[row, column] = 100
+    (line,) = session.map_served(replace(grid_map, occupancy=occupancy), "that of topic /map")
+    differs = f"differs from that of topic /map in 1 of {grid_map.free.sum()} free cells"
+    warning = f"was made from glass_office, which {differs}"
+    assert line == LogLine(f"the atlas {warning}", logging.WARNING)
+    assert session.status.state == SearchState.WAITING
+    loaded = session.reload_atlas()[0]
+    assert loaded.level == logging.WARNING and loaded.text.endswith(f"; it {warning}")
+
+
+@pytest.mark.parametrize("is_to_end", [False, True])
+def test_a_node_that_is_told_to_ends_where_its_atlas_is_refused(is_to_end: bool) -> None:
+    session = started(glass_office, end_without_atlas=is_to_end, judge_by_scans=False)
+    assert not session.is_to_end
+    session.map_served(served("glass_atrium"), "that of topic /map")
+    assert session.is_to_end == is_to_end
 
 
 def test_a_map_need_not_be_that_of_the_atlas_where_nobody_checks() -> None:

@@ -1,4 +1,4 @@
-"""Cases and scan_surfaces against the truth that a simulator tells: confusion matrix, precision and recall.
+"""Cases and scan_surfaces against the truth from a simulator: confusion matrix, precision and recall.
 
 Cases 0..4 as in msg/BeamCases, B beams. Scores are counts, so that those of scans and of runs add up;
 figures are None where nothing was counted.
@@ -20,9 +20,9 @@ NEAR_M = 0.15  # a beam cut that near the pane shows a costmap where it is
 
 @dataclass(frozen=True)
 class CaseScores:
-    """How often beams of one case were told to be of another."""
+    """How often beams of one case were reported as another."""
 
-    confusion: np.ndarray  # (5, 5) int64 beams: rows the true case, columns the one told
+    confusion: np.ndarray  # (5, 5) int64 beams: rows the true case, columns the reported one
     answered: np.ndarray  # (5, 5) int64 of them the beams that came back with a range
 
     def __add__(self, other: "CaseScores") -> "CaseScores":

@@ -42,7 +42,7 @@ FIGURES = (
     Figure("position_p95_m", "position error, 95 %", "m", 1.0, 3, -1),
     Figure("yaw_mean_deg", "yaw error, mean", "deg", 1.0, 2, -1),
     Figure("lost_share", "more than 0.5 m off", "%", 100.0, 2, -1),
-    Figure("localized_share", "says LOCALIZED", "%", 100.0, 1, 1),
+    Figure("localized_share", "reports LOCALIZED", "%", 100.0, 1, 1),
     Figure("case_accuracy", "beam cases right", "%", 100.0, 2, 1),
     Figure("apart_mean_m", "distance from the first", "m", 1.0, 3, 0),
     Figure("cpu_ms_per_scan", "CPU per scan", "ms", 1.0, 1, -1, timing=True),

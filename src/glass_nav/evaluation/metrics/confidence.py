@@ -24,7 +24,7 @@ class Interval:
 
     @property
     def sign(self) -> int:
-        """1 or -1 where 0 is outside the interval, else 0: it cannot be told."""
+        """1 or -1 where 0 is outside the interval, else 0: not significant."""
         if self.half_width is None or abs(self.mean) <= self.half_width:
             return 0
         return 1 if self.mean > 0.0 else -1

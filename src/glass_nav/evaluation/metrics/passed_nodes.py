@@ -1,4 +1,4 @@
-"""Nodes that a robot drove past: those of an atlas against those that it saw. Seen, missed, invented.
+"""Nodes that a robot drove past: those of an atlas against those that it saw. Seen, missed, false positives.
 
 Both by one rule: a node is passed if the robot came within `near(r)` of it, in sight. Passing it again, after the robot
 has been `linger_m` further away than that, counts again. What was seen belongs to a node of the atlas if it lies within
@@ -46,7 +46,7 @@ class KnownNodes:
 
 @dataclass(frozen=True)
 class SeenNode:
-    """A node that the robot made out on its way."""
+    """A node that the robot detected."""
 
     stamp_ns: int  # when it was nearest
     first_ns: int  # while it was about
@@ -253,12 +253,12 @@ def _overlap(visit: Visit, node: SeenNode) -> bool:
 def driven_edges(
     known: KnownNodes, meetings: Sequence[Meeting], line_between: Callable[[int, int], np.ndarray]
 ) -> List[DrivenEdge]:
-    """Edges between nodes that were seen one after the other with none missed or invented between them.
+    """Edges between nodes that were seen in succession, with no miss and no false positive between them.
 
     Args:
         known: the atlas.
         meetings: in the order of time.
-        line_between: rows of two seen nodes -> (n, 2) the way that the robot took, from node to node.
+        line_between: rows of two seen nodes -> (n, 2) the path that the robot took from node to node.
     """
     found = []
     for before, after in zip(meetings, meetings[1:]):

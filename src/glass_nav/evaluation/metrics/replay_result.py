@@ -59,7 +59,7 @@ class ReplayResult:
     used_share: np.ndarray  # (S,) share of the answering beams that a case 1-4 explains
     updated: np.ndarray  # (S,) bool: the scan moved the particles
     particles: np.ndarray  # (S,) int: how many there were
-    reliability: np.ndarray  # (S,) chance that the pose is right, as the filter tells it
+    reliability: np.ndarray  # (S,) probability that the pose is right, as the filter reports it
     places: np.ndarray  # (S,) int: how many are possible while the pose is looked for; 1: it is known
     cpu_ms: np.ndarray  # (S,) CPU time of the filter, all its threads
     cases: np.ndarray  # (S, B) uint8: 0..4, NO_BEAM where a scan has no such beam

@@ -1,4 +1,4 @@
-"""One run told to a person: a verdict, the figures that matter, and what happened when.
+"""One run summarized for people: a verdict, the figures that matter, and what happened when.
 
 S scans. A pose is right within RIGHT_M and RIGHT_RAD of the reference: the right room and the right direction.
 """
@@ -100,7 +100,7 @@ def first_localized(result: ReplayResult) -> Optional[int]:
 
 
 def driven_m(result: ReplayResult) -> np.ndarray:
-    """(S,) way since the first scan by odometry."""
+    """(S,) distance since the first scan by odometry."""
     steps = np.diff(result.odom_from_base[:, :2], axis=0)
     return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
 
@@ -149,7 +149,7 @@ def percent(share: float) -> str:
 
 
 def _scope(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -> np.ndarray:
-    """(S,) bool: scans that the errors are told of. A pose that is being looked for has none yet."""
+    """(S,) bool: scans whose errors count. A pose that is still searched for has none."""
     since = np.zeros(len(result), bool) if found is None else np.arange(len(result)) >= found
     since &= errors.matched
     return since if since.any() else errors.matched
@@ -163,17 +163,17 @@ def _wrong_share(result: ReplayResult, errors: PoseErrors) -> float:
 
 def _verdict(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -> Tuple[str, str]:
     if found is None:
-        return BAD, "The robot never said that it knew where it was"
+        return BAD, "The robot never reported LOCALIZED"
     states = np.array(result.states[found:])
     said = float(np.mean(states == LocalizationState.LOCALIZED))
     if not errors.matched.any():
         if states[-1] == LocalizationState.LOCALIZED and said >= _MANY:
-            return GOOD, "The robot said that it knew where it was, and its scans did not contradict"
+            return GOOD, "The robot reported LOCALIZED throughout, and its scans did not contradict it"
         grade = BAD if states[-1] == LocalizationState.LOST or said < 0.5 else FAIR
-        return grade, f"The robot said that it knew where it was for {percent(said)} of the run"
+        return grade, f"The robot reported LOCALIZED for {percent(said)} of the run"
     wrong = _wrong_share(result, errors)
     if wrong > _FEW:
-        return BAD, f"The robot was sure of a wrong place for {percent(wrong)} of the scans that it said LOCALIZED at"
+        return BAD, f"The pose was wrong in {percent(wrong)} of the scans reported as LOCALIZED"
     if said < 0.5 or states[-1] == LocalizationState.LOST:
         return BAD, "The robot did not know where it was for most of the run"
     off = float(np.mean(errors.position_m[_scope(result, errors, found)] > LOST_M))
@@ -185,7 +185,7 @@ def _verdict(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -> 
 def _drive(result: ReplayResult) -> str:
     return (
         f"It drove {driven_m(result)[-1]:.0f} m in {duration(float(seconds_of(result)[-1]))} and used "
-        f"{len(result)} scans" + (f" ({sum(result.refusals.values())} more were refused)." if result.refusals else ".")
+        f"{len(result)} scans" + (f" ({sum(result.refusals.values())} more were rejected)." if result.refusals else ".")
     )
 
 
@@ -194,9 +194,11 @@ def _beginning(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -
         return []
     most = int(result.places.max())
     if found is None:
-        return [f"It began without a guess; up to {most} places were possible, and {result.places[-1]} at the end."]
+        return [
+            f"It started without an initial pose; up to {most} places were possible, and {result.places[-1]} at the end."
+        ]
     text = (
-        f"It began without a guess: up to {most} places were possible, one was left after "
+        f"It started without an initial pose: up to {most} places were possible, one was left after "
         f"{duration(float(seconds_of(result)[found]))} and {driven_m(result)[found]:.1f} m"
     )
     if errors.matched[found]:
@@ -207,7 +209,7 @@ def _beginning(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -
 
 def _accuracy(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -> List[str]:
     if not errors.matched.any():
-        return ["There is no ground truth: how far off it was nobody knows. What is shown is what the filter claims."]
+        return ["There is no ground truth, so the errors are unknown. What is shown is what the filter claims."]
     off = errors.position_m[_scope(result, errors, found)]
     yaw_deg = np.degrees(errors.yaw_rad[_scope(result, errors, found)])
     lost = np.mean(off > LOST_M)
@@ -215,7 +217,7 @@ def _accuracy(result: ReplayResult, errors: PoseErrors, found: Optional[int]) ->
         f"Half of its poses were within {metres(np.median(off))} and {np.median(yaw_deg):.1f}° of the ground "
         f"truth, 95 % within {metres(_percentile(off, 95))}; "
         + (
-            f"it was never more than {metres(off.max())} off."
+            f"the error never exceeded {metres(off.max())}."
             if lost == 0.0
             else f"for {percent(float(lost))} of the scans it was more than {LOST_M} m off, at most "
             f"{metres(off.max())}."
@@ -265,7 +267,7 @@ def _figures(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -> 
     share = float(np.mean(np.array(result.states) == LocalizationState.LOCALIZED))
     figures.append(
         Figure(
-            "Said LOCALIZED",
+            "Reported LOCALIZED",
             percent(share),
             "of all scans"
             + (f"; at a wrong place: {percent(_wrong_share(result, errors))} of them" if errors.matched.any() else ""),

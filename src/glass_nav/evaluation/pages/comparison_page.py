@@ -37,7 +37,7 @@ def headline(compared: Comparison) -> str:
     first, *others = compared.contestants
     figure = compared.figures[0]
     value = comparison.text(figure, compared.interval(first, figure))
-    if figure.better == 0:  # nobody knows more than that
+    if figure.better == 0:  # no figure can be better than another
         return f"{figure.title[0].upper()}{figure.title[1:]}: " + "; ".join(
             f"{name} {comparison.text(figure, compared.interval(name, figure))} {figure.unit}" for name in others
         )

@@ -13,7 +13,7 @@ def run_lines(result: ReplayResult) -> List[str]:
     """The figures of a run for people."""
     figures = result.metrics()
     lines = [
-        f"{figures['scans']} scans, {figures['updates']} updates, {figures['scans_refused']} refused; "
+        f"{figures['scans']} scans, {figures['updates']} updates, {figures['scans_refused']} rejected; "
         f"{figures['cpu_ms_per_scan']:.1f} ms CPU per scan, {figures['times_real_time']:.1f} times real time"
     ]
     if figures["position_mean_m"] is not None or result.errors.matched.any():
@@ -42,10 +42,10 @@ def _case_lines(scores: Optional[Dict[str, Any]]) -> List[str]:
     if scores is None:
         return []
     lines = [
-        f"cases told      {_figure(scores['accuracy'])} of {scores['beams']} beams right, "
+        f"reported cases  {_figure(scores['accuracy'])} of {scores['beams']} beams correct, "
         f"{_figure(scores['accuracy_answered'])} of those that answered; macro F1 {_figure(scores['macro_f1'])}; "
         f"{_figure(scores['used_share'])} used",
-        f"  {'':22s}{'true':>9s}{'told':>9s}{'precision':>11s}{'recall':>8s}{'F1':>8s}",
+        f"  {'':22s}{'true':>9s}{'reported':>9s}{'precision':>11s}{'recall':>8s}{'F1':>8s}",
     ]
     for case in CASES_IN_ORDER:
         share, told = (100 * (scores[key][case] or 0.0) for key in ("true_share", "told_share"))
@@ -77,12 +77,14 @@ def topology_lines(figures: Optional[Dict[str, Any]]) -> List[str]:
     if figures is None:
         return []
     why = figures["missed_why"]
-    lines = [f"topology        {'':12s}{'passed':>8s}{'seen':>8s}{'missed':>8s}{'invented':>10s}{'degree right':>14s}"]
+    lines = [
+        f"topology        {'':12s}{'passed':>8s}{'seen':>8s}{'missed':>8s}{'false pos.':>12s}{'degree right':>14s}"
+    ]
     for name, row in (("meetpoints", figures["meetpoints"]), ("dead ends", figures["dead_ends"]), ("all", figures)):
         share = "-" if row["degree_right_share"] is None else f"{100 * row['degree_right_share']:.0f} %"
         seen = f"{row['seen']}" if row["seen_share"] is None else f"{row['seen']} ({100 * row['seen_share']:.0f} %)"
         lines.append(
-            f"  {name:14s}{'':12s}{row['passed']:8d}{seen:>11s}{row['missed']:5d}{row['invented']:10d}{share:>14s}"
+            f"  {name:14s}{'':12s}{row['passed']:8d}{seen:>11s}{row['missed']:5d}{row['invented']:12d}{share:>14s}"
         )
     lines.append(
         f"  missed          {why['doubtful']} whose obstacles were not seen well enough, {why['unsteady']} "

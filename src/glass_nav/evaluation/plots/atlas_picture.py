@@ -13,7 +13,7 @@ from glass_nav.evaluation.plots.map_layer import UNKNOWN_GREY, draw_map
 from glass_nav.world.grid_map import GridMap
 
 MARGIN_M = 1.0
-MAX_NUMBERS = 250  # nodes; more numbers than these nobody can read
+MAX_NUMBERS = 250  # nodes; more numbers are unreadable
 MIN_NUMBERED_M = 0.8
 EDGE_COLOUR, CHOSEN_COLOUR, WALL_COLOUR = "#1f77b4", "#d62728", "#009e73"
 NODE_COLOURS = {1: "#ff8c00", 2: "#9467bd", 3: "#d62728", 4: "#2ca02c", 5: "#111111"}  # 5 and more
@@ -28,8 +28,8 @@ class AtlasDrawing:
     r_m: np.ndarray  # (N,)
     degree: np.ndarray  # (N,)
     lines_m: Sequence[np.ndarray]  # (E) arrays (n, 2)
-    seen_there_m: Sequence[np.ndarray]  # (E) arrays (k, 4): wall segments seen on the way of the line
-    seen_back_m: Sequence[np.ndarray]  # (E) arrays (k, 4): and on the way back
+    seen_there_m: Sequence[np.ndarray]  # (E) arrays (k, 4): wall segments seen along the line
+    seen_back_m: Sequence[np.ndarray]  # (E) arrays (k, 4): and along its return
 
 
 def draw_atlas(path: Path, grid: Optional[GridMap], atlas: AtlasDrawing, title: str) -> None:
@@ -182,4 +182,4 @@ def _draw_arrow(axes: Any, line: np.ndarray, colour: Any) -> None:
 
 def _counts(atlas: AtlasDrawing) -> str:
     way_m = sum(float(np.hypot(*np.diff(line, axis=0).T).sum()) for line in atlas.lines_m)
-    return f"{len(atlas.r_m)} nodes, {len(atlas.lines_m)} edges, {way_m:.0f} m of ways"
+    return f"{len(atlas.r_m)} nodes, {len(atlas.lines_m)} edges, {way_m:.0f} m of paths"

@@ -1,4 +1,4 @@
-"""The pictures of a comparison: figures with their intervals, and errors and ways of each log."""
+"""The pictures of a comparison: figures with their intervals, and errors and paths of each log."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from glass_nav.evaluation.plots.map_layer import draw_map
 from glass_nav.evaluation.plots.report.driven_path import TRUTH_COLOUR, bounds_of
 from glass_nav.world.grid_map import GridMap
 
-MAX_LOGS = 6  # have pictures of their own; a sweep over hundreds is told by its figures
+MAX_LOGS = 6  # have pictures of their own; a sweep over hundreds has its figures
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")  # Okabe and Ito's
 _COLUMNS = 3  # of the panels
 _MIN_M = 1e-3  # errors below are drawn there, on a logarithmic axis
@@ -24,7 +24,7 @@ _SPREAD = 0.22  # of the dots of one contestant, in rows
 
 
 def draw_all(folder: Path, compared: Comparison, grids: Mapping[str, GridMap]) -> List[Picture]:
-    """The figures of all logs first, then each of the first MAX_LOGS logs; ways where its map is there."""
+    """The figures of all logs first, then each of the first MAX_LOGS logs; paths where its map exists."""
     found = [_figures(folder, compared)]
     for number, log in enumerate(compared.logs[:MAX_LOGS], 1):
         errors = _errors(folder, compared, log, number)
@@ -186,6 +186,6 @@ def _ways(folder: Path, compared: Comparison, log: str, number: int, grid: GridM
         figure,
         f"ways_{number:02d}",
         f"Ways: {log}",
-        f"The way over the map of {log} by each contestant.",
+        f"The path over the map of {log} by each contestant.",
         "One run of each, that of the lowest seed.",
     )

@@ -1,4 +1,4 @@
-"""Picture of a drive over map and atlas: nodes seen green, missed red, invented orange. By matplotlib."""
+"""Picture of a drive over map and atlas: nodes seen green, missed red, false positives orange. By matplotlib."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def draw(
     draw_map(axes, grid, low, high)
     axes.add_collection(LineCollection(list(lines_m), colors=_EDGE_COLOUR, linewidths=0.8, zorder=2))
     axes.plot(*score.known.position_m.T, ".", color=_NODE_COLOUR, markersize=3.0, zorder=2.5)
-    axes.plot(*way_m.T, color=_WAY_COLOUR, linewidth=0.9, alpha=0.8, zorder=3, label="way of the robot")
+    axes.plot(*way_m.T, color=_WAY_COLOUR, linewidth=0.9, alpha=0.8, zorder=3, label="path of the robot")
     for verdict in COLOURS:
         _draw_meetings(axes, score, verdict)
     axes.legend(loc="best", fontsize=8, framealpha=0.9)
@@ -57,7 +57,7 @@ def draw(
     figures = score.metrics()
     axes.set_title(
         f"{title}\n{figures['passed']} nodes passed: {figures['seen']} seen, {figures['missed']} missed; "
-        f"{figures['invented']} invented",
+        f"{figures['invented']} false positives",
         fontsize=11,
     )
     figure.savefig(path)

@@ -15,7 +15,7 @@ from glass_nav.evaluation.plots.map_layer import draw_map
 from glass_nav.vocabulary import BeamCase
 from glass_nav.world.grid_map import GridMap
 
-MARGIN_M = 3.0  # of map around the way of the robot
+MARGIN_M = 3.0  # of map around the path
 REFERENCE_COLOUR = "#1f77b4"
 ERROR_COLOURS = ("#1b3a8a", "#8a2d9c", "#e0264f", "#ff8c00")  # small to large, all dark enough on white
 
@@ -43,7 +43,7 @@ def draw_trajectory(path: Path, grid: GridMap, result: ReplayResult, title: str)
 
 
 def draw_cases(path: Path, grid: GridMap, result: ReplayResult, title: str) -> None:
-    """Left: what beams of each true case were told to be. Right: the beams of a few scans, true above, told below.
+    """Left: reported case of the beams of each true case. Right: the beams of a few scans, true above, reported below.
 
     Needs result.case_scores.
     """
@@ -54,7 +54,7 @@ def draw_cases(path: Path, grid: GridMap, result: ReplayResult, title: str) -> N
     parts = figure.add_gridspec(2, columns + 1, width_ratios=[5.5] + [4.2] * columns)
     draw_confusion(figure.add_subplot(parts[:, 0]), result.case_scores.confusion)
     for column, example in enumerate(result.examples, 1):
-        for row, (name, case) in enumerate((("true", example.true_case), ("told", example.told_case))):
+        for row, (name, case) in enumerate((("true", example.true_case), ("reported", example.told_case))):
             axes = figure.add_subplot(parts[row, column])
             _draw_beams(axes, grid, example, case)
             seconds = (example.stamp_ns - result.stamps_ns[0]) * 1e-9

@@ -1,4 +1,4 @@
-"""Picture of a robot that woke up somewhere: its way over the map, the candidates at each depth, where it ended.
+"""Picture of a robot that woke up somewhere: its path over the map, the candidates at each depth, where it ended.
 
 By matplotlib without a display. Poses (3,) x [m], y [m], yaw [rad] in the frame map.
 """
@@ -44,7 +44,7 @@ class WakeUpStory:
 
 
 def draw(path: Path, grid: GridMap, story: WakeUpStory, title: str) -> None:
-    """Above the whole way, below a small map for each depth."""
+    """Above the whole path, below a small map for each depth."""
     low, high = _bounds(grid, story)
     shown = _shown(len(story.depths))
     rows = math.ceil(len(shown) / COLUMNS)
@@ -69,7 +69,7 @@ def _shown(count: int) -> List[int]:
 
 
 def _bounds(grid: GridMap, story: WakeUpStory) -> "tuple[np.ndarray, np.ndarray]":
-    """All that is drawn, and at least the way."""
+    """All that is drawn, and at least the path."""
     parts = [story.search_m, story.tour_m, *(depth.candidates[:, :2] for depth in story.depths)]
     points = np.concatenate([part.reshape(-1, 2) for part in parts])
     if not len(points):

@@ -184,7 +184,7 @@ class DriverNode:
 
     def _take_topology(self, msg: TopologyStatus) -> None:
         try:
-            self._driver.search_reports(driver_messages.search_state(msg))
+            self._do(self._driver.search_reports(driver_messages.search_state(msg)))
         except ValueError as err:
             self._log.warn(f"not used: {err}")
 
@@ -197,7 +197,7 @@ class DriverNode:
     def _take_map(self, msg: OccupancyGrid) -> None:
         topic = rospy.resolve_name("map")
         try:
-            self._driver.map_served(conversions.map_from_msg(msg), f"that of topic {topic}")
+            self._do(self._driver.map_served(conversions.map_from_msg(msg), f"that of topic {topic}"))
         except AtlasError as err:
             rospy.logerr(str(err))
         except ValueError as err:

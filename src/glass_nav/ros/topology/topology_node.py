@@ -58,6 +58,7 @@ from glass_nav.topology.observations import ObservationError
 from glass_nav.topology.search_session import Decision, GoalOutcome, SearchSession, SearchStatus
 
 SERVICE_TIMEOUT_S = 30.0
+LAST_WORDS_S = 2.0  # by the wall clock, for others to hear the status
 
 
 class TopologyNode:
@@ -110,7 +111,11 @@ class TopologyNode:
             )
 
     def run(self, ending: threading.Event) -> None:
-        """The only thread that touches the session; returns when ROS shuts down or ending is set."""
+        """The only thread that touches the session; returns when ROS shuts down or ending is set.
+
+        Raises:
+            AtlasError: the atlas is refused, and ~end_without_atlas.
+        """
         while not (rospy.is_shutdown() or ending.is_set()):
             mail = self._inbox.take(timeout_s=0.1)
             jump = self._clock.tick()
@@ -118,6 +123,9 @@ class TopologyNode:
                 self._carry_out(self._session.time_jumped_back(jump))
             for work in [*mail["commands"], *mail["reports"]]:
                 work()
+            if self._session.is_to_end:
+                ending.wait(LAST_WORDS_S)
+                raise AtlasError(self._session.status.reason)
 
     # -- events
 
@@ -255,7 +263,7 @@ class TopologyNode:
 
 
 def main() -> None:
-    """Start the node; exit code 2 if a parameter cannot be used, 3 if the atlas cannot."""
+    """Start the node; exit code 2 if a parameter cannot be used, 3 if the atlas cannot, see ~end_without_atlas too."""
     shutdown.run_node(
         "topology",
         lambda given: TopologyNode(params.load(TopologyParams, given, rospy.get_name())),

@@ -13,11 +13,13 @@ angles, which it leaves for later, are kept per dart.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Sequence, Tuple
+from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
 from glass_nav.topology.atlas import components
+from glass_nav.world.free_space import FreeSpace
+from glass_nav.world.grid_map import GridMap
 
 MEETPOINT, DEAD_END, RING_MARKER = 0, 1, 2
 KINDS = ("meetpoint", "dead_end", "ring_marker")  # a ring without a meetpoint has one node, somewhere on it
@@ -25,6 +27,7 @@ KINDS = ("meetpoint", "dead_end", "ring_marker")  # a ring without a meetpoint h
 BEARING_AT_M = 0.5  # a dart's bearing is measured from its node to the point this far along the edge, or to its end
 ORDER_SLACK_RAD = 1e-3  # rounding may turn two darts of one node past each other by this angle
 CHORD_SLACK_M = 1e-3  # rounding may make a straight edge shorter than its chord by this length
+MAX_DIFFERING_SHARE = 1e-3  # of the free cells: another drawing of the same map, not another map
 POLYLINE_SLACK_M = 0.5  # the line of an edge may end this far from its node: meetpoints lie between cells
 
 
@@ -110,6 +113,7 @@ class MapReference:
 
     name: str
     sha256: str  # GridMap.fingerprint; empty: not known, every map is accepted
+    free_space: Optional[FreeSpace] = None  # of the map; None: not known, only the very same map is accepted
 
 
 @dataclass(frozen=True)
@@ -201,13 +205,31 @@ class Atlas:
         position = self.nodes.position_m[self.darts.node[dart]]
         return np.concatenate([position, self.darts.bearing_rad[dart][..., None]], axis=-1)
 
-    def refuse_other_map(self, fingerprint: str, what: str) -> None:
-        """Raises AtlasError if a map, by its GridMap.fingerprint, is not the one that the atlas was made from."""
-        if self.source.sha256 and self.source.sha256 != fingerprint:
-            raise AtlasError(
-                f"was made from another map than {what}: from {self.source.name or 'one without a name'} "
-                f"with sha256 {self.source.sha256[:12]}..., got {fingerprint[:12]}..."
-            )
+    def check_map(self, grid_map: GridMap, what: str) -> str:
+        """Whether a map is the one that the atlas was made from.
+
+        Args:
+            grid_map: it.
+            what: for people, as "that of topic /map".
+
+        Returns:
+            A warning where a few cells differ, else "".
+
+        Raises:
+            AtlasError: it is another map.
+        """
+        source = self.source
+        if source.sha256 in ("", grid_map.fingerprint):
+            return ""
+        name = source.name or "one without a name"
+        differing = None if source.free_space is None else source.free_space.cells_that_differ(grid_map)
+        if source.free_space is None or differing is None:
+            how = f"with sha256 {source.sha256[:12]}..., got {grid_map.fingerprint[:12]}..."
+            raise AtlasError(f"was made from another map than {what}: from {name} {how}")
+        cells = f"{differing} of {source.free_space.free_cells} free cells"
+        if differing > MAX_DIFFERING_SHARE * source.free_space.free_cells:
+            raise AtlasError(f"was made from another map than {what}: from {name}, which differs in {cells}")
+        return f"was made from {name}, which differs from {what} in {cells}" if differing else ""
 
     def components(self) -> Tuple[int, np.ndarray]:
         """How many parts do not touch, and (N,) in which of them each node lies."""

@@ -33,6 +33,7 @@ from glass_nav.topology.atlas.atlas import (
 from glass_nav.topology.atlas.edge_views import EdgeViews, ViewParams
 from glass_nav.topology.atlas.voronoi.graph import VoronoiGraph
 from glass_nav.topology.atlas.voronoi_graph import VoronoiParams
+from glass_nav.world.free_space import FreeSpace
 from glass_nav.world.grid_map import GridMap
 
 R_SIGMA_CELLS = 1.0  # measured on rough walls: up to 0.9 less than on smooth ones
@@ -116,7 +117,7 @@ def _atlas(graph: VoronoiGraph, seen: Ragged, grid_map: GridMap, name: str, map_
     node = graph.edge_node.ravel().astype(np.int64)
     return Atlas(
         name,
-        MapReference(map_name, grid_map.fingerprint),
+        MapReference(map_name, grid_map.fingerprint, FreeSpace.of(grid_map)),
         Nodes(graph.position_m, graph.r_m, sigma_r_m, kind),
         edges,
         Darts(node, bearing, seen),

@@ -9,11 +9,12 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Sequence, Tuple, Union
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from glass_nav.topology.atlas.atlas import KINDS, Atlas, AtlasError, Darts, Edges, MapReference, Nodes, Ragged, Visits
+from glass_nav.world.free_space import FreeSpace
 
 FORMAT, VERSION = "glass_nav/atlas", 1
 
@@ -23,6 +24,7 @@ _NODE = ("id", "kind", "x", "y", "r", "sigma_r", "darts")
 _EDGE = ("id", "from", "to", "length", "chord", "sigma", "clearance", "bearing_from", "bearing_to")
 _EDGE_MAY = ("polyline", "segments_from", "segments_to", "visits")
 _VISITS = ("count", "mean", "m2")
+_MAP, _MAP_MAY = ("name", "sha256"), ("place", "free")
 _MISSING = object()
 
 Row = Dict[str, Any]
@@ -35,12 +37,16 @@ def text_of(atlas: Atlas) -> str:
         "format": FORMAT,
         "version": VERSION,
         "name": atlas.name,
-        "map": {"name": atlas.source.name, "sha256": atlas.source.sha256},
+        "map": {"name": atlas.source.name, "sha256": atlas.source.sha256, **_free_space_entry(atlas.source.free_space)},
     }
     lines = [f" {json.dumps(key)}: {json.dumps(value)}" for key, value in head.items()]
     for key, rows in (("nodes", _node_rows(atlas)), ("edges", _edge_rows(atlas))):
         lines.append(f" {json.dumps(key)}: [\n  " + ",\n  ".join(json.dumps(row) for row in rows) + "\n ]")
     return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _free_space_entry(free_space: Optional[FreeSpace]) -> Row:
+    return {} if free_space is None else {"place": free_space.place, "free": free_space.text}
 
 
 def _node_rows(atlas: Atlas) -> List[Row]:
@@ -114,8 +120,8 @@ def load(path: Path) -> Atlas:
     name, source = _text("the atlas", data, "name"), data["map"]
     if not isinstance(source, dict):
         raise AtlasError(f"map must be an object with name and sha256, got {_short(source)}")
-    _refuse_keys("map", source, ("name", "sha256"), ())
-    reference = MapReference(_text("map", source, "name"), _text("map", source, "sha256"))
+    _refuse_keys("map", source, _MAP, _MAP_MAY)
+    reference = MapReference(_text("map", source, "name"), _text("map", source, "sha256"), _free_space(source))
     if reference.sha256 and not (len(reference.sha256) == 64 and set(reference.sha256) <= set("0123456789abcdef")):
         raise AtlasError(f"map: sha256 must be 64 digits 0-9a-f or empty, got {_short(reference.sha256)}")
     nodes, edges = _rows(data, "nodes", _NODE, ("visits",)), _rows(data, "edges", _EDGE, _EDGE_MAY)
@@ -128,6 +134,16 @@ def load(path: Path) -> Atlas:
         _rings(nodes),
         Visits(*_visits("node", nodes), *_visits("edge", edges)),
     )
+
+
+def _free_space(source: Row) -> Optional[FreeSpace]:
+    if not any(key in source for key in _MAP_MAY):
+        return None
+    _refuse_keys("map", source, (*_MAP, *_MAP_MAY), ())
+    try:
+        return FreeSpace.from_text(_text("map", source, "place"), _text("map", source, "free"))
+    except ValueError as err:
+        raise AtlasError(f"map: free: {err}") from err
 
 
 def _nodes(rows: List[Row]) -> Nodes:

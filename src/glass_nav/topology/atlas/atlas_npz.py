@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import zipfile
 from pathlib import Path
-from typing import Dict
+from typing import Dict, Mapping, Optional
 
 import numpy as np
 
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError, Darts, Edges, MapReference, Nodes, Ragged, Visits
 from glass_nav.topology.atlas.atlas_json import FORMAT, VERSION
+from glass_nav.world.free_space import FreeSpace
 
 _NPZ_FLOAT = {
     "node_position_m": 2,
@@ -38,12 +39,14 @@ _NPZ_INT = (
     "visits_edge_count",
 )
 _NPZ_TEXT = ("format", "name", "map_name", "map_sha256")
+_NPZ_MAY = ("map_place", "map_free")
 
 
 def arrays_of(atlas: Atlas) -> Dict[str, np.ndarray]:
     """By the names in the file."""
     nodes, edges, darts, visits = atlas.nodes, atlas.edges, atlas.darts, atlas.visits
     return {
+        **_free_space_arrays(atlas.source.free_space),
         "format": np.array(f"{FORMAT}/{VERSION}"),
         "name": np.array(atlas.name),
         "map_name": np.array(atlas.source.name),
@@ -73,6 +76,12 @@ def arrays_of(atlas: Atlas) -> Dict[str, np.ndarray]:
     }
 
 
+def _free_space_arrays(free_space: Optional[FreeSpace]) -> Dict[str, np.ndarray]:
+    if free_space is None:
+        return {}
+    return {"map_place": np.array(free_space.place), "map_free": np.frombuffer(free_space.packed, np.uint8)}
+
+
 def load(path: Path) -> Atlas:
     """Raises AtlasError, in one line without the file."""
     try:
@@ -99,7 +108,7 @@ def load(path: Path) -> Atlas:
     a = arrays
     return Atlas(
         text["name"],
-        MapReference(text["map_name"], text["map_sha256"]),
+        MapReference(text["map_name"], text["map_sha256"], _free_space(a)),
         Nodes(a["node_position_m"], a["node_r_m"], a["node_sigma_r_m"], a["node_kind"].astype(np.int8)),
         Edges(
             a["edge_length_m"],
@@ -119,3 +128,15 @@ def load(path: Path) -> Atlas:
             a["visits_edge_length_m2"],
         ),
     )
+
+
+def _free_space(arrays: Mapping[str, np.ndarray]) -> Optional[FreeSpace]:
+    missing = [name for name in _NPZ_MAY if name not in arrays]
+    if len(missing) == len(_NPZ_MAY):
+        return None
+    if missing:
+        raise AtlasError(f"lacks {', '.join(missing)}")
+    try:
+        return FreeSpace(str(arrays["map_place"]), arrays["map_free"].astype(np.uint8).tobytes())
+    except ValueError as err:
+        raise AtlasError(f"map_free: {err}") from err

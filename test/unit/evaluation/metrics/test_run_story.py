@@ -59,15 +59,15 @@ def test_a_good_run_is_told_as_one():
     story = run_story.of(a_run())
     assert (story.grade, story.headline) == ("good", "The robot knew where it was, and it was right")
     assert story.sentences == [
-        "It drove 99 m in 1 min 39 s and used 100 scans (1 more were refused).",
-        "Half of its poses were within 2.0 cm and 0.0° of the ground truth, 95 % within 2.0 cm; it was never more than "
-        "2.0 cm off.",
+        "It drove 99 m in 1 min 39 s and used 100 scans (1 more were rejected).",
+        "Half of its poses were within 2.0 cm and 0.0° of the ground truth, 95 % within 2.0 cm; the error never "
+        "exceeded 2.0 cm.",
         "It never doubted its pose.",
     ]
     assert [(each.name, each.value) for each in story.figures] == [
         ("Position error", "2.0 cm"),
         ("Heading error", "0.00°"),
-        ("Said LOCALIZED", "100 %"),
+        ("Reported LOCALIZED", "100 %"),
         ("Beams explained", "90.0 %"),
         ("Update", "20 ms"),
     ]
@@ -81,7 +81,7 @@ def test_a_good_run_is_told_as_one():
         pytest.param(
             {"map_from_base": off_by(3.0, 40, 60)},
             "bad",
-            "The robot was sure of a wrong place for 20.0 % of the scans that it said LOCALIZED at",
+            "The pose was wrong in 20.0 % of the scans reported as LOCALIZED",
             id="sure and wrong",
         ),
         pytest.param(
@@ -99,25 +99,25 @@ def test_a_good_run_is_told_as_one():
         pytest.param(
             {"states": ["GLOBAL_SEARCH"] * SCANS, "places": np.full(SCANS, 12)},
             "bad",
-            "The robot never said that it knew where it was",
+            "The robot never reported LOCALIZED",
             id="never found",
         ),
         pytest.param(
             {"reference": None},
             "good",
-            "The robot said that it knew where it was, and its scans did not contradict",
+            "The robot reported LOCALIZED throughout, and its scans did not contradict it",
             id="nobody knows",
         ),
         pytest.param(
             {"reference": None, "states": states(LOST=(90, 100))},
             "bad",
-            "The robot said that it knew where it was for 90.0 % of the run",
+            "The robot reported LOCALIZED for 90.0 % of the run",
             id="nobody knows, lost at the end",
         ),
         pytest.param(
             {"reference": None, "states": states(UNCERTAIN=(50, 70))},
             "fair",
-            "The robot said that it knew where it was for 80.0 % of the run",
+            "The robot reported LOCALIZED for 80.0 % of the run",
             id="nobody knows, doubts",
         ),
     ],
@@ -141,13 +141,13 @@ def test_a_start_without_a_guess_is_told_and_its_errors_count_from_when_it_was_f
     poses = off_by(20.0, 0, 10)
     story = run_story.of(a_run(states=states(GLOBAL_SEARCH=(0, 10)), places=places, map_from_base=poses))
     assert story.sentences[1] == (
-        "It began without a guess: up to 500 places were possible, one was left after 10.0 s "
+        "It started without an initial pose: up to 500 places were possible, one was left after 10.0 s "
         "and 10.0 m, the right one, 2.0 cm off."
     )
     assert story.sentences[2].startswith("Half of its poses were within 2.0 cm")
     assert story.figures[0].note == "median; since it was first LOCALIZED; 95 % below 2.0 cm"
     never = run_story.of(a_run(states=["GLOBAL_SEARCH"] * SCANS, places=np.full(SCANS, 12), map_from_base=poses))
-    assert never.sentences[1] == "It began without a guess; up to 12 places were possible, and 12 at the end."
+    assert never.sentences[1] == "It started without an initial pose; up to 12 places were possible, and 12 at the end."
 
 
 def test_episodes_follow_each_other_without_a_gap():

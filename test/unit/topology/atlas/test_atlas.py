@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Callable
+from typing import Any, Callable, Tuple
 
 import made_atlases
 import numpy as np
@@ -21,6 +21,8 @@ from glass_nav.topology.atlas.atlas import (
     rings_clockwise,
     twin,
 )
+from glass_nav.world.free_space import FreeSpace
+from glass_nav.world.grid_map import GridMap
 
 
 def crossing() -> Atlas:
@@ -76,15 +78,46 @@ def test_visits_have_the_mean_and_spread_of_what_was_measured() -> None:
     assert (visits.edge_length_mean_m[0], visits.edge_length_m2[0]) == (7.0, 0.0)
 
 
+def floor_of(free_cells: int, shape: Tuple[int, int] = (40, 60)) -> GridMap:
+    occupancy = np.full(shape, 100, np.int8)
+    occupancy.ravel()[:free_cells] = 0
+    return GridMap(occupancy, 0.05, np.zeros(3))
+
+
 def test_an_atlas_of_another_map_is_refused_one_without_a_map_fits_all() -> None:
+    lab = floor_of(2000)
     atlas = replace(crossing(), source=MapReference("office", "ab" * 32))
-    atlas.refuse_other_map("ab" * 32, "lab.yaml")
-    crossing().refuse_other_map("cd" * 32, "lab.yaml")
+    assert replace(atlas, source=MapReference("office", lab.fingerprint)).check_map(lab, "lab.yaml") == ""
+    assert crossing().check_map(lab, "lab.yaml") == ""
     with pytest.raises(AtlasError) as refused:
-        atlas.refuse_other_map("cd" * 32, "lab.yaml")
+        atlas.check_map(lab, "lab.yaml")
     assert str(refused.value) == (
-        "was made from another map than lab.yaml: from office with sha256 abababababab..., got cdcdcdcdcdcd..."
+        "was made from another map than lab.yaml: from office with sha256 abababababab..., got "
+        f"{lab.fingerprint[:12]}..."
     )
+
+
+def test_a_map_that_differs_in_a_few_cells_is_told_from_another_map() -> None:
+    drawn = floor_of(2000)
+    atlas = replace(crossing(), source=MapReference("office", drawn.fingerprint, FreeSpace.of(drawn)))
+    assert atlas.check_map(drawn, "lab.yaml") == ""
+    assert atlas.check_map(floor_of(2002), "lab.yaml") == (
+        "was made from office, which differs from lab.yaml in 2 of 2000 free cells"
+    )
+    with pytest.raises(AtlasError) as refused:
+        atlas.check_map(floor_of(1997), "lab.yaml")
+    assert str(refused.value) == (
+        "was made from another map than lab.yaml: from office, which differs in 3 of 2000 free cells"
+    )
+    with pytest.raises(AtlasError, match="from office with sha256 .*, got "):
+        atlas.check_map(floor_of(2000, (60, 40)), "lab.yaml")
+
+
+def test_walls_that_look_unknown_do_not_matter_to_an_atlas() -> None:
+    drawn, scanned = floor_of(2000), floor_of(2000)
+    scanned.occupancy[scanned.occupancy == 100] = -1
+    atlas = replace(crossing(), source=MapReference("office", drawn.fingerprint, FreeSpace.of(drawn)))
+    assert atlas.check_map(scanned, "lab.yaml") == ""
 
 
 def changed(part: str, name: str, value: Any) -> Callable[[Atlas], Atlas]:

@@ -42,6 +42,14 @@ def test_an_atlas_comes_back_from_its_file(suffix: str, seed: int, tmp_path: Pat
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
 
 
+@pytest.mark.parametrize("suffix", ["json", "npz"])
+def test_the_free_space_of_the_map_comes_back(suffix: str, tmp_path: Path) -> None:
+    atlas = atlas_file.load(shipped_atlases.find("glass_bridge"))
+    atlas_file.save(atlas, tmp_path / f"atlas.{suffix}")
+    assert atlas.source.free_space is not None
+    assert atlas_file.load(tmp_path).source == atlas.source
+
+
 def test_lines_and_segments_come_back(tmp_path: Path) -> None:
     data = example()
     data["edges"][0]["segments_to"] = [[0, 1, 2, 1], [3, 1, 4.5, 1]]
@@ -91,6 +99,8 @@ IN_SCHEMA = [
     (set_("map", "office"), "map must be an object with name and sha256, got 'office'"),
     (drop("map", "sha256"), "map: sha256 is missing, needed are name, sha256"),
     (set_("map", "sha256", "xyz"), "map: sha256 must be 64 digits 0-9a-f or empty, got 'xyz'"),
+    (set_("map", "free", 5), "map: place is missing, needed are name, sha256, place, free"),
+    (set_("map", "free", "AAAA"), "map: place is missing, needed are name, sha256, place, free"),
     (set_("nodes", {}), "nodes must be a list, got {}"),
     (set_("nodes", []), "an atlas needs at least one node, got none"),
     (set_("edges", []), "an atlas needs at least one edge, got none"),
@@ -118,6 +128,10 @@ IN_SCHEMA = [
     (set_("edges", 2, "segments_to", [[1, 2, 3]]), "edge 2: segments_to must be a list of lists of 4 finite numbers"),
 ]
 BEYOND_SCHEMA = [
+    (
+        set_("map", {"name": "a", "sha256": "", "place": "8 8", "free": "AAAA"}),
+        "map: free: cells must be packed by zlib, in base64: ",
+    ),
     (set_("nodes", 2, "id", 3), "node 2: id must be its place in the list, 2, got 3"),
     (set_("nodes", 0, "x", float("nan")), "node 0: x must be a finite number, got nan"),
     (set_("edges", 1, "bearing_to", float("inf")), "edge 1: bearing_to must be a finite number, got inf"),
@@ -186,6 +200,11 @@ def test_what_is_no_json_is_refused(text: str, line: str, tmp_path: Path) -> Non
         ),
         (lambda a: a.update(node_kind=a["node_kind"].astype(float)), "node_kind must be integers of 1 dimension, got"),
         (lambda a: a.update(node_r_m=-a["node_r_m"]), "node 0: r must be finite and > 0 m"),
+        (lambda a: a.update(map_free=np.zeros(1, np.uint8)), "lacks map_place"),
+        (
+            lambda a: a.update(map_free=np.zeros(1, np.uint8), map_place=np.array("4 8 0.05")),
+            "map_free: 4 x 8 cells need 4 bytes, got 1",
+        ),
     ],
 )
 def test_a_broken_npz_is_refused_in_one_line(change: Callable[[Data], Any], line: str, tmp_path: Path) -> None:

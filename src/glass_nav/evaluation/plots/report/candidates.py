@@ -50,7 +50,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
     panels[-1].set_xlabel("time since the first scan [s]")
     most = int(result.places[rows].max())
     ending = (
-        "and it was never found"
+        "and none was found"
         if after is None
         else (f"found after {run_story.duration(float(run_story.seconds_of(result)[after] - seconds[0]))}")
     )

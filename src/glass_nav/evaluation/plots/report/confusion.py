@@ -18,7 +18,7 @@ def draw(folder: Path, confusion: np.ndarray) -> Picture:
         folder,
         figure,
         "confusion",
-        "Cases told, and the truth",
-        f"Confusion matrix of the beam cases: {100 * right:.1f} % of {int(confusion.sum())} beams were told right.",
-        "The log knows what each beam truly met. Rows: the truth; columns: what was told.",
+        "Reported and true cases",
+        f"Confusion matrix of the beam cases: {100 * right:.1f} % of {int(confusion.sum())} beams were classified correctly.",
+        "The log knows what each beam truly met. Rows: true case; columns: reported case.",
     )

@@ -70,7 +70,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
         figure,
         "way",
         "Where it drove",
-        f"The robot's way over the map, coloured by the state that the filter told: {shares}.",
+        f"The robot's path over the map, coloured by the state that the filter reported: {shares}.",
         "Coloured: where the filter said the robot was, by what it said of itself. "
         + ("Dashed: the ground truth. " if errors.matched.any() else "")
         + "Numbers: the worst scans, pictured below.",
@@ -100,7 +100,7 @@ def _draw_states(axes: Any, result: ReplayResult) -> None:
 
 
 def bounds(result: ReplayResult) -> "Tuple[np.ndarray, np.ndarray]":
-    """Lower left and upper right corner (2,) [m] of the way, without the places that were only candidates."""
+    """Lower left and upper right corner (2,) [m] of the path, without mere candidates."""
     trusted = ~np.isin(result.states, SEARCHING)
     errors = result.errors
     points = [result.map_from_base[trusted if trusted.any() else slice(None), :2]]

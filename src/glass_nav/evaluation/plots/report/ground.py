@@ -15,4 +15,6 @@ class Ground:
     """The map, and what the run learnt of its walls."""
 
     grid: GridMap
-    glass: Optional[np.ndarray]  # (H, W) int8 [percent] how glassy each wall proved, -1 unknown; None: not learnt
+    glass: Optional[
+        np.ndarray
+    ]  # (H, W) int8 [percent] probability of glass of each wall cell, -1 unknown; None: not learnt

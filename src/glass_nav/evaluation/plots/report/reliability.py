@@ -30,9 +30,9 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
             figure,
             "reliability",
             "How reliable it said it was",
-            f"The chance that the pose is right, as the filter tells it, over time; median "
+            f"The probability of a correct pose that the filter reports, over time; median "
             f"{np.median(result.reliability):.2f}.",
-            "Without a ground truth nobody can say whether it is so.",
+            "Without a ground truth it cannot be checked.",
         )
     told, off = result.reliability[errors.matched], errors.position_m[errors.matched]
     state_of, right = np.array(result.states)[errors.matched], run_story.right(errors)[errors.matched]
@@ -52,7 +52,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
     left.set_yscale("log")
     left.axhline(run_story.RIGHT_M, color="#555555", linewidth=0.8, linestyle="--")
     left.set_xlim(-0.02, 1.02)
-    left.set_xlabel("reliability told")
+    left.set_xlabel("reported reliability")
     left.set_ylabel("true position error [m]")
     left.legend(loc="lower left", fontsize=8, frameon=True, markerscale=2.0)
     centres, share, counts = calibration(told, right)
@@ -62,14 +62,14 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
         beside.annotate(str(count), (centre, height), ha="center", va="bottom", fontsize=7)
     beside.set_xlim(0.0, 1.0)
     beside.set_ylim(0.0, 1.1)
-    beside.set_xlabel("reliability told")
+    beside.set_xlabel("reported reliability")
     beside.set_ylabel("share that was right")
     return save(
         folder,
         figure,
         "reliability",
-        "Reliability told, and the truth",
-        "Told reliability against the true error of each scan, and the share of right poses for each class of "
+        "Reported reliability against the truth",
+        "Reported reliability against the true error of each scan, and the share of right poses for each class of "
         "reliability: "
         + ", ".join(f"{centre:.2f}: {height:.2f} of {count}" for centre, height, count in zip(centres, share, counts))
         + ".",
@@ -81,7 +81,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
 
 
 def calibration(told: np.ndarray, right: np.ndarray) -> "Tuple[np.ndarray, np.ndarray, np.ndarray]":
-    """Of ten classes of told chance those that hold any: their middle, the share that was right, how many (N,)."""
+    """Of ten classes of reported probability, the N that are not empty: centre, share that was right, count."""
     number = np.minimum((np.asarray(told) * 10.0).astype(int), 9)
     counts = np.bincount(number, minlength=10)
     hits = np.bincount(number, np.asarray(right, float), minlength=10)

@@ -57,9 +57,8 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
         folder,
         figure,
         "glass",
-        "How glassy each wall proved",
-        f"The walls that beams tested: {counts[0]} cells proved solid, {counts[1]} are undecided, {counts[2]} "
-        "proved to be glass.",
+        "Probability of glass, by wall",
+        f"The walls that beams tested: {counts[0]} cells are solid, {counts[1]} undecided, {counts[2]} glass.",
         f"Glass: at least {GLASS_FROM} % sure. Solid: at most {SOLID_BELOW} %. Walls left as they are on the "
         "map were not tested by any beam.",
     )

@@ -22,10 +22,10 @@ from glass_nav.world.grid_map import GridMap
 def draw(folder: Path, result: ReplayResult, ground: Ground, number: int, kept: KeptScan) -> Picture:
     errors, row = result.errors, kept.row
     told = result.map_from_base[row]
-    poses = [("where it thought it was", told)]
+    poses = [("estimated pose", told)]
     if errors.matched[row]:
         assert result.reference is not None
-        poses.append(("where it was", result.reference.at(result.stamps_ns[row])))
+        poses.append(("true pose", result.reference.at(result.stamps_ns[row])))
     figure = new_figure(4.6 * len(poses), 4.4)
     cases = result.cases[row, : len(kept.points_m)]
     answered = np.isfinite(kept.points_m).all(axis=1) & (cases < len(BeamCase))
