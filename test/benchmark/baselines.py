@@ -1,11 +1,11 @@
-"""What others would do: localizers to compare with, each as good as we know to make it.
+"""Baseline localizers for comparison, each as good as we can make it.
 
-Two sensor models, the likelihood field and the beam model, in two filters: plain Monte Carlo localization as
-AMCL has it (particles move by odometry only), and our own filter with nothing but the weights exchanged. And our
-filter with less and with more knowledge of glass: only the beams that are told diffuse, and the true cases.
+Two sensor models, the likelihood field and the beam model, in two filters: plain Monte Carlo localization as in
+AMCL (particles move by odometry only), and our own filter with only the weights replaced. And our
+filter with less and with more knowledge of glass: only the beams classified as diffuse, and the true cases.
 
-All have set_pose() and update() as Localizer has. Every model is told what is known to help it: log probabilities
-(AMCL multiplies or adds up cubes), surfaces half a cell inside the walls that are drawn, thinned beams, and the
+All have set_pose() and update() like Localizer. Every model gets what is known to help it: log probabilities
+(AMCL multiplies or adds up cubes), surfaces half a cell inside the drawn walls, thinned beams, and the
 settings of SETTINGS, the best of those that tune_baselines.py tries (glass_office, glass_bridge and glass_atrium, lidar
 weak, seed 100, the first 150 scans). P particles, B beams.
 """
@@ -37,7 +37,7 @@ _PARTS = 4  # of a cell's edge: how finely the likelihood field is tabulated
 
 
 class Settings(NamedTuple):
-    """Of a sensor model; AMCL's names where it has them."""
+    """Settings of a sensor model; AMCL's names where it has them."""
 
     sigma_hit_m: float
     z_hit: float
@@ -51,7 +51,7 @@ class Settings(NamedTuple):
 class LikelihoodField:
     """Thrun, Burgard, Fox, Probabilistic Robotics (2005), table 6.3: how near is a wall to where the beam ended?
 
-    log of z_hit exp(-d^2 / (2 s^2)) + z_rand / z_max, as AMCL has it, looked up in a table of quarters of cells.
+    log of z_hit exp(-d^2 / (2 s^2)) + z_rand / z_max, as in AMCL, looked up in a table of quarters of cells.
     """
 
     def __init__(self, grid_map: GridMap, settings: Settings) -> None:
@@ -88,7 +88,7 @@ class LikelihoodField:
 
 
 class BeamModel:
-    """Thrun et al. (2005), sec. 6.3.1: hit, something in the way, no answer, and a floor of random ranges.
+    """Thrun et al. (2005), sec. 6.3.1: hit, unexpected obstacle, no answer, and a floor of random ranges.
 
     Beams without an answer weigh all particles alike and are left out.
     """
@@ -127,7 +127,7 @@ SensorModel = Union[LikelihoodField, BeamModel]
 
 
 def chosen_beams(scan: Scan, settings: Settings) -> np.ndarray:
-    """Indices of beams that answered, at most so many, spread evenly."""
+    """Indices of beams that answered, at most this many, spread evenly."""
     answered = np.flatnonzero(scan.answered)
     if settings.max_beams is None or len(answered) <= settings.max_beams:
         return answered
@@ -135,7 +135,7 @@ def chosen_beams(scan: Scan, settings: Settings) -> np.ndarray:
 
 
 def weight_of_a_beam(beams: int, settings: Settings) -> float:
-    """Neighbouring beams err together; many of them count for less each."""
+    """Neighbouring beams have correlated errors; the more beams, the less each counts."""
     if settings.independent_beams is None:
         return 1.0
     return min(1.0, settings.independent_beams / max(beams, 1))
@@ -143,14 +143,14 @@ def weight_of_a_beam(beams: int, settings: Settings) -> float:
 
 @dataclass(frozen=True)
 class PlainEstimate:
-    """What plain Monte Carlo localization says after one scan."""
+    """The estimate of plain Monte Carlo localization after one scan."""
 
     stamp_ns: int
     map_from_base: np.ndarray  # (3,) pose of the best cluster
 
 
 class PlainMcl:
-    """Monte Carlo localization as AMCL has it: odometry moves the particles, the scan weighs them, KLD counts them.
+    """Monte Carlo localization as in AMCL: odometry moves the particles, the scan weights them, KLD sets their number.
 
     Thrun et al. (2005), table 8.2 and sec. 8.3.7; resampling with every update, the update thresholds and the noise
     of odometry those of our filter.
@@ -202,7 +202,7 @@ class PlainMcl:
 
 
 class OtherWeights(ParticleFilter):
-    """Our filter, start to end, but the particles weighed by another sensor model."""
+    """Our whole filter, but another sensor model weights the particles."""
 
     def __init__(self, *ours: Any, model: SensorModel) -> None:
         super().__init__(*ours)
@@ -213,7 +213,7 @@ class OtherWeights(ParticleFilter):
 
 
 class DiffuseOnly(BeamClassifier):
-    """Our filter, going only by the beams that it takes for ended at the first surface."""
+    """Our filter, using only the beams that it classifies as ended at the first surface."""
 
     def classify(self, scan: Scan, *pose: Any, **options: Any) -> Tuple[BeamCases, ExpectedRanges]:
         cases, expected = super().classify(scan, *pose, **options)
@@ -222,7 +222,7 @@ class DiffuseOnly(BeamClassifier):
 
 
 class TrueCases(BeamClassifier):
-    """Goes by the true cases, which somebody tells it."""
+    """Uses the true cases, which it is given."""
 
     true_case = np.zeros(0, np.uint8)
 
@@ -233,7 +233,7 @@ class TrueCases(BeamClassifier):
 
 
 class OracleCases(Localizer):
-    """Our filter, going by the true cases; set `true_case` (B,) before each update()."""
+    """Our filter, using the true cases; set `true_case` (B,) before each update()."""
 
     _classifier: TrueCases
 
@@ -264,7 +264,7 @@ PoseFilter = Union[Localizer, PlainMcl]
 def localizer(
     name: str, params: LocalizerParams, grid_map: GridMap, seed: int, settings: Optional[Settings] = None
 ) -> PoseFilter:
-    """One of LOCALIZERS, fresh.
+    """A new one of LOCALIZERS.
 
     Args:
         name: of LOCALIZERS.

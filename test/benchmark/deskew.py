@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Does it help to make up for the robot's motion while the lidar turns?  Simulated buildings, with and without.
+"""Does it help to compensate the robot's motion during a sweep?  Simulated buildings, with and without.
 
     python test/benchmark/deskew.py
     python test/benchmark/deskew.py --turn-time 0.05 --seeds 2 --speed 1.0
 
 A robot drives the first path of each building; its lidar takes `--turn-time` from the first beam to the last one, and
-the scan says so. The same scans go through the filter deskewed by odometry (which slips as the simulator's wheels
-do) and as they are; beside it those of a lidar that takes all beams at once. Prints rmse of position and heading at
+the scan reports it. The same scans go through the filter deskewed by odometry (which slips as the simulator's wheels
+do) and as they are, next to those of a lidar that takes all beams at once. Prints rmse of position and heading at
 the stamps of the scans. Exit 1 if deskewing makes the position or the heading worse over all buildings.
 """
 
@@ -41,7 +41,7 @@ START_COVARIANCE = np.diag([0.1, 0.1, 0.05]) ** 2
 
 
 def drive(name: str, turn_time_s: float, seed: int, speed_m_s: float, max_scans: int) -> Tuple[GridMap, List[Frame]]:
-    """The robot once along the first path."""
+    """Drive the robot once along the first path."""
     building = building_file.load(drives.MAPS / name / "building.yaml")
     simulation = Simulation(building, lidar.preset("sensitive"), seed=seed, scan_rate_hz=10.0, turn_time_s=turn_time_s)
     frames = simulation.drive(next(iter(building.paths)), PathFollowerParams(speed_m_s=speed_m_s))

@@ -16,7 +16,7 @@ SCAN_RATE_HZ = 5.0  # a scan every 0.12 m: enough for each to be an update
 
 
 class Drive(NamedTuple):
-    """A robot once along the path of its building."""
+    """One drive of a robot along the path of its building."""
 
     grid_map: GridMap  # as it was drawn, before anything changed
     frames: List[Frame]
@@ -33,14 +33,14 @@ def lidars() -> List[str]:
 
 
 def drive(name: str, lidar_name: str, seed: int, changed: float = 0.0, max_scans: Optional[int] = None) -> Drive:
-    """Along the first path of the building.
+    """Drive along the first path of the building.
 
     Args:
         name: of a building in maps/.
         lidar_name: a preset.
-        seed: of everything that is random.
+        seed: of everything random.
         changed: share of the movable furniture that was moved since the map was drawn.
-        max_scans: stop there.
+        max_scans: stop after this many.
     """
     return drive_with(lidar.preset(lidar_name), name, seed, changed, max_scans)
 

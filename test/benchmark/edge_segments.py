@@ -49,7 +49,7 @@ WAY_SIGMA, TURN_SIGMA_RAD = 0.02, 0.07
 
 
 def driven(atlas: Atlas, building: Building, model: LidarModel, dart: int, rng: np.random.Generator) -> Traversal:
-    """What a robot reports that drove the edge of a dart."""
+    """The report of a robot that drove the edge of a dart."""
     line = atlas.edges.polyline_m[dart >> 1]
     true = poses_along(line[::-1] if dart & 1 else line, STEP_M)
     length_m = max(float(np.hypot(*np.diff(line, axis=0).T).sum()), 1.0)

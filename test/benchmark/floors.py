@@ -1,4 +1,4 @@
-"""What simulated robots of the benchmarks wake up in: shipped buildings, random floors, maps of real ones."""
+"""Floors for the benchmarks' simulated robots: shipped buildings, random floors, maps of real ones."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HELP = "names of shipped buildings, map_server .yaml files, or random: another f
 
 
 class Floor(NamedTuple):
-    """A building, and what the robot has of it."""
+    """A building, and what the robot knows of it."""
 
     building: Building
     grid_map: GridMap
@@ -28,7 +28,7 @@ def load(name: str, seed: int, opaque: bool) -> Floor:
     """The floor of a name: see HELP.
 
     Args:
-        name: of it.
+        name: of the floor.
         seed: of a random one.
         opaque: film on all glass. The walls of maps are opaque anyway.
     """

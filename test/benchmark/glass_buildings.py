@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Simulated buildings of glass through the filter and through others: cases, poses, scan_surfaces.
+"""Our filter and baselines in simulated buildings of glass: cases, poses, scan_surfaces.
 
     python test/benchmark/glass_buildings.py --localizers ours ours_paper      cases, soft and the document's vote
     python test/benchmark/glass_buildings.py --first-seed 200 --mixed --jobs 2 --out glass_buildings.json
@@ -8,9 +8,9 @@
 
 Every building x lidar x seed is driven once, and every localizer gets the same scans, odometry and start. A seed
 seeds the drive, the lidar, the odometry, the start and the localizer. Baselines: test/benchmark/baselines.py;
-ours_oracle is told the true cases and is no baseline, but what the weights could come to. Ratios are those of the
-means over lidars and seeds, against the best baseline of that figure in that building. Seeds from 100 on have been
-looked at while developing; those from 200 on have not. Exit code 1 when a bar is missed.
+ours_oracle is given the true cases: it is not a baseline but an upper bound for the weights. Ratios are those of the
+means over lidars and seeds, against the best baseline of that figure in that building. Seeds from 100 on were used in
+development; those from 200 on were not. Exit code 1 when a bar is missed.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Job(NamedTuple):
 
 
 class Run(NamedTuple):
-    """What one localizer made of one drive."""
+    """The results of one localizer on one drive."""
 
     building: str
     lidar: str
@@ -130,7 +130,7 @@ def follow(name: str, job: Job, drive: drives.Drive, settings: Optional[baseline
 
 
 def print_cases(runs: Sequence[Run], ways: Sequence[Callable[[Run], str]]) -> None:
-    """A line for each group of runs, grouped one way after the other, and each way to tell cases."""
+    """A line for each group of runs, for each grouping in turn, and each method of classification."""
     print(
         "| runs | vote | accuracy | answering | macro F1 | "
         + " | ".join(f"P {case}" for case in range(1, 5))
@@ -158,7 +158,7 @@ def print_cases(runs: Sequence[Run], ways: Sequence[Callable[[Run], str]]) -> No
 
 
 def print_confusion(runs: Sequence[Run]) -> None:
-    """Of all runs of ours: rows truth, columns told, per cent of the true beams."""
+    """Of all our runs: rows true cases, columns reported cases, per cent of the true beams."""
     parts = [each.cases for each in runs if each.localizer == "ours" and each.cases is not None]
     if not parts:
         return
@@ -242,7 +242,7 @@ def print_surfaces(runs: Sequence[Run]) -> None:
 
 
 def print_bars(runs: Sequence[Run]) -> bool:
-    """What is asked of ours, and whether it is so; all of it?"""
+    """Print the bars for ours and whether each is met; returns whether all are."""
     own = [each for each in runs if each.localizer == "ours"]
     cases = {
         building: sum(
@@ -282,7 +282,7 @@ def print_bars(runs: Sequence[Run]) -> bool:
 
 
 class Bar(NamedTuple):
-    """What a figure has to be."""
+    """The bar for one figure."""
 
     what: str
     found: Optional[float]  # None: there was nothing to measure it by
@@ -310,7 +310,7 @@ def number(value: Optional[float], digits: int = 3) -> str:
 
 
 def baselines_from(path: Path, jobs: Sequence[Job]) -> List[Run]:
-    """What the baselines, and no other localizer, made of the drives of these jobs in an earlier benchmark."""
+    """The results of the baselines, and no other localizer, on the drives of these jobs in an earlier benchmark."""
     found = json.loads(path.read_text())
     wanted = {(job.building, job.lidar, job.seed): job for job in jobs}
     runs = []

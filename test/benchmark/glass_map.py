@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Glass learnt from real logs, against the cells that the logs' own beams see through.
+"""Glass learnt from real logs, against the cells that the logs' own beams pass through.
 
     python test/benchmark/glass_map.py                      uob_trace0 olin_mac mit_csail intel aces seattle
     python test/benchmark/glass_map.py --logs intel --seeds 3 --pictures DIR
 
-Each log is replayed once a seed; then a cell is called glass from --threshold percent on. Precision and recall are
-within 0.15 m of see_through_mask.yaml beside the log: evidence of the same drive, so an agreement and not a truth.
-Logs without a mask only show the share of the wall cells that is called glass. The logs are in GLASS_NAV_DATA.
+Each log is replayed once per seed; then a cell counts as glass from --threshold percent on. Precision and recall are
+within 0.15 m of see_through_mask.yaml beside the log: evidence of the same drive, so they measure agreement, not truth.
+Logs without a mask only show the share of wall cells that counts as glass. The logs are in GLASS_NAV_DATA.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def learnt(name: str, seed: int, settings: LocalizerParams) -> "tuple[GridMap, n
 
 
 def see_through(name: str) -> Optional[np.ndarray]:
-    """(M, 2) [m] centres of the cells that the log's beams see through; None without a mask."""
+    """(M, 2) [m] centres of the cells that the log's beams pass through; None without a mask."""
     path = DATA / "logs" / name / "see_through_mask.yaml"
     if not path.is_file():
         return None

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Finding the robot: from anywhere on the map, after it was kidnapped, and in a building that is not the map's.
+"""Finding the robot: from anywhere on the map, after it was kidnapped, and in a building that is not on the map.
 
     python test/benchmark/global_localization.py                       all tasks, 10 seeds, every log and building
     python test/benchmark/global_localization.py --tasks global --tracks intel glass_bridge --seeds 3
     python test/benchmark/global_localization.py --tasks kidnap --first-seed 200 --out figures.json
 
-global: starts in the first third of the track without a guess; found when ~status says LOCALIZED first, right if that
-is within 0.7 m and 20 degrees. kidnap: carried to another moment of the same track, two metres away or turned at
-least; counts when LOCALIZED is left and when the right place is LOCALIZED again. elsewhere: the track with the map of
-another one. A bar missed gives exit code 1.
+global: starts in the first third of the track without a guess; found when ~status first reports LOCALIZED, right if
+that is within 0.7 m and 20 degrees. kidnap: kidnapped to another moment of the same track, at least two metres away or
+turned; measures when LOCALIZED is left and when the right place is LOCALIZED again. elsewhere: the track with the map
+of another one. Exit code 1 if a bar is missed.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ Job = Tuple[str, str, int]
 
 
 def find(track: tracks.Track, seed: int) -> Dict[str, Any]:
-    """From anywhere."""
+    """A start from anywhere."""
     rng = np.random.default_rng(seed)
     start = tracks.start_of(track, rng)
     localizer = Localizer(LocalizerParams(), track.grid_map, rng)
@@ -70,7 +70,7 @@ def find(track: tracks.Track, seed: int) -> Dict[str, Any]:
 
 
 def kidnap(track: tracks.Track, seed: int) -> Dict[str, Any]:
-    """Carried away."""
+    """A kidnapped robot."""
     rng = np.random.default_rng(seed)
     moments, down = tracks.carried_away(track, rng, KNOWN_M)
     localizer = Localizer(LocalizerParams(), track.grid_map, rng)

@@ -5,9 +5,9 @@
 
 Prints, for four landmarks, fixes per CPU second (one thread, this Python); the document's Table 1; its Figure 7, with
 four tags around four viewers (the document does not give their coordinates) and angles read in steps of 1 degree: the
-errors of each triple, of the average over them, and of the least squares; and what becomes of four or more bearings of
-which one is wrong. Exit 1 if less than 1000 fixes a second, a cell of Table 1 off by 0.1 cm or more, or the average no
-better than the worst triple in 95 % of the draws.
+errors of each triple, of the average over them, and of the least squares; and the outcome for four or more bearings
+of which one is wrong. Exit 1 if less than 1000 fixes a second, a cell of Table 1 off by 0.1 cm or more, or the average
+no better than the worst triple in 95 % of the draws.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def figure_7(rng: np.random.Generator, draws: int) -> float:
 
 
 def one_wrong(rng: np.random.Generator, landmarks: LandmarkMap, draws: int) -> Dict[str, int]:
-    """Whether the wrong one is found, the fix refused, or the robot led astray by more than 5 sigma."""
+    """Whether the wrong one is found, the fix is refused, or the fix is wrong by more than 5 sigma."""
     outcome = {"found": 0, "refused": 0, "astray": 0}
     low, high = ([3.0, 2.0], [7.0, 6.0]) if landmarks is not FIELD else ([-2.0, -2.0], [2.0, 3.0])
     for _ in range(draws):

@@ -4,15 +4,15 @@
     python test/benchmark/pf_localization.py                                  10 seeds, every log and building
     python test/benchmark/pf_localization.py --tracks intel glass_office --seeds 3 --out figures.json
 
-It has no state that tells when it is sure. Found is where its mean is first within 0.7 m and 20 degrees of the truth
-and stays so for 3 m (or to the end), which takes hindsight, and ours is not judged by: it has to say when. Wrong at the
-end: its last mean is not there. The seed chooses the start (and a building's drive); pf-localization seeds itself from
-the clock, so its runs differ from one time to the next.
+It has no state that reports when it is sure. Found: its mean is first within 0.7 m and 20 degrees of the truth and
+stays so for 3 m (or to the end). This needs hindsight, which ours is not given: it must report when. Wrong at the end:
+its last mean is not there. The seed chooses the start (and a building's drive); pf-localization seeds itself from the
+clock, so its runs differ each time.
 
 The settings are those of the localization_demo.ini that comes with it: 40000 particles in the free cells of the whole
 map, KLD sampling from 150 to 40000 (bins of 0.1 m and 10 degrees, delta and epsilon 0.01), likelihood field (sigma
-0.2 m, every 20th beam), 0.1 m and 2 degrees of noise a step; --set changes them. It takes every scan that it is
-given, and gets those that Localizer takes: one after each 0.1 m or 0.1 rad. Needs apt's mrpt-apps, cmake and
+0.2 m, every 20th beam), 0.1 m and 2 degrees of noise a step; --set changes them. It uses every scan that it is
+given, and is given those that Localizer uses: one after each 0.1 m or 0.1 rad. Needs apt's mrpt-apps, cmake and
 libmrpt-maps-dev; a small program compiled into .build writes the map and the log.
 """
 
@@ -105,14 +105,14 @@ Job = Tuple[str, int, Dict[str, str], float]
 
 
 class Step(NamedTuple):
-    """A scan that is given, and how far the robot has come."""
+    """A scan that is given, and the distance driven so far."""
 
     way_m: float
     moment: tracks.Moment
 
 
 class Answer(NamedTuple):
-    """Of one run of pf-localization."""
+    """The results of one run of pf-localization."""
 
     grid_from_base: np.ndarray  # (U, 3) its mean after each scan, as many as it came to
     cpu_s: float
@@ -153,14 +153,14 @@ def config_text(folder: Path, grid_map: GridMap, settings: Mapping[str, Mapping[
 
 
 def map_numbers(grid_map: GridMap) -> np.ndarray:
-    """What the writer reads as map.bin: resolution, columns, rows, cells."""
+    """The contents of map.bin for the writer: resolution, columns, rows, cells."""
     rows, columns = grid_map.occupancy.shape
     cells = np.where(grid_map.occupied, OCCUPIED, np.where(grid_map.free, FREE, UNKNOWN))
     return np.concatenate([[grid_map.resolution_m, columns, rows], cells.reshape(-1)])
 
 
 def scan_numbers(scan: Scan, odom_from_base: np.ndarray) -> np.ndarray:
-    """What the writer reads of one scan from track.bin.
+    """The contents of track.bin for the writer, for one scan.
 
     Raises:
         ValueError: the beams are not evenly spaced, which MRPT's scans are.
@@ -184,7 +184,7 @@ def scan_numbers(scan: Scan, odom_from_base: np.ndarray) -> np.ndarray:
 
 
 def steps_of(track: tracks.Track, start: int) -> List[Step]:
-    """The scans that Localizer would take, each lidar's own."""
+    """The scans that Localizer would use, per lidar."""
     schedule = LocalizerParams().schedule
     steps: List[Step] = []
     taken: List[str] = []
@@ -209,7 +209,7 @@ def means_in(log: str) -> np.ndarray:
 
 
 def found_after(way_m: np.ndarray, right: np.ndarray) -> Optional[float]:
-    """Way [m] after which the place is right first and for KEPT_M, or to the end; None: never."""
+    """Distance [m] after which the place is first right and stays so for KEPT_M, or to the end; None: never."""
     for index, here_m in enumerate(way_m):
         if np.all(right[index:][way_m[index:] <= here_m + KEPT_M]):
             return float(here_m)
@@ -217,7 +217,7 @@ def found_after(way_m: np.ndarray, right: np.ndarray) -> Optional[float]:
 
 
 def writer() -> Path:
-    """The program of mrpt_track_writer.cpp, compiled if it is older than that."""
+    """The program of mrpt_track_writer.cpp, compiled if it is out of date."""
     program = WRITER_BUILD / "build" / "mrpt_track_writer"
     if not program.is_file() or program.stat().st_mtime < WRITER.stat().st_mtime:
         WRITER_BUILD.mkdir(parents=True, exist_ok=True)
@@ -242,7 +242,7 @@ def write(folder: Path, grid_map: GridMap, steps: List[Step], settings: Mapping[
 
 
 def localize(config: Path, most_s: float) -> Answer:
-    """Run pf-localization, without a window, for so long at most."""
+    """Run pf-localization, without a window, for a limited time."""
     log = config.with_name("log.txt")
     began = resource.getrusage(resource.RUSAGE_CHILDREN)
     out_of_time = False

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""How fast, and how right, are the rays? Exact backend, corrected mrpt backend and MRPT's simulateScanRay as it is.
+"""How fast and how correct are the rays? Exact backend, corrected mrpt backend and MRPT's simulateScanRay as it is.
 
     test/benchmark/raycast.py [MAP]      MAP: below GLASS_NAV_DATA or a path; default maps/willow-full-0.05.yaml
 
 All cast the same rays on the same cells to the same range, in one thread: P poses anywhere in the free cells times B
-beams, as a filter does when it searches the whole map. Rates are rays per CPU second, of the fastest of several turns
-taken in alternation. A ray is wrong if it differs from the slow traversal of test/unit/sensing by more than a millionth
+beams, as a filter does when it searches the whole map. Rates are rays per CPU second, of the fastest of several
+alternating rounds. A ray is wrong if it differs from the slow traversal of test/unit/sensing by more than a millionth
 of a metre (simulateScanRay: by more than two cells; its step is 0.8). Exit code 1 if a bar is missed.
 """
 
@@ -90,7 +90,7 @@ def poses_in(world: GridMap, rng: np.random.Generator, count: int) -> np.ndarray
 
 
 def alternate(casts: Dict[str, Callable[[], np.ndarray]], rays: int) -> Dict[str, float]:
-    """Rays per CPU second of each: turn and turn about, so that a busy machine hits all alike."""
+    """Rays per CPU second of each, in alternation, so that a busy machine affects all alike."""
     best = dict.fromkeys(casts, np.inf)
     for _ in range(TURNS):
         for name, cast in casts.items():

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Is the chance in ~status true? Of the poses that are told to be right by 90 %, 90 % should be.
+"""Is the confidence in ~status calibrated? Of the poses reported as right at 90 %, 90 % should be right.
 
     python test/benchmark/reliability.py --out reliability/              every track, 3 seeds: table, plot, figures
     python test/benchmark/reliability.py --tracks intel glass_office --first-seed 200
 
 Each track and seed has three drives: one in which the robot is kidnapped after 5 m, one that starts with a wrong
 pose (AMCL's default uncertainty around a free cell drawn at random) and one without a guess. A pose is right within
-0.7 m and 20 degrees. Printed: what was told against what was true in ten classes, the mean difference weighted by
-counts (expected calibration error), and the share of wrong poses among those told LOCALIZED.
+0.7 m and 20 degrees. Prints the reported against the true share in ten classes, the mean difference weighted by counts
+(expected calibration error), and the share of wrong poses among those reported LOCALIZED.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def table(told: np.ndarray, right: np.ndarray) -> Tuple[List[str], float]:
 
 
 def draw(told: np.ndarray, right: np.ndarray, path: Path) -> None:
-    """The reliability plot: told against true, and how often each was told."""
+    """The reliability plot: reported against true, and how often each was reported."""
     import matplotlib
 
     matplotlib.use("Agg")

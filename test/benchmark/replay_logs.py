@@ -6,8 +6,8 @@
     python test/benchmark/replay_logs.py --set laser_max_beams=90 --set vote_mode=paper
     python test/benchmark/replay_logs.py --even                  maps of the even scans, errors of the odd ones
 
-InitialPoses as AMCL did for its figures: at the first reference pose. The logs are in GLASS_NAV_DATA (default
-../shared/data beside the repository), the rawlog comes with apt's mrpt-common. A log is read once a process.
+Starts as AMCL did for its figures: at the first reference pose. The logs are in GLASS_NAV_DATA (default
+../shared/data beside the repository), the rawlog comes with apt's mrpt-common. A log is read once per process.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ COVARIANCE = np.diag([0.25, 0.25, (np.pi / 12.0) ** 2])  # AMCL's default
 
 
 class Peer(NamedTuple):
-    """What another localizer did on the log, from INDEX.md beside the data."""
+    """The results of another localizer on the log, from INDEX.md beside the data."""
 
     rmse_m: float
     lost_1m_share: float
@@ -67,7 +67,7 @@ PEERS = {  # AMCL 1.17.3, the better of two parameter sets; on the uwb log MRPT'
 
 
 def files(name: str, even: bool) -> Tuple[Path, Path]:
-    """The log and its map, or the map that only the even scans of the log have drawn."""
+    """The log and its map, or the map drawn by only the even scans of the log."""
     if name == "uwb":
         stem = "uwb_ro-localization_demo"
         return MRPT_DATA / f"{stem}.rawlog", MRPT_DATA / f"{stem}_map.gridmap.gz"

@@ -1,8 +1,8 @@
-"""How many times faster than real time `glass_nav replay` goes through a log: whole runs of the command, on one core.
+"""How many times faster than real time `glass_nav replay` is: whole runs of the command, on one core.
 
     python3 test/benchmark/replay_speed.py [--logs NAME ...] [--minutes 10]
 
-Each log is replayed as a user would, with all that it writes (pictures, too) and default parameters, up to so many
+Each log is replayed as a user would, with all output (pictures, too) and default parameters, up to the given
 minutes of it; numpy's libraries have one thread. Figures: seconds of log, CPU seconds of the process (user and system;
 start of Python included), their quotient, CPU milliseconds per scan, and what share of the scans moved the particles
 (update_min_d 0.1 m, update_min_a 0.1 rad). Exit code 1 where the quotient is below 20. The logs are read from the

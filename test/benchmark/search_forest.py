@@ -53,7 +53,7 @@ def slowest_steps_ms(
 
 
 def size_mb(atlas: Atlas) -> float:
-    """Of the arrays of an atlas."""
+    """Memory of the arrays of an atlas."""
     parts = [atlas.nodes, atlas.edges, atlas.darts, atlas.rings, atlas.visits]
     arrays = [value for part in parts for value in vars(part).values()]
     return sum(value.nbytes for value in arrays if isinstance(value, np.ndarray)) / 1e6

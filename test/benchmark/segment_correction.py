@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A scan put on the wall segments of a map: how its quality looks around the truth, from where it gets there, how fast.
+"""A scan aligned with wall segments of a map: quality around the truth, region of convergence, speed.
 
     python test/benchmark/segment_correction.py                   the simulated buildings, some minutes
     python test/benchmark/segment_correction.py --out pictures/   also draws Emse, Ecf and the combined measure
@@ -8,13 +8,13 @@
 
 quality: Emse, Ecf and the combined measure over a grid of offsets from the true pose, of scans as they are and with a
 third of the beams ending at people. basin: share of random starts within 0.5 m and 10 degrees that end within 2 cm and
-0.3 degrees of the truth; where the walls leave a direction free (a hallway), apart from that. By beams whose true case
-is 1, 3 or 4, by all beams, and as `glass_nav locate` does it, which has to find the cases out; beside it the
-document's method, and point-to-point ICP on the wall cells by scipy's KD-tree. speed: CPU time of a correction of 541
-points against 500 segments. judge: do the measures tell right poses from wrong ones that a scan was aligned to, better
-than the fit that `~status` goes by?
+0.3 degrees of the truth, not counting a direction that the walls leave free (a hallway). With beams whose true case is
+1, 3 or 4, with all beams, and as in `glass_nav locate`, which has to estimate the cases; next to the document's method,
+and point-to-point ICP on the wall cells by scipy's KD-tree. speed: CPU time of a correction of 541 points against 500
+segments. judge: do the measures distinguish right poses from wrong ones that a scan was aligned to, better than the fit
+that `~status` uses?
 
-Exit 1 if a best value is not at the truth, if fewer than 95 % of the starts in rooms get there by known cases, or a
+Exit 1 if a best value is not at the truth, if fewer than 95 % of the starts in rooms converge with known cases, or if a
 correction takes more than 3 ms of CPU time.
 """
 
@@ -60,7 +60,7 @@ POINTS, SEGMENTS = 541, 500
 
 
 class Icp:
-    """Point to point on the centres of the wall cells, pairs that are far apart left out; the reach shrinks."""
+    """Point to point on the centres of the wall cells, without pairs that are far apart; the reach shrinks."""
 
     def __init__(self, grid_map: GridMap, iterations: int = 15, first_m: float = 1.0) -> None:
         self._cells = grid_map.centres(*np.nonzero(grid_map.occupied))
@@ -84,7 +84,7 @@ class Icp:
 
 
 class View(NamedTuple):
-    """What a lidar saw somewhere."""
+    """A scan with its truth."""
 
     frame: drives.Frame
     points: np.ndarray  # (B, 2) in the robot's frame, NaN: no answer
@@ -92,7 +92,7 @@ class View(NamedTuple):
 
 
 def views(name: str, lidar_name: str, seed: int, count: int) -> Tuple[GridMap, List[View]]:
-    """So many scans spread over the drive through a building."""
+    """Scans spread over the drive through a building."""
     grid_map, frames = drives.drive(name, lidar_name, seed)
     chosen = [frames[index] for index in np.linspace(0, len(frames) - 1, count).astype(int)]
     return grid_map, [
@@ -108,7 +108,7 @@ def walls(grid_map: GridMap) -> np.ndarray:
 
 
 def with_people(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The same with a third of the beams cut short, in groups of about 15 beams."""
+    """The same scans with a third of the beams cut short, in groups of about 15 beams."""
     groups = np.repeat(rng.random(len(points) // 15 + 1) < PEOPLE_SHARE, 15)[: len(points)]
     share = np.repeat(rng.uniform(0.2, 0.9, len(points) // 15 + 1), 15)[: len(points)]
     return np.where(groups[:, None], share[:, None] * points, points)
@@ -205,13 +205,13 @@ def draw(path: Path, plane: np.ndarray, turns: np.ndarray) -> None:
 
 
 def start_near(true: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Anywhere within reach, all places alike."""
+    """Uniformly distributed offsets within reach."""
     away, bearing = REACH_M * np.sqrt(rng.random()), rng.uniform(-np.pi, np.pi)
     return true + [away * np.cos(bearing), away * np.sin(bearing), rng.uniform(-REACH_RAD, REACH_RAD)]
 
 
 def is_right(pose: np.ndarray, true: np.ndarray, free: np.ndarray, lever_m: float) -> bool:
-    """Within the limits, free directions (K, 3) left out."""
+    """Within the limits, ignoring free directions (K, 3)."""
     left = pose - true
     left[2] = lever_m * angles.wrap(left[2])
     left -= free.T @ (free @ left)
@@ -219,7 +219,7 @@ def is_right(pose: np.ndarray, true: np.ndarray, free: np.ndarray, lever_m: floa
 
 
 def basin(arguments: argparse.Namespace) -> bool:
-    """Share of the starts that get there."""
+    """Share of the starts that converge."""
     ways = ("known cases", "all beams", "locate", "document", "ICP, known cases")
     print("basin: share of starts that end at the truth; rooms / hallways, apart from the direction that is free")
     print("| building | starts in rooms, hallways | " + " | ".join(ways) + " |\n|" + "---|" * (2 + len(ways)))
@@ -271,7 +271,7 @@ def basin_row(name: str, found: Dict[Tuple[str, bool], List[bool]], ways: Tuple[
 
 
 def speed(arguments: argparse.Namespace) -> bool:
-    """Median CPU ms of a correction, turn and turn about."""
+    """Median CPU ms of a correction, methods in alternation."""
     grid_map, seen = views("changed_rooms", arguments.lidar, arguments.seed, 20)
     segments_m = walls(grid_map)
     if len(segments_m) < SEGMENTS:
@@ -313,7 +313,7 @@ def speed(arguments: argparse.Namespace) -> bool:
 
 
 def judge(arguments: argparse.Namespace) -> bool:
-    """Chance that a right pose is told to be better than a wrong one of the same scan, by each measure."""
+    """Probability that each measure ranks a right pose above a wrong one of the same scan."""
     print("judge: chance that the right pose of a scan gets the better value than a wrong one that it was aligned to")
     print("| log or building | pairs | fit of the scan | Ecf | combined | Emse |\n|---|---|---|---|---|---|")
     for name in [*arguments.logs, *arguments.buildings]:

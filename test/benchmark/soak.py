@@ -1,19 +1,19 @@
 #!/usr/bin/env python3
-"""Does the node last?  The real node on a simulated robot, fed faster than it can compute, through faults of all kinds.
+"""Does the node last?  The real node on a simulated robot, fed faster than it can compute, with faults of all kinds.
 
     python test/benchmark/soak.py                 # 30 simulated minutes, some 7 minutes by the clock
     python test/benchmark/soak.py --minutes 3     # what CI runs, about one minute
 
-InitialPoses a ROS master on a free port and one localization_node (source .build/env.bash first). The robot drives to and fro
-through a building of glass. Each simulated minute has: other parameters by dynamic_reconfigure, bad ones too; seconds
-without scans; seconds without odometry; another map with set_map; scans with nonsense in them, with stamps and frames
-that are none; a clock that jumps back; a global search that somebody ends with initialpose; and, at the speed of the
-clock, some seconds without faults in which the age of tf is measured.
+Starts a ROS master on a free port and one localization_node (source .build/env.bash first). The robot drives back and
+forth through a building of glass. Each simulated minute has: other parameters by dynamic_reconfigure, bad ones too;
+seconds without scans; seconds without odometry; another map with set_map; scans with invalid values, stamps and frames;
+a clock that jumps back; a global search ended by initialpose; and, at the speed of the clock, some seconds without
+faults in which the age of tf is measured.
 
-Prints what it found, and exits with 1 if the node ended, lost a thread or took more; if its resident memory after the
-last third is more than 5 % above that after the second; if it used a scan though a newer one had come before it was
-done with the scan before; if tf at the speed of the clock was stamped longer than one scan period ago when the next
-scan came; or if the pose was wrong at the end of a minute. The age of tf is that of the machine, too: run it on an idle
+Prints what it found, and exits with 1 if the node ended, or lost or added a thread; if its resident memory after the
+last third is more than 5 % above that after the second; if it used a scan although a newer one had arrived before it
+finished the previous one; if tf at the speed of the clock was stamped longer than one scan period ago when the next
+scan came; or if the pose was wrong at the end of a minute. The age of tf depends on the machine, too: run it on an idle
 one.
 """
 
@@ -62,7 +62,7 @@ def master() -> "Tuple[subprocess.Popen[bytes], str]":
 
 @dataclass
 class Watch:
-    """What was seen of the node."""
+    """Observations of the node."""
 
     memory_kb: List[Tuple[float, int]] = field(default_factory=list)  # simulated time [s], resident
     threads: List[int] = field(default_factory=list)  # at the end of each minute
@@ -75,7 +75,7 @@ class Watch:
 
 
 class Soak:
-    """The robot, the faults and the watch; one thread drives, callbacks store."""
+    """The robot, the faults and the observations; one thread drives, callbacks store."""
 
     def __init__(self, node_pid: int, minutes: float, speed: float) -> None:
         import rospy
@@ -195,7 +195,7 @@ class Soak:
         rospy.ServiceProxy("global_localization", Empty)()
 
     def _spoilt(self, msg: Any, number: int) -> Any:
-        """One way to spoil a scan after the other."""
+        """Corrupt a scan, in each way in turn."""
         import rospy
 
         ways: List[Dict[str, Any]] = [
@@ -222,7 +222,7 @@ class Soak:
     # -- the drive
 
     def run(self, is_alive: Callable[[], bool]) -> None:
-        """Until the simulated time is over or the node is."""
+        """Run until the simulated time or the node ends."""
         import rospy
         from rosgraph_msgs.msg import Clock
         from tf2_msgs.msg import TFMessage
@@ -278,7 +278,7 @@ class Soak:
         return 51.0 <= second < 55.0
 
     def _second(self, minute: int, second: int, run_s: float) -> None:
-        """What happens once, at a second of each minute."""
+        """Events that happen once, at a second of each minute."""
         self.watch.memory_kb.append((run_s, self._status("VmRSS")))
         if run_s < 3.0 or second in (39, 46):
             self._starts.publish(self._start_msg())
@@ -314,7 +314,7 @@ class Soak:
 
 
 def thirds(watch: Watch) -> "List[float]":
-    """Resident memory [MB] at the end of each third: the median of the last quarter of it."""
+    """Resident memory [MB] at the end of each third: the median of its last quarter."""
     times_s, memory_kb = np.array(watch.memory_kb, float).T
     ends_s = times_s[-1] * np.arange(1, 4) / 3.0
     return [
@@ -428,7 +428,7 @@ def main() -> int:
 
 
 def serve(soak: Soak) -> None:
-    """static_map, for the node's first map; and wait until it listens."""
+    """Serve static_map, for the node's first map, and wait until the node subscribes."""
     import rospy
     from nav_msgs.srv import GetMap, GetMapResponse
 

@@ -93,7 +93,7 @@ def run(job: Job) -> Dict[str, Any]:
 
 
 def line(name: str, lidar_name: str, rows: List[Dict[str, Any]]) -> str:
-    """One row of the table: the drives together."""
+    """One row of the table, over all drives."""
     total = {key: sum(row[key] for row in rows) for key in SUMMED}
     why = {key: sum(row["missed_why"][key] for row in rows) for key in rows[0]["missed_why"]}
     off = [row["position_off_m"]["median_abs"] for row in rows if row["position_off_m"]["median_abs"] is not None]

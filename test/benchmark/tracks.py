@@ -1,4 +1,4 @@
-"""Drives with the truth beside, recorded and simulated, and what may befall a robot on them.
+"""Drives with ground truth, recorded and simulated, and events such as kidnapping.
 
 A track is a map and frames of scan, odometry and true pose. Names: those of the logs in GLASS_NAV_DATA (default
 ../shared/data beside the repository), and those of the buildings in maps/.
@@ -32,7 +32,7 @@ class Moment(NamedTuple):
 
 
 class Track(NamedTuple):
-    """A robot on its way."""
+    """A drive: a map and frames."""
 
     name: str
     grid_map: GridMap
@@ -40,13 +40,13 @@ class Track(NamedTuple):
 
 
 def names() -> List[str]:
-    """All tracks there are."""
+    """All available tracks."""
     return [*LOGS, *drives.buildings()]
 
 
 @lru_cache(maxsize=4)
 def load(name: str, seed: int) -> Track:
-    """The track of that name; of a building the drive, its lidar and its noise go with the seed."""
+    """The track of that name; for a building, the seed determines drive, lidar and noise."""
     if name not in LOGS:
         presets = drives.lidars()
         grid_map, frames = drives.drive(name, presets[seed % len(presets)], seed)
@@ -75,15 +75,15 @@ def start_of(track: Track, rng: np.random.Generator, share: float = 1.0 / 3.0) -
 def carried_away(
     track: Track, rng: np.random.Generator, before_m: float, least_m: float = 2.0
 ) -> Tuple[List[Moment], int]:
-    """A drive in which the robot is carried to another place and notices nothing, and the moment it is set down.
+    """A drive in which the robot is kidnapped unnoticed, and the moment it is set down.
 
-    The odometry goes on as if nothing had happened; so do the stamps.
+    Odometry and stamps continue as if nothing had happened.
 
     Args:
         track: the drive.
         rng: source of all randomness.
-        before_m: way before.
-        least_m: how far it is carried, or it is turned by more than half a right angle.
+        before_m: distance driven before.
+        least_m: least distance that it is moved, unless it is turned by more than half a right angle.
     """
     way = ways(track.moments)
     half = [index for index in range(len(way)) if way[index] >= before_m]
@@ -111,18 +111,18 @@ def carried_away(
 
 
 def ways(moments: List[Moment]) -> np.ndarray:
-    """(N,) way driven [m] up to each moment."""
+    """(N,) distance driven [m] up to each moment."""
     points = np.array([moment.map_from_base[:2] for moment in moments])
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
 
 
 def is_right(map_from_base: np.ndarray, truth: np.ndarray) -> bool:
-    """The pose is that place."""
+    """Whether the pose is at that place."""
     return _near(map_from_base, truth, RIGHT_M, RIGHT_RAD)
 
 
 def moments_of(track: Track, start: int, most_m: float) -> Iterator[Tuple[float, Moment]]:
-    """Way since the start [m] and moment, up to so much way."""
+    """Distance since the start [m] and moment, up to that distance."""
     way = ways(track.moments[start:])
     for way_m, moment in zip(way, track.moments[start:]):
         if way_m > most_m:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-r"""Which settings suit each baseline best? The ones in baselines.SETTINGS were chosen by this.
+r"""Which settings suit each baseline best? This chose those in baselines.SETTINGS.
 
     python test/benchmark/tune_baselines.py --buildings glass_office glass_bridge glass_atrium --lidars weak \
         --max-scans 150

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Does the filter keep up?  CPU time of one update, and of the cases alone, on a map of the data folder.
+"""Does the filter keep up?  CPU time of one update, and of the classification alone, on a map of the data folder.
 
     python test/benchmark/update_time.py
     python test/benchmark/update_time.py --map ../shared/data/logs/intel/map.yaml --beams 541 --particles 2000
 
-A robot is put on free cells, scans are cast from there (with noise) and the particles are kept at the number
-asked for. Prints the median CPU milliseconds of the process, one thread. Then, on scans of a simulated building of
-glass, turn and turn about: whole updates of our filter, of the same filter weighing by a likelihood field, and of plain
-Monte Carlo localization with that field; and how long all beams of a scan take to classify. Exit 1 if a whole update
+A robot is placed on free cells, scans are cast from there (with noise), and the number of particles is fixed as given.
+Prints the median CPU milliseconds of the process, one thread. Then, on scans of a simulated building of glass, in
+alternation: whole updates of our filter, of the same filter weighted by a likelihood field, and of plain Monte Carlo
+localization with that field; and the time to classify all beams of a scan. Exit 1 if a whole update
 takes more than --limit-ms or --limit-ratio times as long as with the field, or classifying more than
 --limit-classify-ms.
 """

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Whole wake-ups without ROS: simulated robots that know nothing find out where they are, and drive a tour.
 
-What decides is what decides in the nodes: Driver, SearchSession and Localizer, wired as by their topics. A robot is put
+Driver, SearchSession and Localizer decide, as in the nodes, wired as by their topics. A robot is put
 at a random place of a building, seeks a meetpoint, and drives as the votes say until the search is over; then it hands
 its pose over to the localization and drives to nodes of the atlas. Right: CONFIRMED within 0.5 m and 20 degrees of the
 truth; wrong: CONFIRMED elsewhere, or any place reported with --believed another building. A collision is a control step
@@ -98,7 +98,7 @@ class Trial:
     # -- the search
 
     def search(self) -> Dict[str, Any]:
-        """Until the search is over, or nobody drives any more."""
+        """Run until the search is over, or driving has stopped."""
         robot = self.robot
         robot.wake_up(self.grid_map)
         while self.now_s < SEARCH_S and not robot.has_given_up:
@@ -137,7 +137,7 @@ class Trial:
         )
 
     def _scans_say(self) -> str:
-        """How the followed pose that explains most compares, and how far it is off the truth."""
+        """How the followed pose that explains most compares, and its error."""
         localizer = self.robot.session.localizer
         standing = None if localizer is None else localizer.standing
         if standing is None:
@@ -149,7 +149,7 @@ class Trial:
         )
 
     def _edge_truth(self, arrival: Arrival, node: int) -> str:
-        """The edges between the last node and this one that are most like what was driven."""
+        """The edges between the last node and this one that are most like the driven path."""
         before, self._last_node = self._last_node, node
         driven = arrival.traversal
         if driven is None:
@@ -175,7 +175,7 @@ class Trial:
     # -- the tour
 
     def tour(self) -> Dict[str, Any]:
-        """To some nodes, while the filter tracks."""
+        """Drive to some nodes while the filter tracks."""
         robot = self.robot
         robot.localize(Localizer(LocalizerParams(), self.grid_map, self.rng))
         planner = RoutePlanner(self.atlas, self.drive.edge.limits, self.grid_map)

@@ -1,6 +1,6 @@
-"""A simulated robot whose driver, search and localization hear each other as they do through the topics of the nodes.
+"""A simulated robot whose driver, search and localization are connected as through the topics of the nodes.
 
-What one decides reaches the others before the next control step, in the order in which it was decided. The scan of a
+Decisions reach the other parts before the next control step, in order. The scan of a
 meetpoint is looked up by its stamp, as topology_node does; while the localization is LOCALIZED the driver is given the
 scan with glass in it, as by scan_surfaces.
 """
@@ -36,7 +36,7 @@ KEPT_SCANS = 50  # for looking up those of meetpoints
 
 
 class WiredRobot:
-    """Call step() until what is wanted is there; status and figures are read from outside."""
+    """Call step() until the wanted state is reached; status and figures are read from outside."""
 
     def __init__(
         self, simulation: Simulation, driver_params: DriveParams, atlas: Atlas, session: SearchSession
@@ -75,13 +75,13 @@ class WiredRobot:
         }
 
     def wake_up(self, grid_map: GridMap) -> None:
-        """All nodes begin; the map is served."""
+        """Start all nodes; the map is served."""
         self._tell(self.session.start())
         self._tell(self.session.map_served(grid_map, "that of the benchmark"))
         self.driver.map_served(grid_map, "that of the benchmark")
 
     def localize(self, localizer: Localizer) -> None:
-        """Track on from the pose that the search found."""
+        """Continue tracking from the pose that the search found."""
         assert self.map_from_base is not None
         localizer.set_pose(self.map_from_base, INITIAL_COVARIANCE)
         self._localizer = localizer
@@ -91,12 +91,12 @@ class WiredRobot:
         self._tell(self.driver.goto_node(PlaceGoal(node)))
 
     def give_up(self) -> None:
-        """Nobody waits for the goal any more."""
+        """Cancel the goal."""
         self._tell(self.driver.preempt(Action.GOTO_NODE))
 
     @property
     def has_given_up(self) -> bool:
-        """Whether the driver waits for somebody: its attempts failed."""
+        """Whether the driver waits for help after failed attempts."""
         status = self.driver.status
         return status.phase == DriverPhase.FAILED and not status.task
 
@@ -119,7 +119,7 @@ class WiredRobot:
 
     @property
     def map_from_base(self) -> Optional[np.ndarray]:
-        """(3,) as the localization has it; None: not known."""
+        """(3,) pose by the localization; None: unknown."""
         if self._map_from_odom is None:
             return None
         return se2.compose(self._map_from_odom, self.simulation.reading.odom_from_base)
@@ -129,7 +129,7 @@ class WiredRobot:
         return self.simulation.stamp_ns * 1e-9
 
     def _localize(self, frame: Frame) -> Scan:
-        """Take a scan through the localization; the scan that the driver is to see."""
+        """Pass a scan to the localization; returns the scan for the driver."""
         if self._localizer is None:
             return frame.scan
         self.estimate = estimate = self._localizer.update(frame.scan, frame.odom_from_base)

@@ -1,8 +1,8 @@
 """A point ahead on a line -> the velocity along the arc through it, for a base that drives forward and turns.
 
 Coulter, Implementation of the Pure Pursuit Path Tracking Algorithm, CMU-RI-TR-92-01 (1992). Ours: slower in bends, and
-only speeds from which the base can still brake. Velocities (3,) forward, left [m/s], turn [rad/s], within the speeds of the
-base but not by its accelerations.
+only speeds from which the base can still brake. Velocities (3,) forward, left [m/s], turn [rad/s], within the speeds of
+the base but not by its accelerations.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ NO_SEGMENT = -1
 
 
 def corners(points: np.ndarray, tolerance: float) -> np.ndarray:
-    """Indices (K,) of the points (N, 2) of a line that all others are within the tolerance of; first and last included."""
+    """Indices (K,) of the points (N, 2) of a line within the tolerance of all others; first and last included."""
     kept = [0, len(points) - 1]
     pieces = [(0, len(points) - 1)]
     while pieces:

@@ -54,7 +54,9 @@ class Mailbox:
 
 
 def outcome(future: "Future[T]", timeout_s: float) -> T:
-    """What a call by Mailbox.submit() returned or raised. TimeoutError if it has not finished; if not begun, it is cancelled."""
+    """What a call by Mailbox.submit() returned or raised. TimeoutError if it has not finished; it is cancelled
+    if it has not begun.
+    """
     try:
         return future.result(timeout_s)
     except concurrent.futures.TimeoutError:

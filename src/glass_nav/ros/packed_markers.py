@@ -53,7 +53,7 @@ def points_marker(
     width_m: float,
     marker_colour: ColorRGBA,
 ) -> PackedMarker:
-    """Squares (Marker.POINTS) at points (K, 2), or lines (LINE_LIST) between pairs of them; a deletion if there are none.
+    """Squares (Marker.POINTS) at points (K, 2), or lines (LINE_LIST) between pairs; a deletion if there are none.
 
     rviz complains about a marker without points, so the previous one is deleted instead.
     """

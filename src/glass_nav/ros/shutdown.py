@@ -14,8 +14,8 @@ import rospy
 def event_on_signals() -> threading.Event:
     """Set by SIGINT and SIGTERM; for nodes that call rospy.init_node(..., disable_signals=True).
 
-    rospy's own handler interrupts the main thread to shut down; during a call to the parameter server it deadlocks. Ours
-    only asks the loop to end.
+    rospy's own handler interrupts the main thread to shut down; during a call to the parameter server it deadlocks.
+    Ours only asks the loop to end.
     """
     ending = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -166,7 +166,7 @@ class Building:
         rows: List[Tuple[float, ...]] = []
         for wall in self.walls:
             for a, b in zip(wall.line_m[:-1], wall.line_m[1:]):
-                along = (b - a) / np.hypot(*(b - a)) * wall.thickness_m / 2.0  # extends into the corner, so that it has no gap
+                along = (b - a) / np.hypot(*(b - a)) * wall.thickness_m / 2.0  # fills the corner: no gap
                 rows += outline_rows(_strip(a - along, b + along, wall.thickness_m), True, True, wall.reflectance)
         for door in self.doors:
             rows += outline_rows(

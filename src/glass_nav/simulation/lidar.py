@@ -75,7 +75,7 @@ class LidarModel:
 
     @property
     def angles_rad(self) -> np.ndarray:
-        """(B,) directions in the laser's frame, counter-clockwise, the middle ahead; a full circle has no direction twice."""
+        """(B,) directions in the laser's frame, counter-clockwise, the middle ahead; a full circle has none twice."""
         half = self.field_of_view_rad / 2.0
         all_round = self.field_of_view_rad > 2.0 * np.pi - 1e-9
         return np.linspace(-half, half, self.beams, endpoint=not all_round)
@@ -431,7 +431,7 @@ def _crossings(
     )  # (F, S)
     span = angles.wrap(to_at - from_at)
     start = np.mod(np.where(span < 0.0, to_at, from_at), 2.0 * np.pi)
-    start = np.concatenate([start, start - 2.0 * np.pi], axis=1)  # a surface that begins past the last beam may reach the first
+    start = np.concatenate([start, start - 2.0 * np.pi], axis=1)  # past the last beam, it may reach the first
     step = np.abs(fans.step_rad)[:, None]
     low = np.maximum(np.ceil(start / step).astype(int) - 1, fans.lowest[:, None])
     high = np.minimum(np.floor((start + np.tile(np.abs(span), 2)) / step).astype(int) + 1, fans.highest[:, None])
@@ -456,8 +456,8 @@ def _crossings(
 
 
 def _pane_light(model: LidarModel, surfaces: Surfaces, ways: _Ways) -> Tuple[np.ndarray, np.ndarray]:
-    """Share of the light that each pane (B, K) mirrors, with all sheets of its glazing; and the share that reaches pane k
-    or, for k = K, passes them all (B, K + 1).
+    """Share of the light that each pane (B, K) mirrors, with all sheets of its glazing; and the share that reaches pane
+    k or, for k = K, passes them all (B, K + 1).
     """
     coating = surfaces.coating[ways.pane] * model.coating
     is_mirror = surfaces.kind[ways.pane] == MIRROR

@@ -105,6 +105,6 @@ class Odometry:
 
 
 def _normal(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """2 N normal numbers from 2 N uniform ones (Box, Muller, 1958): a fixed number of draws, the same in every numpy."""
+    """2 N normal numbers from 2 N uniform ones (Box, Muller, 1958): a fixed number of draws, equal in every numpy."""
     radius = np.sqrt(-2.0 * np.log1p(-a))
     return np.concatenate([radius * np.cos(2.0 * np.pi * b), radius * np.sin(2.0 * np.pi * b)])

@@ -176,7 +176,7 @@ class Simulation:
         ]
 
     def look(self) -> Frame:
-        """One sweep of the lidar, which ends now. If no sweep fits into the time so far, all beams are taken at once."""
+        """One sweep of the lidar, which ends now. If no sweep fits into the time so far, it is instantaneous."""
         model = self.lidar_model
         turn_ns = self._turn_ns if self._turn_ns <= self._time_ns else 0
         stamp_ns = self.stamp_ns - turn_ns

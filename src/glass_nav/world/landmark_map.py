@@ -106,7 +106,7 @@ class LandmarkMap:
     def reaches(
         self, way_m: np.ndarray, which: "Union[slice, np.ndarray]", range_share: float = 1.0, slack_rad: float = 0.0
     ) -> np.ndarray:
-        """(..., M) as in_view(), for vectors (..., M, 2) from M of the landmarks, chosen by `which`, to a point each."""
+        """(..., M) as in_view(), for vectors (..., M, 2) from M landmarks, chosen by `which`, to a point each."""
         near = np.hypot(way_m[..., 0], way_m[..., 1]) <= self.range_m[which] * range_share
         off = np.abs(angles.wrap(np.arctan2(way_m[..., 1], way_m[..., 0]) - self.facing_rad[which]))
         all_round = np.isnan(off)

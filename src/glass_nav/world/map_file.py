@@ -40,8 +40,8 @@ def load(path: "Union[str, os.PathLike[str]]") -> GridMap:
 
 
 def save(grid_map: GridMap, path_yaml: "Union[str, os.PathLike[str]]", image_suffix: str = ".pgm") -> None:
-    """Write a map_server yaml, and beside it the image of the same name. load() gives an equal map, but 99 percent, which
-    mode scale does not have, becomes 98.
+    """Write a map_server yaml, and beside it the image of the same name. load() gives an equal map, but 99 percent,
+    which mode scale does not have, becomes 98.
 
     The image has the given suffix (.pgm, .png) and is in mode trinary; for a map with percentages between 0 and 100 it
     is a .png in mode scale with the unknown cells transparent.

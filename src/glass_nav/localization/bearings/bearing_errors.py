@@ -1,7 +1,7 @@
 """How wrong will a position from bearings be?  Step angle -> limits of the error, covariance, sigma over a map.
 
-Seed document landmark_bearings.txt (Tsukiyama 2009), sec. 3: an emitter that turns in steps measures the angle between two
-landmarks with an error of up to one step; Tables 1 and 2 list the position errors of one triple at these limits and
+Seed document landmark_bearings.txt (Tsukiyama 2009), sec. 3: an emitter that turns in steps measures the angle between
+two landmarks with an error of up to one step; Tables 1 and 2 list the position errors of one triple at these limits and
 halfway to them. To first order a bearing error moves the position more if the landmarks are farther away or closer
 together, or if the robot is nearer to the circle through them. M points, N landmarks.
 """

@@ -56,7 +56,7 @@ def beam_cloud(scan: Scan, cases: BeamCases, height_m: float, base_frame: str) -
 
 
 def beam_markers(scan: Scan, cases: BeamCases, surface: SurfaceScan, height_m: float, base_frame: str) -> MarkerArray:
-    """A namespace per case, which names it beside rviz' checkbox: squares where its beams end, and lines there from the surface they met first.
+    """A namespace, and so a checkbox, per case: squares where its beams end, lines there from the first surface.
 
     For publishing only: `points` stay empty. A case without beams has one line of zero length, so that rviz
     shows the checkbox of its namespace from the first scan on.

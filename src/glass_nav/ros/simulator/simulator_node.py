@@ -5,8 +5,8 @@ Wiring only; the robot is simulation.Simulation. One loop moves it; callbacks on
 Subscribes: cmd_vel (Twist; takes precedence over the path), tf map -> odom (only to know whether the localization
     runs and keeps up).
 Publishes: /clock, scan (LaserScan), odom (Odometry), tf odom -> base_link and base_link -> laser (static),
-    landmark_bearings (LandmarkBearings, at the end of each sweep of the scanner, if the building has tags), tf base_link
-    -> emitter (static),
+    landmark_bearings (LandmarkBearings, at the end of each sweep of the scanner, if the building has tags), tf
+    base_link -> emitter (static),
     ground_truth (PoseStamped in map) and true_beams (TrueBeams) with the stamps of scan, ~blocked (Bool, latched: an
     obstacle blocks the robot), initialpose (if ~give_initial_pose), map and map_metadata (latched, if ~serve_map).
 Services: static_map (GetMap, if ~serve_map).
