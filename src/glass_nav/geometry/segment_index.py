@@ -33,7 +33,8 @@ class SegmentIndex:
     """Segments, prepared to be asked often."""
 
     def __init__(self, segments: np.ndarray, square: float = 0.25, margin: float = 2.0) -> None:
-        """Args:
+        """
+        Args:
             segments: (S, 4) x1 y1 x2 y2; S = 0 is allowed.
             square: edge of the squares.
             margin: how far around the segments they reach; points beyond are looked up slowly.

@@ -50,9 +50,10 @@ class Odometry:
     """Sums up what the wheels of one robot say; the frame odom begins where it begins."""
 
     def __init__(self, p: OdometryParams, kind: str, rng: np.random.Generator) -> None:
-        """Args:
-        kind: of the base, "diff" or "omni".
-        rng: this robot's wheels and all that happens to them.
+        """
+        Args:
+            kind: of the base, "diff" or "omni".
+            rng: this robot's wheels and all that happens to them.
         """
         self._p, self._kind, self._rng = p, kind, rng
         radius, mismatch, base = rng.normal(size=3) * [p.wheel_radius_sigma, p.wheel_mismatch_sigma, p.wheel_base_sigma]

@@ -25,8 +25,9 @@ class BearingInput:
     """Lets bearings wait for a scan that is not older, and says what cannot be used; nothing without ~landmark_file."""
 
     def __init__(self, p: LocalizationNodeParams, tf: tf2_ros.Buffer, log: LogThrottle) -> None:
-        """Raises:
-        LandmarkError: the landmark file cannot be used; one line.
+        """
+        Raises:
+            LandmarkError: the landmark file cannot be used; one line.
         """
         self._p, self._tf, self._log = p, tf, log
         self._landmarks = landmark_file.load(p.landmark_file) if p.landmark_file else landmark_map.NONE

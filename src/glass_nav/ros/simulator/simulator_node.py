@@ -120,8 +120,9 @@ class SimulatorNode:
     """Wiring only: time goes on by a step, messages out."""
 
     def __init__(self, p: SimulatorNodeParams) -> None:
-        """Raises:
-        ValueError: a building, path, lidar or robot that cannot be used; one line.
+        """
+        Raises:
+            ValueError: a building, path, lidar or robot that cannot be used; one line.
         """
         self._p = p
         drive = _drive(p)
