@@ -2,9 +2,9 @@
 
 Two sensor models, the likelihood field and the beam model, in two filters: plain Monte Carlo localization as
 AMCL has it (particles move by odometry only), and our own filter with nothing but the weights exchanged. And our
-filter with less and with more knowledge of glass: only the beams that are told diffuse, and the true cases.
+filter with less and with more knowledge of glass: only the beams that are reported diffuse, and the true cases.
 
-All have set_pose() and update() as Localizer has. Every model is told what is known to help it: log probabilities
+All have set_pose() and update() as Localizer has. Every model is given what is known to help it: log probabilities
 (AMCL multiplies or adds up cubes), surfaces half a cell inside the walls that are drawn, thinned beams, and the
 settings of SETTINGS, the best of those that tune_baselines.py tries (glass_office, glass_bridge and glass_atrium, lidar
 weak, seed 100, the first 150 scans). P particles, B beams.
@@ -296,4 +296,4 @@ OURS: Dict[str, Callable[[LocalizerParams, GridMap, np.random.Generator], Locali
     "ours_oracle": OracleCases,
 }
 LOCALIZERS = (*OURS, *SETTINGS)
-BASELINES = ("ours_case1", *SETTINGS)  # honest: they know what a localizer can know; ours_oracle is told more
+BASELINES = ("ours_case1", *SETTINGS)  # honest: they know what a localizer can know; ours_oracle is given more

@@ -275,7 +275,7 @@ def glass_map_msg(stamp_ns: int, map_frame: str, grid_map: GridMap, glass: np.nd
         stamp_ns: of the last scan that it holds, 0 before the first.
         map_frame: frame of the map.
         grid_map: the map whose geometry it has.
-        glass: (H, W) int8, how glassy each wall cell proved [percent], -1 where nothing is known.
+        glass: (H, W) int8, probability of glass of each wall cell [percent], -1 where nothing is known.
     """
     msg = _PackedGrid(header(stamp_ns, map_frame), np.asarray(glass, np.int8))
     msg.info = grid_info(grid_map)

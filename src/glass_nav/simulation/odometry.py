@@ -27,7 +27,7 @@ class OdometryParams:
     wheel_base_m: float = 0.4
     wheel_radius_sigma: float = 0.008  # share, both wheels together: a floor's length, worn tyres
     wheel_mismatch_sigma: float = 0.0003  # share, one wheel against the other: bends what is straight
-    wheel_base_sigma: float = 0.008  # share: turns are told too wide or too narrow
+    wheel_base_sigma: float = 0.008  # share: turns are reported too wide or too narrow
     slip_m_per_sqrt_m: float = 0.008  # along the way, also sideways of an omnidirectional base
     slip_rad_per_sqrt_m: float = 0.005
     slip_rad_per_sqrt_rad: float = 0.015
@@ -58,20 +58,20 @@ class Odometry:
         self._p, self._kind, self._rng = p, kind, rng
         radius, mismatch, base = rng.normal(size=3) * [p.wheel_radius_sigma, p.wheel_mismatch_sigma, p.wheel_base_sigma]
         forward, turn = 1.0 + radius, (1.0 + radius) / (1.0 + base)
-        # (3, 3) twist told by twist made. Diff: each wheel tells its own radius; omni: three wheels, whose mismatch
+        # (3, 3) twist reported by twist made. Diff: each wheel tells its own radius; omni: three wheels, whose mismatch
         # skews forward motion to the left and back.
         half_m = 0.5 * p.wheel_base_m
         if kind == "diff":
-            self._told_by_made = np.array(
+            self._reported_by_made = np.array(
                 [[forward, 0.0, mismatch * half_m], [0.0, 0.0, 0.0], [mismatch / half_m, 0.0, turn]]
             )
         else:
-            self._told_by_made = np.array(
+            self._reported_by_made = np.array(
                 [[forward, mismatch, 0.0], [-mismatch, forward, 0.0], [mismatch / half_m, 0.0, turn]]
             )
         self.odom_from_base = np.zeros(3)
-        self.velocity = np.zeros(3)  # as told: forward, left [m/s], turn [rad/s]
-        self._spin, self._spin_left_s = np.zeros(3), 0.0  # velocity told by a wheel that spins, and until when
+        self.velocity = np.zeros(3)  # as reported: forward, left [m/s], turn [rad/s]
+        self._spin, self._spin_left_s = np.zeros(3), 0.0  # velocity reported by a wheel that spins, and until when
 
     def step(self, twist: np.ndarray, dt_s: float) -> None:
         """The base made this twist (3,) in this time."""
@@ -79,21 +79,21 @@ class Odometry:
         draws = self._rng.random(DRAWS)
         normals = _normal(draws[:2], draws[2:4])  # 4 of them
         way_m, turn_rad = math.hypot(twist[0], twist[1]), abs(float(twist[2]))
-        told = self._told_by_made @ twist
-        told[0] += p.slip_m_per_sqrt_m * math.sqrt(way_m) * normals[0]
+        reported = self._reported_by_made @ twist
+        reported[0] += p.slip_m_per_sqrt_m * math.sqrt(way_m) * normals[0]
         if self._kind == "omni":
-            told[1] += p.slip_m_per_sqrt_m * math.sqrt(way_m) * normals[1]
-        told[2] += (
+            reported[1] += p.slip_m_per_sqrt_m * math.sqrt(way_m) * normals[1]
+        reported[2] += (
             p.slip_rad_per_sqrt_m * math.sqrt(way_m) * normals[2]
             + p.slip_rad_per_sqrt_rad * math.sqrt(turn_rad) * normals[3]
         )
         if draws[4] < p.slip_event_per_m * way_m:
             self._spin, self._spin_left_s = self._spinning(draws[5], draws[6]) / SPIN_S, SPIN_S
         spun_s = min(dt_s, self._spin_left_s)
-        told += spun_s * self._spin
+        reported += spun_s * self._spin
         self._spin_left_s -= spun_s
-        self.odom_from_base = moved(self.odom_from_base, told)
-        self.velocity = told / dt_s
+        self.odom_from_base = moved(self.odom_from_base, reported)
+        self.velocity = reported / dt_s
 
     def _spinning(self, how_far: float, which: float) -> np.ndarray:
         """(3,) what one wheel tells that turns on its spot; both draws are of [0, 1)."""

@@ -11,7 +11,7 @@ Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseAr
     passed or was mirrored at. Stamp, frame and beams are the scan's; its `intensities` say 0 as measured, 1 cut,
     and -1 for all beams while the pose is not trusted: the scan is passed on raw then. One for every scan that
     is used; none for a scan that is refused or has no transforms, as nobody knows where it would have to be cut;
-    ~glass_map (OccupancyGrid, latched): how glassy each wall cell proved [percent], -1 where nothing is known;
+    ~glass_map (OccupancyGrid, latched): probability of glass of each wall cell [percent], -1 where nothing is known;
     for rviz, while somebody listens: ~beam_cloud (PointCloud2), ~beam_markers (MarkerArray, a namespace per case
     and one for the status), ~wall_markers (MarkerArray, latched: the glass map without what is unknown), ~legend
     (Image, latched).

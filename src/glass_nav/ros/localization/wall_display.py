@@ -25,7 +25,7 @@ def wall_markers(map_frame: str, grid_map: GridMap, glass: np.ndarray) -> Marker
     Args:
         map_frame: frame of the map.
         grid_map: the map.
-        glass: (H, W) how glassy each wall cell proved [percent], -1 where nothing is known.
+        glass: (H, W) probability of glass of each wall cell [percent], -1 where nothing is known.
     """
     header = conversions.header(0, map_frame)  # stamp 0: for every time
     kinds = glass < SOLID_BELOW, (glass >= SOLID_BELOW) & (glass < GLASS_FROM), glass >= GLASS_FROM
