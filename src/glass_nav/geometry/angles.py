@@ -32,8 +32,8 @@ def mean(angle_rad: np.ndarray, weights: Optional[np.ndarray] = None) -> float:
 def cos_sin(angle_rad: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
     """Cosine and sine, any shape.
 
-    Of a copy: for a column of a table numpy's last bit depends on where the table lies in memory, and a run
-    would not repeat.
+    Computed on a copy: for a column of a table, numpy's last bit depends on the table's place in memory, and a
+    run would not repeat.
     """
     angle_rad = np.array(angle_rad, float)
     return np.cos(angle_rad), np.sin(angle_rad)

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def inside(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """(M,) bool: which points (M, 2) lie in a polygon (N, 2) of at least 3 corners in either sense.
+    """(M,) bool: which points (M, 2) lie in a polygon (N, 2) of at least 3 corners in either order.
 
     A ray to the right crosses its edges an odd number of times; so an edge that runs over another one cuts out.
     """

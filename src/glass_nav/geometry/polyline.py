@@ -1,4 +1,4 @@
-"""A line through points, by the way along it. W points (W, 2), one unit of length throughout."""
+"""A line through points, by the distance along it. W points (W, 2), one unit of length throughout."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ class Polyline:
     def __init__(self, points: np.ndarray) -> None:
         """
         Args:
-            points: (W, 2), at least two, each apart from the one before; see distinct().
+            points: (W, 2), at least two, consecutive ones different; see distinct().
         """
         self.points = points
         self._lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
         self._directions = np.diff(points, axis=0) / self._lengths[:, None]
-        self._starts = np.concatenate([[0.0], np.cumsum(self._lengths)])  # way from the first point to each
+        self._starts = np.concatenate([[0.0], np.cumsum(self._lengths)])  # distance from the first point to each
         self.length = float(self._starts[-1])
 
     def at(self, way: float) -> np.ndarray:
-        """(2,) the point so far along; before the start and beyond the end the line runs straight on."""
+        """(2,) the point at that distance; before the start and beyond the end the line continues straight."""
         index = self._piece(way)
         return self.points[index] + (way - self._starts[index]) * self._directions[index]
 
     def direction(self, way: float) -> np.ndarray:
-        """(2,) of length 1, in which the line runs there."""
+        """(2,) unit vector of the line there."""
         return self._directions[self._piece(way)]
 
     def nearest(self, point: np.ndarray, from_way: float = 0.0, window: float = np.inf) -> float:
-        """Way to the point of the line that is nearest to a point (2,), neither before from_way nor on a piece that
+        """Distance along the line to its point nearest to a point (2,), neither before from_way nor on a piece that
         begins more than the window after it: a line may cross itself.
         """
         first, last = self._piece(from_way), self._piece(from_way + window)
@@ -42,7 +42,7 @@ class Polyline:
         return min(float(self._starts[first + best] + along[best]), self.length)
 
     def part(self, from_way: float, to_way: float) -> np.ndarray:
-        """(n, 2) the points from one way to another, both ends included; backwards if the second is less."""
+        """(n, 2) the points from one distance to another, both ends included; backwards if the second is less."""
         low, high = sorted((from_way, to_way))
         between = self.points[(self._starts > low) & (self._starts < high)]
         points = np.concatenate([self.at(low)[None], between, self.at(high)[None]])
@@ -53,12 +53,12 @@ class Polyline:
 
 
 def distinct(points: np.ndarray, least_step: float = 1e-6) -> np.ndarray:
-    """(n, 2) the points (W, 2) without those that repeat the one before."""
+    """(n, 2) the points (W, 2) without consecutive duplicates."""
     keep = np.ones(len(points), bool)
     keep[1:] = np.linalg.norm(np.diff(points, axis=0), axis=1) > least_step
     return points[keep]
 
 
 def length(points: np.ndarray) -> float:
-    """Of the line through the points (W, 2)."""
+    """Length of the line through the points (W, 2)."""
     return float(np.hypot(*np.diff(points, axis=0).T).sum())

@@ -1,7 +1,7 @@
 """A point ahead on a line -> the velocity along the arc through it, for a base that drives forward and turns.
 
 Coulter, Implementation of the Pure Pursuit Path Tracking Algorithm, CMU-RI-TR-92-01 (1992). Ours: slower in bends, and
-speeds from which the base can still brake. Velocities (3,) forward, left [m/s], turn [rad/s], within the speeds of the
+only speeds from which the base can still brake. Velocities (3,) forward, left [m/s], turn [rad/s], within the speeds of the
 base but not by its accelerations.
 """
 
@@ -13,11 +13,11 @@ from typing import Protocol
 import numpy as np
 
 LATERAL_M_S2 = 0.4  # in bends
-BRAKING_SHARE = 0.7  # of the acceleration: some is kept in reserve
+BRAKING_SHARE = 0.7  # of the acceleration: the rest is a reserve
 
 
 class Base(Protocol):
-    """What bounds the velocities of a base."""
+    """Limits on the velocities of a base."""
 
     @property
     def max_speed_m_s(self) -> float: ...
@@ -30,7 +30,7 @@ class Base(Protocol):
 
 
 def curvature_to(point_m: np.ndarray) -> float:
-    """Of the arc from the robot to a point (2,) in its frame [1/m], positive to the left."""
+    """Curvature [1/m] of the arc from the robot to a point (2,) in its frame, positive to the left."""
     distance = max(math.hypot(point_m[0], point_m[1]), 1e-6)
     return 2.0 * float(point_m[1]) / distance**2
 
@@ -45,7 +45,7 @@ def along_arc(curvature: float, base: Base, speed_m_s: float, lateral_m_s2: floa
 
     Args:
         curvature: of the arc.
-        base: that drives.
+        base: its limits.
         speed_m_s: at most.
         lateral_m_s2: acceleration to the side, at most.
     """
@@ -61,5 +61,5 @@ def on_the_spot(angle_rad: float, base: Base, creep_rad_s: float = 0.0) -> np.nd
 
 
 def braking_speed(distance: float, acceleration: float) -> float:
-    """From which the base stands within a distance, with some in reserve; of a turn too, in rad."""
+    """Speed from which the base can stop within a distance [m] or a turn [rad], with some reserve."""
     return math.sqrt(2.0 * BRAKING_SHARE * acceleration * max(distance, 0.0))

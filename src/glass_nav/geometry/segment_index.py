@@ -1,10 +1,10 @@
-"""Points -> the segment nearest to each, without a look at all the others.
+"""Points -> the segment nearest to each, without testing all of them.
 
-Nearest as the seed document segment_localization.txt has it, "Classification of Data Points": by the distance to the
-segment itself, which is that to its line where the foot of the perpendicular lies on it, else that to the nearer end.
-The plane around the segments is cut into squares; each knows the few segments that can be the nearest to a point in it:
-if the nearest to its centre is d away, no point of the square has a nearest one further than d + 2 h from the centre,
-h being half of its diagonal. Found from large squares to small ones. N points, S segments; one unit of length.
+Nearest as the seed document segment_localization.txt defines it, "Classification of Data Points": by the distance to
+the segment itself, which is that to its line where the foot of the perpendicular lies on it, else that to the nearer
+end. The plane around the segments is cut into squares; each stores the few segments that can be the nearest to a point
+in it: if the nearest to its centre is d away, the nearest to any of its points is within d + 2 h of the centre, h being
+half of the diagonal. The search goes from large squares to small ones. N points, S segments; one unit of length.
 """
 
 from __future__ import annotations
@@ -16,28 +16,28 @@ import numpy as np
 
 from glass_nav.geometry.segments import NO_SEGMENT
 
-_HALVINGS = 5  # of the squares that are looked at first
+_HALVINGS = 5  # of the first squares
 _MAX_PAIRS = 4_000_000  # of points and segments at once
 _SLACK = 1e-9
 
 
 @dataclass(frozen=True)
 class Nearest:
-    """Of each point."""
+    """The nearest segment of each point."""
 
-    segment: np.ndarray  # (N,) int: the nearest one, the first of equals; NO_SEGMENT: there is none
-    distance: np.ndarray  # (N,) to it; inf: there is none
+    segment: np.ndarray  # (N,) int: the nearest segment, the first of equals; NO_SEGMENT: none
+    distance: np.ndarray  # (N,) to it; inf: none
 
 
 class SegmentIndex:
-    """Segments, prepared to be asked often."""
+    """Segments, prepared for many queries."""
 
     def __init__(self, segments: np.ndarray, square: float = 0.25, margin: float = 2.0) -> None:
         """
         Args:
             segments: (S, 4) x1 y1 x2 y2; S = 0 is allowed.
-            square: edge of the squares.
-            margin: how far around the segments they reach; points beyond are looked up slowly.
+            square: edge length of the squares.
+            margin: how far the squares reach beyond the segments; points further out are looked up slowly.
 
         Raises:
             ValueError: wrong shape, an end that is not finite, a segment without length.
@@ -128,7 +128,7 @@ class SegmentIndex:
         return np.concatenate(of), np.concatenate(candidate)
 
     def _may_be_nearest(self, corner: np.ndarray, edge: float, of: np.ndarray, candidate: np.ndarray) -> np.ndarray:
-        """(K,) bool of pairs of a square and a segment; each square has at least one, in pairs that are together."""
+        """(K,) bool of pairs of a square and a segment; each square has at least one, and its pairs are adjacent."""
         distance = np.empty(len(of))
         for begin in range(0, len(of), _MAX_PAIRS):
             part = slice(begin, begin + _MAX_PAIRS)
@@ -141,7 +141,7 @@ class SegmentIndex:
 
 
 def nearest_of_all(points: np.ndarray, segments: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """(N,) the segment nearest to each point (N, 2), the first of equals, and (N,) its distance, by looking at all."""
+    """(N,) the segment nearest to each point (N, 2), the first of equals, and (N,) its distance, by testing all."""
     length = np.hypot(*(segments[:, 2:] - segments[:, :2]).T)
     rows = np.column_stack([segments[:, :2], (segments[:, 2:] - segments[:, :2]) / length[:, None], length])
     found, away = np.empty(len(points), np.int64), np.empty(len(points))

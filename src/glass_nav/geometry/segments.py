@@ -1,7 +1,7 @@
-"""Points in their order along walls -> line segments, by split and merge with total least squares.
+"""Points in order along walls -> line segments, by split and merge with total least squares.
 
 Split: Ramer (1972), Douglas and Peucker (1973). Merge and fit: Pavlidis and Horowitz (1974). A segment is a row
-x1 y1 x2 y2 that runs as its points do. N points, S segments; one unit of length throughout.
+x1 y1 x2 y2 in the direction of its points. N points, S segments; one unit of length throughout.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ NO_SEGMENT = -1
 
 
 def corners(points: np.ndarray, tolerance: float) -> np.ndarray:
-    """Indices (K,) of the points (N, 2) of a line that has all others within the tolerance; first and last included."""
+    """Indices (K,) of the points (N, 2) of a line that all others are within the tolerance of; first and last included."""
     kept = [0, len(points) - 1]
     pieces = [(0, len(points) - 1)]
     while pieces:
@@ -33,8 +33,8 @@ def split_and_merge(points: np.ndarray, tolerance: float, least_length: float) -
     """Line segments along a chain of points.
 
     Args:
-        points: (N, 2) in their order along the wall.
-        tolerance: no point of a segment lies further from its line.
+        points: (N, 2) in order along the wall.
+        tolerance: largest distance of a point from the line of its segment.
         least_length: shorter segments are left out.
 
     Returns:
@@ -59,14 +59,14 @@ def split_and_merge(points: np.ndarray, tolerance: float, least_length: float) -
 
 
 def fit(points: np.ndarray) -> np.ndarray:
-    """(4,) the segment that points (N, 2) lie along: of their line by total least squares, from end to end."""
+    """(4,) the segment along points (N, 2): on their total least-squares line, from end to end."""
     centre, direction = _line(points)
     along = (points - centre) @ direction
     return np.concatenate([centre + along.min() * direction, centre + along.max() * direction])
 
 
 def weighted_fit(points: np.ndarray, variance: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """As fit(), each point with the variance (N,) of its distance from the line.
+    """As fit(), with the variance (N,) of each point's distance from the line.
 
     Returns:
         (4,) the segment, and the covariance (2, 2) of its line's heading [rad] and offset, the offset being the
@@ -82,7 +82,7 @@ def weighted_fit(points: np.ndarray, variance: np.ndarray) -> Tuple[np.ndarray, 
     if (points[-1] - points[0]) @ direction < 0.0:
         direction = -direction
     along = (points - centre) @ direction
-    turn = np.array([1.0, -(direction @ centre)])  # of heading and offset, by a turn about the centre
+    turn = np.array([1.0, -(direction @ centre)])  # change of heading and offset by a turn about the centre
     spread = max(float(weight @ along**2), 1e-300)
     covariance = np.outer(turn, turn) / spread + np.diag([0.0, 1.0 / total])
     return np.concatenate([centre + along.min() * direction, centre + along.max() * direction]), covariance

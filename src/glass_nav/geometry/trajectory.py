@@ -1,6 +1,6 @@
 """A path of stamped planar poses, and its pose between two stamps.
 
-N poses; stamps in integer nanoseconds, because a float second of today holds only 0.2 microseconds.
+N poses; stamps in integer nanoseconds, because a float in seconds resolves only 0.2 microseconds today.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ class Trajectory:
         return (stamp_ns >= self.stamps_ns[0] - slack_ns) & (stamp_ns <= self.stamps_ns[-1] + slack_ns)
 
     def at(self, stamp_ns: ArrayLike) -> np.ndarray:
-        """Poses (..., 3) at stamps (...), linear in x, y and the shorter way in yaw.
+        """Poses (..., 3) at stamps (...), linear in x and y, and by the shorter turn in yaw.
 
-        Outside the recorded time the nearest end holds; ask covers() first.
+        Outside the recorded time the pose of the nearest end is returned; check covers() first.
         """
         if not len(self):
             raise ValueError("an empty trajectory has no pose")

@@ -1,4 +1,4 @@
-"""A simulated robot -> a ROS 1 bag, as a real robot's is recorded, with the truth beside.
+"""A simulated robot -> a ROS 1 bag as of a real robot, plus the ground truth.
 
 /scan, /odom, /tf (odom -> base_link), /tf_static (base_link -> laser), /clock; and the truth: /ground_truth in the
 frame map, /true_beams with the stamps of /scan.
@@ -18,7 +18,7 @@ MAP, ODOM, BASE, LASER = "map", "odom", "base_link", "laser"
 
 
 class BagWriter(MessageWriter):
-    """Write in the order of time."""
+    """Write in order of time."""
 
     KINDS = {
         "/scan": "sensor_msgs/msg/LaserScan",
@@ -37,7 +37,7 @@ class BagWriter(MessageWriter):
         self._send("/tf_static", stamp_ns, transforms=[self._transform(stamp_ns, BASE, LASER, base_from_laser)])
 
     def odometry(self, stamp_ns: int, odom_from_base: np.ndarray, velocity: np.ndarray) -> None:
-        """/odom and /tf, and the time.
+        """/odom, /tf and /clock.
 
         Args:
             odom_from_base: (3,) pose.
@@ -62,7 +62,7 @@ class BagWriter(MessageWriter):
         )
 
     def scan(self, scan: Scan, period_s: float) -> None:
-        """/scan, recorded when its last beam was there; the laser turns once in period_s."""
+        """/scan, recorded at the time of its last beam; the laser turns once in period_s."""
         angles_rad = scan.angles_rad
         increment = float(angles_rad[1] - angles_rad[0]) if len(scan) > 1 else 0.0
         self._send(

@@ -1,6 +1,6 @@
-"""Messages of a robot in the plane -> a ROS 1 bag, through rosbags: what the writers of bags share.
+"""Messages of a robot in the plane -> a ROS 1 bag, through rosbags: the common part of all bag writers.
 
-No ROS needed, and the same for rosbags 0.9.23 and later.
+Needs no ROS; works with rosbags 0.9.23 and later.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ Self = TypeVar("Self", bound="MessageWriter")
 
 
 class MessageWriter:
-    """`with Writer(path) as bag:` write in the order of time; the file is there when all of it is.
+    """`with Writer(path) as bag:` write in order of time; the file appears when it is complete.
 
-    It grows under another name beside it, and an error leaves nothing behind. An older file of the name is replaced.
+    It is written under a temporary name beside it, and an error leaves nothing behind. An older file is replaced.
     """
 
     KINDS: Dict[str, str] = {}  # topic -> message type
-    LATCHED: Tuple[str, ...] = ()  # a player sends the last of these to those who come late, too
+    LATCHED: Tuple[str, ...] = ()  # a player sends their last message to late subscribers, too
     OWN_TYPES: Dict[str, str] = {}  # definitions of the types that Noetic's message packages do not have
 
     def __init__(self, path: Path) -> None:

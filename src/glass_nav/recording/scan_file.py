@@ -12,15 +12,15 @@ from glass_nav.sensing.scan import Scan, ScanError, scan_from_fields
 
 SUFFIXES = (".yaml", ".yml", ".csv")
 _FIELDS = ("angle_min", "angle_increment", "range_min", "range_max")
-_BEYOND_M = 0.01  # the largest range of a table, and so much more, is as far as its lidar sees
+_BEYOND_M = 0.01  # added to the largest range of a table to give its lidar's range_max
 
 
 def load(path: Path, base_from_laser: Sequence[float] = (0.0, 0.0, 0.0)) -> Scan:
     """The scan of a file.
 
-    .yaml: the fields angle_min, angle_increment, range_min, range_max and ranges of a sensor_msgs/LaserScan, others
-    are left aside. .csv: a line for each beam with its angle [rad] and range [m], counterclockwise in the laser's
-    frame; a first line of words and lines after # are left aside. No answer: nan or inf.
+    .yaml: the fields angle_min, angle_increment, range_min, range_max and ranges of a sensor_msgs/LaserScan; others
+    are ignored. .csv: a line for each beam with its angle [rad] and range [m], counterclockwise in the laser's
+    frame; a header line and comments after # are ignored. No answer: nan or inf.
 
     Args:
         path: by its suffix.
@@ -70,7 +70,7 @@ def _numbers(path: Path, message: Dict[str, Any]) -> Dict[str, float]:
 
 
 def _number(path: Path, what: str, value: Any) -> float:
-    """rostopic writes nan and inf, which yaml takes for words."""
+    """rostopic writes nan and inf, which yaml reads as words."""
     try:
         if not isinstance(value, bool):
             return float(value)
@@ -89,7 +89,7 @@ def _from_table(path: Path, text: str, laser: np.ndarray) -> Scan:
             row = [float(cell) for cell in cells]
         except ValueError as err:
             if not rows and number == 1:
-                continue  # names of the columns
+                continue  # column names
             raise RecordingError(f"{path}: line {number} must be an angle [rad] and a range [m], got {line!r}") from err
         if len(row) != 2 or not np.isfinite(row[0]):
             raise RecordingError(f"{path}: line {number} must be an angle [rad] and a range [m], got {line!r}")

@@ -17,10 +17,10 @@ def load(path: Path, scan_stamps_ns: Optional[np.ndarray] = None) -> Trajectory:
 
     Args:
         path: TUM (`stamp x y z qx qy qz qw` a row) or MRPT (`index x y yaw` a row).
-        scan_stamps_ns: (S,) of the log; MRPT's rows have no time, row i - 1 belongs to scan i.
+        scan_stamps_ns: (S,) of the log; MRPT's rows have no stamps, row i - 1 belongs to scan i.
 
     Raises:
-        RecordingError: no such file, or rows of neither form.
+        RecordingError: no such file, or rows in neither format.
     """
     rows = _rows(path)
     columns = {len(row) for _, row in rows}
@@ -103,4 +103,4 @@ def _nanoseconds(path: Path, number: int, word: str) -> int:
     if whole.lstrip("-").isdigit() and (rest.isdigit() or not rest):
         sign = -1 if whole.startswith("-") else 1
         return int(whole) * 1_000_000_000 + sign * int((rest + "000000000")[:9])
-    return int(round(_numbers(path, number, [word])[0] * 1e9))  # 1.5e9 and the like
+    return int(round(_numbers(path, number, [word])[0] * 1e9))  # exponents such as 1.5e9

@@ -1,4 +1,4 @@
-"""An action server goes on telling its clients that it is there when time jumps back."""
+"""Keeps an action server's status published when time jumps back."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from typing import Any
 
 import rospy
 
-PERIOD_S = 0.2  # as actionlib's own
+PERIOD_S = 0.2  # actionlib's own
 
 
 def start(server: Any) -> None:
-    """Start a SimpleActionServer; actionlib's timer of the status ends with an exception when time jumps back."""
+    """Start a SimpleActionServer; actionlib's status timer ends with an exception when time jumps back."""
     server.start()
-    timer = getattr(server.action_server, "status_timer", None)  # none if its rate was set to 0
+    timer = getattr(server.action_server, "status_timer", None)  # None if its rate was set to 0
     if timer is None:
         return
     timer.shutdown()

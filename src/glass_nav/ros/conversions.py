@@ -1,6 +1,6 @@
-"""ROS messages <-> the types of the core: every conversion of the package, and the checks that go with it.
+"""ROS messages <-> the types of the core: every conversion of the package, with its checks.
 
-Stamps are integer nanoseconds on the core's side. What cannot be converted raises ValueError (ScanError
+Stamps are integer nanoseconds on the core's side. Invalid messages raise ValueError (ScanError
 for scans) with one line for the log. B beams, P particles.
 """
 
@@ -50,7 +50,7 @@ def stamp_from_ns(stamp_ns: int) -> rospy.Time:
 
 
 def frame_id(name: str) -> str:
-    """The frame as tf2 wants it: tf1 wrote a "/" in front."""
+    """The frame name for tf2: tf1 wrote a "/" in front."""
     return name.lstrip("/")
 
 
@@ -107,7 +107,7 @@ def transform_stamped(stamp_ns: int, parent: str, child: str, parent_from_child:
 
 
 def guess_from_msg(msg: PoseWithCovarianceStamped, map_frame: str) -> PoseGuess:
-    """The message that rviz sends on `initialpose`, checked. ValueError if it cannot be a start."""
+    """The message that rviz sends on `initialpose`, checked. ValueError if it cannot be an initial pose."""
     frame = frame_id(msg.header.frame_id)
     if frame != map_frame:
         raise ValueError(f"the pose must be given in frame {map_frame!r}, got {msg.header.frame_id!r}")
@@ -141,7 +141,7 @@ def pose_with_covariance(
 
 
 class _PackedPoseArray(PoseArray):
-    """A PoseArray whose poses are an array already: 5000 of them go out in under 1 ms instead of 30."""
+    """A PoseArray that holds its poses as an array: 5000 are sent in under 1 ms instead of 30."""
 
     def __init__(self, head: Header, packed: np.ndarray) -> None:
         super().__init__(header=head)
@@ -154,7 +154,7 @@ class _PackedPoseArray(PoseArray):
 
 
 def pose_array(stamp_ns: int, map_frame: str, poses: np.ndarray) -> PoseArray:
-    """Poses (P, 3) as the message of `particlecloud`; for publishing only, its `poses` stay empty."""
+    """Poses (P, 3) as the message of `particlecloud`; for publishing only: its `poses` stay empty."""
     packed = np.zeros((len(poses), 7))
     packed[:, :2] = poses[:, :2]
     packed[:, 5], packed[:, 6] = np.sin(0.5 * poses[:, 2]), np.cos(0.5 * poses[:, 2])
@@ -165,7 +165,7 @@ def pose_array(stamp_ns: int, map_frame: str, poses: np.ndarray) -> PoseArray:
 
 
 def mounting_from_transform(base_from_laser: Transform) -> Mounting:
-    """Where a level lidar sits, upright or upside down. ScanError if it is neither."""
+    """Mounting of a level lidar, upright or upside down. ScanError if it is neither."""
     try:
         planar = planar_from_transform(base_from_laser)
         upwardness = rotation_from_quaternion(base_from_laser.rotation)[2, 2]
@@ -175,7 +175,7 @@ def mounting_from_transform(base_from_laser: Transform) -> Mounting:
 
 
 def raw_scan_from_msg(msg: LaserScan) -> RawScan:
-    """The fields of a LaserScan, nothing checked."""
+    """The fields of a LaserScan, unchecked."""
     return RawScan(
         ns_from_stamp(msg.header.stamp),
         frame_id(msg.header.frame_id),
@@ -190,19 +190,19 @@ def raw_scan_from_msg(msg: LaserScan) -> RawScan:
     )
 
 
-# What the `intensities` of scan_surfaces say of a beam.
+# Meaning of the `intensities` of scan_surfaces.
 AS_MEASURED, CUT, NOT_JUDGED = 0.0, 1.0, -1.0
 
 
 def surface_scan_msg(placed: PlacedScan, surface: SurfaceScan) -> LaserScan:
     """The message of `scan_surfaces`: the scan with its beams cut at the first surface of the map.
 
-    Fields, order and ranges are the driver's own, but for the ranges of beams that were cut and for the
-    intensities: 0 as measured, 1 cut; -1 for all beams while the pose is not trusted and nothing is cut.
+    Fields, order and ranges are the driver's own, except the ranges of cut beams and the intensities: 0 as
+    measured, 1 cut; -1 for all beams while the pose is not trusted and nothing is cut.
 
     Args:
-        placed: the scan; upside down or not, its beams keep the driver's order.
-        surface: beam by beam in that order.
+        placed: the scan; its beams keep the driver's order, upside down or not.
+        surface: per beam, in that order.
     """
     raw = placed.raw
     ranges = np.array(raw.ranges_m, float)
@@ -226,7 +226,7 @@ def surface_scan_msg(placed: PlacedScan, surface: SurfaceScan) -> LaserScan:
 
 
 def map_from_msg(msg: OccupancyGrid) -> GridMap:
-    """OccupancyGrid -> GridMap, its origin with yaw. ValueError if it is no map."""
+    """OccupancyGrid -> GridMap, with the yaw of its origin. ValueError if it is no valid map."""
     info = msg.info
     if info.width == 0 or info.height == 0:
         raise ValueError(f"a map needs at least one cell, got {info.width} x {info.height}")
@@ -254,7 +254,7 @@ def msg_from_map(grid_map: GridMap, stamp: rospy.Time, map_frame: str) -> Occupa
 
 
 class _PackedGrid(OccupancyGrid):
-    """An OccupancyGrid whose cells are an array already: a million go out in 1 ms instead of 50."""
+    """An OccupancyGrid that holds its cells as an array: a million are sent in 1 ms instead of 50."""
 
     def __init__(self, head: Header, packed: np.ndarray) -> None:
         super().__init__(header=head)
@@ -269,13 +269,13 @@ class _PackedGrid(OccupancyGrid):
 
 
 def glass_map_msg(stamp_ns: int, map_frame: str, grid_map: GridMap, glass: np.ndarray) -> OccupancyGrid:
-    """The message of `~glass_map`; for publishing only, its `data` stays empty.
+    """The message of `~glass_map`; for publishing only: its `data` stays empty.
 
     Args:
-        stamp_ns: of the last scan that it holds, 0 before the first.
+        stamp_ns: of the last scan used, 0 before the first.
         map_frame: frame of the map.
-        grid_map: the map whose geometry it has.
-        glass: (H, W) int8, probability of glass of each wall cell [percent], -1 where nothing is known.
+        grid_map: the map that gives its geometry.
+        glass: (H, W) int8, probability of glass by wall cell [percent], -1 where unknown.
     """
     msg = _PackedGrid(header(stamp_ns, map_frame), np.asarray(glass, np.int8))
     msg.info = grid_info(grid_map)
@@ -289,7 +289,7 @@ def grid_info(grid_map: GridMap) -> MapMetaData:
     return info
 
 
-# -- what the filter says
+# -- what the filter reports
 
 
 def status_msg(
@@ -301,7 +301,7 @@ def status_msg(
 
 
 def area_from_msg(msg: PolygonStamped, map_frame: str) -> np.ndarray:
-    """(N, 2) corners [m, in map] of an area to search; ValueError if it is none."""
+    """(N, 2) corners [m, in map] of an area to search; ValueError if it is invalid."""
     if frame_id(msg.header.frame_id) != map_frame:
         raise ValueError(f"the area must be given in frame {map_frame!r}, got {msg.header.frame_id!r}")
     corners = np.array([(point.x, point.y) for point in msg.polygon.points], float).reshape(-1, 2)

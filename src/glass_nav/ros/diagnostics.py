@@ -14,7 +14,7 @@ class Diagnostics:
     """One status per entry, named "node: entry".
 
     Nodes publish once a second of the wall clock. Updater.update() would go by ROS time, which may stand still, and by
-    a parameter ~diagnostic_period, which the nodes refuse as unknown.
+    a parameter ~diagnostic_period, which the nodes reject as unknown.
     """
 
     def __init__(self, *names: str) -> None:
@@ -25,7 +25,7 @@ class Diagnostics:
             self._updater.add(name, functools.partial(self._fill, name))
 
     def publish(self, entries: Mapping[str, Health]) -> None:
-        """The entries by name, all of those that __init__ named."""
+        """The entries by name: all that __init__ named."""
         self._entries = entries
         self._updater.force_update()
 

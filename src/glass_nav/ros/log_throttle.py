@@ -1,4 +1,4 @@
-"""One line of a kind now and then: a warning at scan rate would bury the others."""
+"""Limits how often a kind of line is logged: a warning at scan rate would bury the others."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ _WRITERS = {logging.INFO: rospy.loginfo, logging.WARNING: rospy.logwarn, logging
 
 
 class LogThrottle:
-    """Says a line unless one that differs from it in its numbers only was said a moment ago.
+    """Logs a line unless one that differs only in its numbers was logged a moment ago.
 
     rospy's own throttles go by the place in the code, where two reasons hide each other, or by the
-    exact text, which a stamp makes new each time. Periods are of the wall clock: ROS time may stand still.
+    exact text, which differs each time if it has a stamp. Periods are of the wall clock: ROS time may stand still.
     """
 
     def __init__(self) -> None:
-        self._said_s: Dict[str, float] = {}  # kind of line -> when last [s]
+        self._said_s: Dict[str, float] = {}  # kind of line -> when last logged [s]
 
     def is_due(self, text: str, period_s: float) -> bool:
-        """Whether a line of that kind may be said; it is noted as said then."""
+        """Whether a line of that kind may be logged; if so, it counts as logged."""
         kind = _NUMBER.sub("#", text)
         now_s = time.monotonic()
         if now_s - self._said_s.get(kind, -period_s) < period_s:

@@ -1,4 +1,4 @@
-"""ROS time as the run loop of a node reads it, and whether it was set back: a bag or a simulation starts over."""
+"""ROS time for the run loop of a node, with detection of jumps back: a bag or a simulation starts over."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Optional
 
 import rospy
 
-TIME_JUMP_S = 0.5  # a clock set back by less is noise between machines
+TIME_JUMP_S = 0.5  # smaller jumps back are noise between machines
 
 
 class LoopClock:
@@ -14,10 +14,10 @@ class LoopClock:
 
     def __init__(self) -> None:
         self.now_s = rospy.get_time()
-        self.has_begun = False  # in this pass: before it, nothing had published /clock
+        self.has_begun = False  # in this pass: before it, nobody published /clock
 
     def tick(self) -> Optional[str]:
-        """Read the time; in words by how much it jumped back, None if it did not."""
+        """Read the time; returns in words by how much it jumped back, or None."""
         before_s, self.now_s = self.now_s, rospy.get_time()
         self.has_begun = before_s == 0.0
         back_s = before_s - self.now_s

@@ -14,11 +14,11 @@ T = TypeVar("T")
 class Mailbox:
     """Bounded lanes of items: put() from any thread, take() from the run loop.
 
-    A lane that is full loses its oldest item, so a flood of scans cannot push out a command.
+    A full lane drops its oldest item, so a flood of scans cannot displace a command.
     """
 
     def __init__(self, **capacities: int) -> None:
-        """Lanes by name, and how many items each may hold."""
+        """Names of the lanes, and how many items each may hold."""
         self._lanes: Dict[str, Deque[Any]] = {
             lane: collections.deque(maxlen=capacity) for lane, capacity in capacities.items()
         }
@@ -36,7 +36,7 @@ class Mailbox:
         return future
 
     def take(self, timeout_s: float) -> Dict[str, List[Any]]:
-        """Lane -> what came since the last call, oldest first; waits for a first item up to the timeout."""
+        """Lane -> items since the last call, oldest first; waits for a first item up to the timeout."""
         with self._changed:
             if not any(self._lanes.values()):
                 self._changed.wait(timeout_s)
@@ -46,7 +46,7 @@ class Mailbox:
             return taken
 
     def take_now(self, lane: str) -> List[Any]:
-        """What lies in one lane, oldest first; without waiting."""
+        """The items in one lane, oldest first, without waiting."""
         with self._changed:
             taken = list(self._lanes[lane])
             self._lanes[lane].clear()
@@ -54,11 +54,11 @@ class Mailbox:
 
 
 def outcome(future: "Future[T]", timeout_s: float) -> T:
-    """What the work of Mailbox.submit() returned or raised. TimeoutError if it has not finished; not begun, it never is."""
+    """What a call by Mailbox.submit() returned or raised. TimeoutError if it has not finished; if not begun, it is cancelled."""
     try:
         return future.result(timeout_s)
     except concurrent.futures.TimeoutError:
-        future.cancel()  # the caller is told that it failed: doing it later would surprise
+        future.cancel()  # its failure is reported to the caller: a later call would be a surprise
         raise TimeoutError(f"the node did not answer within {timeout_s:g} s") from None
 
 

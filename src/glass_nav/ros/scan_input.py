@@ -1,4 +1,4 @@
-"""Scans of one or several lidars, from their topics; what becomes of them is decided in sensing/scan_queue.py."""
+"""Scans of one or several lidars, from their topics; sensing/scan_queue.py decides how they are used."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class ScanInput(ScanQueue):
         self._subscribers: List[rospy.Subscriber] = []
 
     def reconfigure(self, p: LocalizationNodeParams, deskew: Deskew) -> None:
-        """Other parameters from now on."""
+        """Change the parameters."""
         self.use(self._placement_by_tf(p, deskew), p.transform_wait_s)
 
     def subscribe(self, put: Callable[[LaserScan], None]) -> None:
-        """Listen; put is called by other threads."""
+        """Subscribe; put is called by other threads."""
         self._subscribers = [  # Nagle's algorithm would hold small messages for 40 ms
             rospy.Subscriber(topic, LaserScan, put, queue_size=100, buff_size=2**22, tcp_nodelay=True)
             for topic in self._topics
@@ -42,7 +42,7 @@ class ScanInput(ScanQueue):
         return self.add(conversions.raw_scan_from_msg(msg), now_s, unusable)
 
     def silence(self, now_s: float) -> str:
-        """The line on a lidar that is not heard."""
+        """The log line about missing scans."""
         topics = ", ".join(rospy.resolve_name(topic) for topic in self._topics)
         publishers = sum(subscriber.get_num_connections() for subscriber in self._subscribers)
         return f"no scan on {topics} for {now_s - self.last_arrival_s:.0f} s: " + (

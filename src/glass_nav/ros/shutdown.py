@@ -1,4 +1,4 @@
-"""How a node begins and runs, is told to end, and says that it cannot begin."""
+"""How a node starts, runs, ends, and reports that it cannot start."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ import rospy
 def event_on_signals() -> threading.Event:
     """Set by SIGINT and SIGTERM; for nodes that call rospy.init_node(..., disable_signals=True).
 
-    rospy's own handler shuts down from within whatever the main thread is doing; within a call of the parameter server
-    it waits for itself. Ours only asks the loop to end.
+    rospy's own handler interrupts the main thread to shut down; during a call to the parameter server it deadlocks. Ours
+    only asks the loop to end.
     """
     ending = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -24,7 +24,7 @@ def event_on_signals() -> threading.Event:
 
 
 def refuse_to_start(err: Exception, exit_code: int = 2) -> NoReturn:
-    """One line in the log, with the node's name in front, and the end of the process."""
+    """Log one line, with the node's name in front, and end the process."""
     name, text = rospy.get_name(), " ".join(str(err).split())
     rospy.logfatal(text if text.startswith(name) else f"{name}: {text}")
     rospy.signal_shutdown("cannot start")
@@ -32,7 +32,7 @@ def refuse_to_start(err: Exception, exit_code: int = 2) -> NoReturn:
 
 
 def core_logs_to_rosout() -> None:
-    """What the core says by its loggers goes where rospy's lines go."""
+    """Send the log lines of the core where rospy's lines go."""
     core_log = logging.getLogger("glass_nav")
     core_log.handlers = logging.getLogger("rosout").handlers
     core_log.setLevel(logging.INFO)
@@ -40,11 +40,11 @@ def core_logs_to_rosout() -> None:
 
 
 def run_node(name: str, make: Callable[[Dict[str, Any]], Any], bad_input: Tuple[Type[Exception], ...] = ()) -> None:
-    """Start a node and run it until it is told to end.
+    """Start a node and run it until it is asked to end.
 
     Args:
         name: of the node, unless it is renamed.
-        make: the node from its private parameters, as they are given; ValueError ends it with exit code 2.
+        make: makes the node from its private parameters; ValueError ends it with exit code 2.
         bad_input: exceptions of make() and of its run() that end it with exit code 3.
     """
     rospy.init_node(name, disable_signals=True)

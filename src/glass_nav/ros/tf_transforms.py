@@ -1,4 +1,4 @@
-"""The transforms of a running robot, as the core asks for them."""
+"""The transforms of a running robot, in the form that the core needs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from glass_nav.sensing.scan_placement import NoTransform, Transforms
 
 
 class TfTransforms(Transforms):
-    """By a buffer of tf2, which its node fills and clears."""
+    """Looks transforms up in a tf2 buffer, which the node fills and clears."""
 
     def __init__(self, tf: tf2_ros.Buffer, odom_frame: str, base_frame: str) -> None:
         self._tf, self._odom_frame, self._base_frame = tf, odom_frame, base_frame

@@ -1,1 +1,1 @@
-"""A building, a robot and its lidar, as the physics of glass has them; seeded."""
+"""A simulated building, robot and lidar, with the physics of glass; seeded."""

@@ -1,8 +1,8 @@
 """Building: walls, panes and things as lines in the frame map, in metres.
 
-Everything has two flags: mapped, it was there when the map was drawn; present, it is there now. What stands there
-unmapped is mapped = False, what the map still shows is present = False. S surfaces: the straight pieces that a beam
-can meet. Errors begin with the word for the part, so that building_file can say which one.
+Every part has two flags: mapped, it was there when the map was drawn; present, it is there now. Unmapped furniture has
+mapped = False; furniture that has been removed has present = False. S surfaces: the straight pieces that a beam
+can hit. Errors begin with the name of the part, so that building_file can add its number.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from glass_nav.world.landmark_map import LandmarkMap
 MATERIALS = {"plaster": 0.7, "wood": 0.5, "metal": 0.4, "cloth": 0.3, "plant": 0.4, "black": 0.06}
 LARGEST_GAP_M = 0.1  # panes nearer than this to each other are one glazing, drawn as one surface
 OPAQUE, PANE, MIRROR = 0, 1, 2
-TRIES = 60  # places tried for a thing that is moved
-MOVED_M = (0.5, 3.0)  # how far
-PATH_CLEARANCE_M = 0.55  # of a moved thing from the paths
+TRIES = 60  # places tried for each moved thing
+MOVED_M = (0.5, 3.0)  # distance by which a thing is moved
+PATH_CLEARANCE_M = 0.55  # distance of a moved thing from the paths
 
 
 @dataclass(frozen=True)
 class Wall:
-    """A wall of corners joined by straight lines, as thick to either side of them."""
+    """A wall along a polyline, which runs in the middle of its thickness."""
 
     line_m: np.ndarray  # (N, 2)
     thickness_m: float = 0.2
@@ -66,7 +66,7 @@ class Pane:
 
 @dataclass(frozen=True)
 class Mirror:
-    """A mirror; a beam sees it as glass that lets nothing through."""
+    """A mirror: to a beam, glass that transmits nothing."""
 
     line_m: np.ndarray  # (2, 2)
     reflectance: float = 0.9
@@ -78,7 +78,7 @@ class Mirror:
 
 @dataclass(frozen=True)
 class Door:
-    """A door leaf; open, there is nothing."""
+    """A door leaf; an open door has no surface."""
 
     line_m: np.ndarray  # (2, 2)
     mapped: str = "closed"  # or "open": when the map was drawn
@@ -115,7 +115,7 @@ class Thing:
 
 @dataclass(frozen=True)
 class Person:
-    """Somebody who walks along the waypoints and back; on no map."""
+    """A person who walks along the waypoints and back; never mapped."""
 
     waypoints_m: np.ndarray  # (N, 2)
     speed_m_s: float = 1.0
@@ -136,37 +136,39 @@ class Surfaces:
     kind: np.ndarray  # (S,) uint8: OPAQUE, PANE, MIRROR
     mapped: np.ndarray  # (S,) bool
     present: np.ndarray  # (S,) bool
-    reflectance: np.ndarray  # (S,) diffuse of OPAQUE, specular of MIRROR; of a PANE not used
+    reflectance: np.ndarray  # (S,) diffuse for OPAQUE, specular for MIRROR; unused for PANE
     thickness_m: np.ndarray  # (S,) of PANE
     coating: np.ndarray  # (S,) of PANE
     dirt: np.ndarray  # (S,) of PANE and MIRROR
     glazing: np.ndarray  # (S,) int: panes of the same number count as one surface; -1: OPAQUE
-    sheets: np.ndarray  # (S,) int: how many of that number there are
+    sheets: np.ndarray  # (S,) int: how many surfaces share that number
 
 
 @dataclass(frozen=True, eq=False)
 class Building:
-    """What a robot drives in and what its map knows of it."""
+    """The building that a robot drives in, and what the map shows of it."""
 
     walls: Tuple[Wall, ...]
     panes: Tuple[Pane, ...] = ()
     mirrors: Tuple[Mirror, ...] = ()
     doors: Tuple[Door, ...] = ()
-    things: Tuple[Thing, ...] = ()  # furniture, mullions, what is unmapped, what is gone
+    things: Tuple[Thing, ...] = ()  # furniture and mullions, unmapped and removed ones included
     people: Tuple[Person, ...] = ()
     paths: Dict[str, np.ndarray] = field(default_factory=dict)  # name -> (N, 2) waypoints, free to drive
     start: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) map_from_base
     seen_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))  # (N, 2) in rooms seen too
     name: str = "building"
-    tags: LandmarkMap = landmark_map.NONE  # that answer to the beam of a landmark scanner
+    tags: LandmarkMap = landmark_map.NONE  # tags that answer the beam of a landmark scanner
 
     @cached_property
     def surfaces(self) -> Surfaces:
-        """All of them: present or not, mapped or not."""
+        """All surfaces: present or not, mapped or not."""
         rows: List[Tuple[float, ...]] = []
         for wall in self.walls:
             for a, b in zip(wall.line_m[:-1], wall.line_m[1:]):
-                along = (b - a) / np.hypot(*(b - a)) * wall.thickness_m / 2.0  # into the corner, so that none is open
+                along = (
+                    (b - a) / np.hypot(*(b - a)) * wall.thickness_m / 2.0
+                )  # extends into the corner, so that it has no gap
                 rows += outline_rows(_strip(a - along, b + along, wall.thickness_m), True, True, wall.reflectance)
         for door in self.doors:
             rows += outline_rows(
@@ -219,17 +221,17 @@ class Building:
         return surfaces_from_rows(rows)
 
     def opaque(self) -> "Building":
-        """The same building with film on all glass and mirrors; the map of it is the same."""
+        """The same building with film on all glass and mirrors; its map does not change."""
         lines = [pane.line_m for pane in self.panes] + [mirror.line_m for mirror in self.mirrors]
         return replace(self, panes=tuple(Pane(line_m, film=True) for line_m in lines), mirrors=())
 
     def changed(self, share: float, rng: np.random.Generator) -> "Building":
-        """The same building after somebody moved furniture: the map does not know.
+        """The same building after furniture was moved; the map does not show it.
 
         Args:
-            share: of the movable things, 0 to 1; each is gone from its old place and stands, unmapped, 0.5 to 3 m off,
-                in the same room, turned, clear of the paths. What finds no such place has left the building.
-            rng: which, and where to.
+            share: of the movable things that move, 0 to 1. Each leaves its old place and stands, unmapped, 0.5 to 3 m
+                away in the same room, turned, clear of the paths. If there is no such place, it is removed.
+            rng: chooses the things and their new places.
         """
         if not 0.0 <= share <= 1.0:
             raise ValueError(f"changed share must be 0 to 1, got {share}")
@@ -248,7 +250,7 @@ class Building:
         return building
 
     def _free_place(self, outline_m: np.ndarray, rng: np.random.Generator) -> "np.ndarray | None":
-        """(N, 2) the outline somewhere near where it touches nothing present, or None."""
+        """(N, 2) the outline at a nearby place where it touches nothing present; None if there is none."""
         surfaces = self.surfaces
         from_m, to_m = surfaces.from_m[surfaces.present], surfaces.to_m[surfaces.present]
         middle = outline_m.mean(axis=0)
@@ -261,7 +263,7 @@ class Building:
             spokes = np.tile(there, (len(outline), 1))
             if (
                 not crosses(outline, edges, from_m, to_m).any()  # touches nothing
-                and not crosses(spokes, outline, from_m, to_m).any()  # nor has a small thing inside
+                and not crosses(spokes, outline, from_m, to_m).any()  # nor encloses a small thing
                 and not crosses(middle[None], there[None], from_m, to_m).any()  # nor leaves the room
                 and self._path_clearance(outline) > PATH_CLEARANCE_M
             ):
@@ -297,7 +299,7 @@ def surfaces_from_rows(rows: Sequence[Tuple[float, ...]]) -> Surfaces:
 
 
 def joined(first: Surfaces, second: Surfaces) -> Surfaces:
-    """Both; the glazings of the second keep their numbers."""
+    """Both sets joined; the second keeps its glazing numbers."""
     return Surfaces(
         **{
             name: np.concatenate([getattr(first, name), getattr(second, name)])
@@ -314,7 +316,7 @@ def box(x_m: float, y_m: float, length_m: float, width_m: float, yaw_rad: float 
 
 
 def crosses(from_m: np.ndarray, to_m: np.ndarray, line_from_m: np.ndarray, line_to_m: np.ndarray) -> np.ndarray:
-    """(N, M) bool: segment n (N, 2) meets line m (M, 2); parallel ones do not."""
+    """(N, M) bool: segment n (N, 2) crosses line m (M, 2); parallel ones never do."""
     way, line = (to_m - from_m)[:, None], line_to_m - line_from_m
     to_line = line_from_m - from_m[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -348,7 +350,7 @@ def _opaque_row(a: np.ndarray, b: np.ndarray, mapped: bool, present: bool, refle
 
 
 def check_line(noun: str, line_m: np.ndarray, least: int = 2, most: int = 0) -> None:
-    """Raise a ValueError unless there are enough points (N, 2), finite and one apart from the next."""
+    """Raise a ValueError unless there are enough points (N, 2), all finite and consecutive ones distinct."""
     line_m = np.asarray(line_m, float)
     article = "an" if noun[0] in "aeiou" else "a"
     if line_m.ndim != 2 or line_m.shape[1] != 2:

@@ -48,7 +48,7 @@ Item = Dict[str, Any]
 
 
 class BuildingError(ValueError):
-    """A building file that cannot be used; one line: the file, which part, what was given, what is allowed."""
+    """A building file is unusable; one line: the file, which part, what was given, what is allowed."""
 
 
 def load(path: "Union[str, os.PathLike[str]]") -> Building:
@@ -178,7 +178,7 @@ def _tags(document: Item, placed: np.ndarray) -> LandmarkMap:
 
 
 def _made(noun: str, number: int, item: Item, make: Callable[[str, Item], T]) -> T:
-    """make(), its errors with the number of the item."""
+    """Call make() and add the item's number to its errors."""
     try:
         return make(noun, item)
     except ValueError as err:
@@ -186,7 +186,7 @@ def _made(noun: str, number: int, item: Item, make: Callable[[str, Item], T]) ->
 
 
 def _without_noun(err: ValueError) -> str:
-    """The text of an error of a part of a building, which begins with the word for it."""
+    """The text of a part's error without the name of the part that it begins with."""
     return str(err).partition(" ")[2]
 
 
@@ -219,7 +219,7 @@ def _number(what: str, value: Any) -> float:
 
 
 def _numbers(noun: str, item: Item, *keys: str) -> Dict[str, Any]:
-    """Arguments of the part for those of the keys that are given."""
+    """The part's arguments for the keys that are given."""
     given: Dict[str, Any] = {}
     for key in keys:
         if key not in item:
@@ -285,7 +285,7 @@ def _outline(noun: str, item: Item) -> np.ndarray:
 
 
 def _mullions(noun: str, item: Item, placed: np.ndarray) -> List[Thing]:
-    """Square posts: along a line from its one end to the other, or at points."""
+    """Square posts: along a line from end to end, or at points."""
     numbers = {key: _number(f"{noun} {key}", item[key]) for key in ("every", "size", "yaw_deg") if key in item}
     size, every = numbers.get("size", MULLION_M), numbers.get("every", 1.0)
     for key, value in (("size", size), ("every", every)):

@@ -1,8 +1,8 @@
-"""Building -> GridMap: what a mapper with a lidar drew before anything changed.
+"""Building -> GridMap: the map that a lidar mapper drew before anything changed.
 
-The mapper drove all paths and looked into the rooms of the points `seen`. Everything that can be reached from there
-without crossing a surface is free, every surface that borders on it is occupied, glass like any wall. The rest is
-unknown: the inside of walls and furniture, the far side of walls, rooms that nobody saw, outside. H rows, W columns.
+The mapper drove all paths and looked into the rooms that contain the points `seen`. Cells that can be reached from
+there without crossing a surface are free; surfaces that border on them are occupied, glass like any wall. The rest is
+unknown: the inside of walls and furniture, the far side of walls, unseen rooms, outside. H rows, W columns.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ LANDMARKS_NAME = "landmarks.yaml"
 MARGIN_M = 1.0  # of unknown cells around the building
 RESOLUTION_M = 0.05
 STEPS_PER_CELL = 10
-MIN_SHARE = 0.35  # of a cell that a surface runs through: where it cuts a corner, more beams pass than end
+MIN_SHARE = 0.35  # of a cell's width that a surface must cross: where it only cuts a corner, more beams pass than end
 
 
 def draw(building: Building, resolution_m: float = RESOLUTION_M) -> GridMap:
-    """The map of a building: mapped things only, those that are gone included.
+    """The map of a building: mapped things only, removed ones included.
 
     Args:
-        building: open to the outside, the outside within MARGIN_M counts as seen.
-        resolution_m: edge of a cell, > 0.
+        building: if it is open to the outside, the outside within MARGIN_M counts as seen.
+        resolution_m: edge length of a cell, > 0.
     """
     if not (np.isfinite(resolution_m) and resolution_m > 0.0):
         raise ValueError(f"a map needs resolution > 0 m, got {resolution_m}")
@@ -51,7 +51,7 @@ def draw(building: Building, resolution_m: float = RESOLUTION_M) -> GridMap:
     row, column = grid.cells(_points(from_m, to_m, resolution_m / STEPS_PER_CELL))
     points = np.bincount(row * columns + column, minlength=rows * columns).reshape(rows, columns)
     surface = points >= MIN_SHARE * STEPS_PER_CELL
-    regions, _ = ndimage.label(~surface)  # of cells that share an edge
+    regions, _ = ndimage.label(~surface)  # connected by edges
     reached = np.unique(regions[grid.cells(seeds)])
     free = np.isin(regions, reached[reached > 0])
     grid.occupancy[free] = 0
@@ -60,7 +60,7 @@ def draw(building: Building, resolution_m: float = RESOLUTION_M) -> GridMap:
 
 
 def redraw(folder: "Union[str, os.PathLike[str]]") -> None:
-    """Write map.yaml, map.png and, of a building with tags, landmarks.yaml beside the building.yaml of a folder."""
+    """Write map.yaml, map.png and, if the building has tags, landmarks.yaml beside a folder's building.yaml."""
     building = building_file.load(folder)
     map_file.save(draw(building), Path(folder) / "map.yaml", ".png")
     if len(building.tags):
@@ -68,7 +68,7 @@ def redraw(folder: "Union[str, os.PathLike[str]]") -> None:
 
 
 def is_drawn(building: Building, points_m: np.ndarray) -> np.ndarray:
-    """(...) bool: at the point (..., 2) or in a cell next to it the map of the building has a surface."""
+    """(...) bool: the building's map has a surface at the point (..., 2) or in a neighbouring cell."""
     grid, near = _near_surfaces(building)
     rows, columns = grid.cells(points_m)
     inside = grid.contains(rows, columns)
@@ -83,7 +83,7 @@ def _near_surfaces(building: Building) -> Tuple[GridMap, np.ndarray]:
 
 
 def _mapped_lines(building: Building) -> Tuple[np.ndarray, np.ndarray]:
-    """Ends (L, 2), (L, 2) of what is drawn; a glazing is one line."""
+    """Ends (L, 2), (L, 2) of the lines to draw; a glazing is one line."""
     surfaces = building.surfaces
     opaque = surfaces.mapped & (surfaces.kind == OPAQUE)
     lines: List[np.ndarray] = [pane.line_m for pane in building.panes if not pane.film]

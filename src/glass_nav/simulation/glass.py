@@ -1,4 +1,4 @@
-"""Glass and near infrared light: what a pane reflects, lets through and sends back.
+"""Glass and near infrared light: what a pane reflects, transmits and returns.
 
 Fresnel's equations for a sheet with two surfaces, light unpolarised and not coherent (Hecht, Optics, 5th ed., sec. 4.6;
 Born, Wolf, Principles of Optics, sec. 1.6.4 for the sheet). Incidence is the angle to the normal; any shape.
@@ -12,7 +12,7 @@ import numpy as np
 
 INDEX = 1.51  # refractive index of float glass
 ABSORPTION_PER_M = 4.0  # clear float glass near 0.9 um: 3 percent in 8 mm
-LARGEST_REFLECTANCE = 0.85  # of a coated pane, however flat the beam
+LARGEST_REFLECTANCE = 0.85  # of a coated pane at any incidence
 
 
 def reflectance(cos_incidence: np.ndarray, coating: np.ndarray, sheets: np.ndarray) -> np.ndarray:
@@ -22,7 +22,7 @@ def reflectance(cos_incidence: np.ndarray, coating: np.ndarray, sheets: np.ndarr
 
 
 def sheet(cos_incidence: np.ndarray, coating: np.ndarray, thickness_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """R and T = 1 - R - A of one sheet; A is of the way through it."""
+    """R and T = 1 - R - A of one sheet; A is absorbed along the path through it."""
     reflected = reflectance(cos_incidence, coating, np.ones(()))
     sin_inside = np.sqrt(np.maximum(1.0 - cos_incidence**2, 0.0)) / INDEX
     absorbed = 1.0 - np.exp(-ABSORPTION_PER_M * thickness_m / np.sqrt(1.0 - sin_inside**2))
@@ -30,7 +30,7 @@ def sheet(cos_incidence: np.ndarray, coating: np.ndarray, thickness_m: np.ndarra
 
 
 def visibility(incidence_rad: np.ndarray, half_rad: float, width_rad: float) -> np.ndarray:
-    """Share of the beams that a clean pane sends back: 1 near the normal, half at half_rad, logistic."""
+    """Share of beams that a clean pane returns: logistic, 1 near the normal, half at half_rad."""
     return 1.0 / (1.0 + np.exp(np.clip((incidence_rad - half_rad) / width_rad, -50.0, 50.0)))
 
 

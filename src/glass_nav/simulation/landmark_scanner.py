@@ -1,16 +1,15 @@
-"""Robot, tags, walls -> bearings: a turning slit of light, and tags that answer by radio when it hits them.
+"""Robot, tags, walls -> bearings: a rotating slit of light, and tags that answer by radio when it hits them.
 
 The device of the seed document landmark_bearings.txt, secs. 3 and 4. A motor turns a vertical slit of modulated light
-in steps. It searches from coarse to fine: a coarse move that some tag answers is taken back and made again in fine
-moves, and the tag's bearing is read as the middle of the fine move in which it answered. So a turn takes about a minute
-with four tags, and a robot that drives takes each bearing from somewhere else. The emitter turns to and fro over its
-span, never through the gap behind the robot.
+in steps. It searches from coarse to fine: if a tag answers a coarse move, the emitter returns and repeats it in fine
+moves; the bearing is the middle of the fine move in which the tag answered. A sweep takes about a minute with four
+tags, so a moving robot takes each bearing from a different place. The emitter turns back and forth over its span, never
+through the gap behind the robot.
 
-A tag answers if the light comes from within its view, if nothing opaque is in the way (walls, furniture, people), and
-if enough light arrives. A slit spreads in height only, so light falls with the distance, and a pane that lets the share
-T through leaves T times the range: tags are seen through glass, from not quite as far. The radio goes through
-everything.
-Not modelled: light mirrored by a pane onto a tag, answers of two tags that garble each other, the width of the beam
+A tag answers if the light comes from within its view, nothing opaque blocks it (walls, furniture, people), and enough
+light arrives. The slit spreads in height only, so the light falls with the distance. A pane that transmits the share T
+reduces the range by the factor T: tags are seen through glass, at a shorter range. The radio passes through everything.
+Not modelled: light that a pane mirrors onto a tag, collisions between the answers of two tags, the width of the beam
 (7 mm at 15 m).
 """
 
@@ -27,18 +26,18 @@ from glass_nav.simulation import glass, people
 from glass_nav.simulation.building import PANE, Building, Surfaces, crosses, joined
 
 OFF_WALL_M = 0.03  # the detector sticks out of the wall that its tag hangs on
-PASSING_RAD = 0.5  # a tag that was so near the beam before and after has been passed, if it changed sides
+PASSING_RAD = 0.5  # a tag this near the beam before and after was passed if it changed sides
 
 
 @dataclass(frozen=True)
 class ScannerModel:
     """The turning emitter. The defaults are the document's."""
 
-    reading_rad: float = float(np.radians(1.0))  # of a fine move: bearings are read in these steps
+    reading_rad: float = float(np.radians(1.0))  # size of a fine move: the resolution of bearings
     motor_step_rad: float = float(np.radians(0.18))  # where a move can end
-    coarse_rad: float = float(np.radians(10.0))  # of a coarse move
+    coarse_rad: float = float(np.radians(10.0))  # size of a coarse move
     span_rad: float = float(np.radians(300.0))
-    move_s: float = 0.8  # a move, coarse or fine: four tags take about 60 s
+    move_s: float = 0.8  # duration of a move, coarse or fine: four tags take about 60 s
 
     def __post_init__(self) -> None:
         if not 0.0 < self.motor_step_rad <= self.reading_rad <= self.coarse_rad <= self.span_rad <= 2.0 * np.pi:
@@ -55,7 +54,7 @@ class ScannerModel:
 
     @property
     def sigma_rad(self) -> float:
-        """Of a bearing: anywhere in its fine move, the ends of which are off by up to half a motor step."""
+        """Standard deviation of a bearing: uniform in its fine move, whose ends are off by up to half a motor step."""
         return float(np.hypot(self.reading_rad, self.motor_step_rad) / np.sqrt(12.0))
 
 
@@ -64,12 +63,12 @@ class Turn:
     """One sweep over the span."""
 
     stamp_ns: int  # of its end
-    bearings: Tuple[LandmarkBearing, ...]  # in the order in which they were taken
+    bearings: Tuple[LandmarkBearing, ...]  # in the order taken
 
 
 @dataclass(frozen=True)
 class _Move:
-    """From one angle to another [rad], as it is meant to be; the motor goes to the nearest of its steps."""
+    """From one angle to another [rad], as commanded; the motor goes to its nearest step."""
 
     start_rad: float
     end_rad: float
@@ -78,7 +77,7 @@ class _Move:
 
 
 class LandmarkScanner:
-    """The emitter on its robot: step() it as time goes on."""
+    """The emitter on its robot: step() it as time advances."""
 
     def __init__(self, model: ScannerModel, building: Building, start_ns: int = 0) -> None:
         """
@@ -96,11 +95,11 @@ class LandmarkScanner:
         self._move = self._next_move()
         self._answered = False
         self._found: Dict[str, LandmarkBearing] = {}
-        self._off_rad: Optional[np.ndarray] = None  # (N,) tags from the beam, at the last step
+        self._off_rad: Optional[np.ndarray] = None  # (N,) angle from the beam to each tag at the last step
         self._turns: List[Turn] = []
 
     def step(self, now_ns: int, map_from_sensor: np.ndarray) -> None:
-        """Time has come to now; the sensor is there (3,). Steps should be short against a move."""
+        """Advance to the time now, with the sensor at a pose (3,). Steps should be short compared with a move."""
         while now_ns >= self._began_ns + self._move_ns:
             end_ns = self._began_ns + self._move_ns
             self._look(end_ns, 1.0, map_from_sensor)
@@ -109,12 +108,12 @@ class LandmarkScanner:
         self._look(now_ns, (now_ns - self._began_ns) / self._move_ns, map_from_sensor)
 
     def take_turns(self) -> List[Turn]:
-        """Those that ended since the last call."""
+        """The sweeps that ended since the last call."""
         turns, self._turns = self._turns, []
         return turns
 
     def _look(self, now_ns: int, share: float, map_from_sensor: np.ndarray) -> None:
-        """Which tags did the beam pass since the last look?"""
+        """Which tags did the beam pass since the last step?"""
         start, end = self._on_motor(self._move.start_rad), self._on_motor(self._move.end_rad)
         tags = self._building.tags
         way = tags.positions_m - map_from_sensor[:2]
@@ -136,7 +135,7 @@ class LandmarkScanner:
 
     def _after_move(self, end_ns: int) -> None:
         move, model = self._move, self._model
-        if not move.fine and move.listens and self._answered:  # back, and the same way again in fine moves
+        if not move.fine and move.listens and self._answered:  # go back and repeat it in fine moves
             count = max(int(round(abs(move.end_rad - move.start_rad) / model.reading_rad)), 1)
             edges = np.linspace(move.start_rad, move.end_rad, count + 1).tolist()
             self._move_queue = [_Move(move.end_rad, move.start_rad, False, listens=False)]
@@ -173,7 +172,7 @@ class LandmarkScanner:
 
 
 def light_between(surfaces: Surfaces, from_m: np.ndarray, to_m: np.ndarray) -> float:
-    """Share of the light that comes from one point (2,) to another, by what is present."""
+    """Share of the light that reaches one point (2,) from another through all that is present."""
     met = crosses(from_m[None], to_m[None], surfaces.from_m, surfaces.to_m)[0] & surfaces.present
     if (met & (surfaces.kind != PANE)).any():
         return 0.0

@@ -1,11 +1,11 @@
 """Building, lidar, pose -> one scan and the truth about each of its beams.
 
-Every beam has several ways back: from each pane on its way, from what stands behind them, and by a mirror image in the
-first or the second glazing. Each way has an echo power (reference figures: Fresnel for panes, Lambert for what is
-diffuse, distances squared); what is above the detection floor competes, and the lidar reports the first, the strongest
-or the last. Not modelled: two mirrors on one way, beams wider than a line, the robot's own body.
+Every beam has several return paths: from each pane on its path, from the surface behind them, and by reflection in the
+first or the second glazing. Each path has an echo power (reference figures: Fresnel for panes, Lambert for diffuse
+surfaces, squared distances). Echoes above the detection floor compete, and the lidar reports the first, the strongest
+or the last. Not modelled: two reflections on one path, beam width, the robot's own body.
 
-B beams, K panes on a way; ranges in m, inf where there is nothing.
+B beams, K panes on a path; ranges in m, inf where there is nothing.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from glass_nav.vocabulary import BeamCase
 
 ECHOES = ("first", "strongest", "last")
 VISIBILITIES = ("logistic", "lobe")
-FLOOR_REFLECTANCE = 0.1  # what a lidar still sees at its largest range, face on
-USUAL_DIRT = 0.004  # of a pane; dirty_share is the model's for this
-LARGEST_PANES = 8  # of one way that are looked at, two for each double glazing
-RESOLVED_M = 0.05  # echoes closer than this are one, named after the stronger
-NEAR_M = 1e-6  # a mirrored way does not meet its mirror
-ENDS = 1e-9  # share by which a surface is longer than it is: no beam slips through a corner
+FLOOR_REFLECTANCE = 0.1  # least that the lidar detects at maximum range, face on
+USUAL_DIRT = 0.004  # of a pane; dirty_share is given for this dirt
+LARGEST_PANES = 8  # considered on one path, two for each double glazing
+RESOLVED_M = 0.05  # closer echoes merge into one, labelled as the stronger
+NEAR_M = 1e-6  # a mirrored path does not hit its own mirror
+ENDS = 1e-9  # relative extension of each surface: no beam slips through a corner
 
 
 @dataclass(frozen=True)
@@ -40,15 +40,15 @@ class LidarModel:
     range_min_m: float = 0.1
     range_max_m: float = 25.0
     noise_m: float = 0.015  # sigma of a range
-    dropout: float = 0.005  # share of the beams that come back and are lost
-    echo: str = "strongest"  # which one is reported: one of ECHOES
+    dropout: float = 0.005  # share of returning beams that are lost
+    echo: str = "strongest"  # which echo is reported: one of ECHOES
     visibility: str = "logistic"  # of panes: "logistic" share of beams by incidence, or "lobe" power by incidence
-    half_rad: float = np.deg2rad(15.5)  # logistic: half of the beams return from a clean pane
+    half_rad: float = np.deg2rad(15.5)  # logistic: incidence at which a clean pane returns half of the beams
     width_rad: float = np.deg2rad(2.2)  # logistic: 12 to 88 percent within two widths to either side
-    dirty_share: float = 0.16  # logistic: of a usual pane, the share of spots that return a beam at any incidence
+    dirty_share: float = 0.16  # logistic: share of spots on a usual pane that return a beam at any incidence
     specular: float = 1.0  # A: power of a pane face on at 1 m; a white wall has 1
     lobe_rad: float = np.deg2rad(5.0)  # lobe: theta_s
-    coating: float = 1.0  # factor on that of every pane of the building
+    coating: float = 1.0  # factor on the coating of every pane in the building
 
     def __post_init__(self) -> None:
         if isinstance(self.beams, bool) or not isinstance(self.beams, (int, np.integer)) or self.beams < 2:
@@ -75,7 +75,7 @@ class LidarModel:
 
     @property
     def angles_rad(self) -> np.ndarray:
-        """(B,) directions in the laser's frame, counter-clockwise, the middle ahead; all round, none twice."""
+        """(B,) directions in the laser's frame, counter-clockwise, the middle ahead; a full circle has no direction twice."""
         half = self.field_of_view_rad / 2.0
         all_round = self.field_of_view_rad > 2.0 * np.pi - 1e-9
         return np.linspace(-half, half, self.beams, endpoint=not all_round)
@@ -103,31 +103,31 @@ def preset(name: str) -> LidarModel:
 
 @dataclass(frozen=True)
 class TrueScan:
-    """What the lidar says, and what each beam did in terms of the map.
+    """What the lidar reports, and what each beam did in terms of the map.
 
-    Cases: 1 ended at the first mapped surface on its way; 3 and 4 passed one and two mapped panes and ended at the
+    Cases: 1 ended at the first mapped surface on its path; 3 and 4 passed one and two mapped panes and ended at the
     second and third mapped surface; 2 was mirrored at the first mapped surface, then ended at the first mapped one on
-    the mirrored way; 0 all else. What is nearer than LARGEST_GAP_M to a pane, along the beam, is one surface with it,
-    as in the map; so are the sheets of a double glazing.
+    the mirrored path; 0 everything else. A surface nearer than LARGEST_GAP_M to a pane, along the beam, counts as one
+    with it, as in the map; so do the sheets of a double glazing.
     """
 
     ranges_m: np.ndarray  # (B,) REP 117: inf no answer, -inf nearer than range_min
     case: np.ndarray  # (B,) uint8
-    exact_m: np.ndarray  # (B,) length of the way without noise, NaN: no answer
+    exact_m: np.ndarray  # (B,) path length without noise, NaN: no answer
     crossing_m: np.ndarray  # (B,) where it passed or was mirrored at the first mapped pane, NaN: neither
 
 
 @dataclass(frozen=True)
 class _Fans:
-    """Rays that seem to come from F centres: the laser, or its mirror images behind panes. R rays, B beams.
+    """Rays from F apparent centres: the laser, or its mirror images behind panes. R rays, B beams.
 
     The ray of beam b in fan f has the direction first_rad[f] + b * step_rad[f].
     """
 
     centre_m: np.ndarray  # (F, 2)
     first_rad: np.ndarray  # (F,) direction of beam 0 in map
-    step_rad: np.ndarray  # (F,) from one beam to the next, negative in a mirror
-    ray_of: np.ndarray  # (F, B) index of the ray, -1: the beam is none of this fan
+    step_rad: np.ndarray  # (F,) from one beam to the next, negative if mirrored
+    ray_of: np.ndarray  # (F, B) index of the ray, -1: the beam is not in this fan
     lowest: np.ndarray  # (F,) first and last beam of the fan
     highest: np.ndarray
     fan: np.ndarray  # (R,) of each ray
@@ -141,24 +141,24 @@ class _Fans:
 
 @dataclass(frozen=True)
 class _Ways:
-    """What R rays meet up to the first opaque surface. Panes by ascending range, inf where there is none."""
+    """What R rays hit up to the first opaque surface. Panes by ascending range, inf where there is none."""
 
     pane_m: np.ndarray  # (R, K)
     pane: np.ndarray  # (R, K) index of the surface
     cos: np.ndarray  # (R, K) of the incidence
-    met: np.ndarray  # (R, K) bool: there is this pane
+    met: np.ndarray  # (R, K) bool: this pane exists
     pane_mapped: np.ndarray  # (R, K) bool
-    passed: np.ndarray  # (R, K) int: mapped glazings on the way to this pane
+    passed: np.ndarray  # (R, K) int: mapped glazings before this pane
     end_m: np.ndarray  # (R,)
     end_power: np.ndarray  # (R,) of the opaque surface at 1 m, panes not counted: rho cos
     end_mapped: np.ndarray  # (R,) bool
-    end_passed: np.ndarray  # (R,) int: mapped glazings on the way to it
-    missing_m: np.ndarray  # (R,) where something mapped is no longer
+    end_passed: np.ndarray  # (R,) int: mapped glazings before it
+    missing_m: np.ndarray  # (R,) range of a mapped surface that is gone
 
 
 @dataclass(frozen=True)
 class _Echoes:
-    """One way back for each beam."""
+    """One return path for each beam."""
 
     power: np.ndarray  # (B,) 0: none
     range_m: np.ndarray  # (B,)
@@ -169,14 +169,14 @@ class _Echoes:
 def scan(
     model: LidarModel, building: Building, map_from_laser: np.ndarray, time_s: float, rng: np.random.Generator
 ) -> TrueScan:
-    """One turn of the lidar, all beams at one moment.
+    """One sweep of the lidar, all beams at one moment.
 
     Args:
         model: the lidar.
-        building: its people walk, everything else stands.
+        building: its people walk, everything else is static.
         map_from_laser: (3,) pose.
         time_s: since the start of the building's clock.
-        rng: noise, dropouts, which spots of a pane are seen.
+        rng: draws noise, dropouts and the visible spots of panes.
     """
     map_from_laser = np.asarray(map_from_laser, float)
     surfaces = joined(building.surfaces, people.surfaces(building.people, time_s, map_from_laser[:2]))
@@ -192,12 +192,12 @@ def scan(
 def _reported(model: LidarModel, echoes: List[_Echoes], first_m: np.ndarray, rng: np.random.Generator) -> TrueScan:
     power, range_m, case, crossing_m = (
         np.stack([getattr(echo, field.name) for echo in echoes], axis=1) for field in fields(_Echoes)
-    )  # (B, ways)
+    )  # (B, paths)
     heard = (power > FLOOR_REFLECTANCE / model.range_max_m**2) & (range_m <= model.range_max_m)
     rank = {"first": -range_m, "last": range_m, "strongest": power}[model.echo]
     best = np.argmax(np.where(heard, rank, -np.inf), axis=1)
     beams = np.arange(len(best))
-    with np.errstate(invalid="ignore"):  # echoes of one range, mostly by a wall that runs into the pane
+    with np.errstate(invalid="ignore"):  # echoes at equal range, mostly from a wall that runs into the pane
         same = heard & (np.abs(range_m - range_m[beams, best][:, None]) < RESOLVED_M)
     best = np.argmax(np.where(same, power, -np.inf), axis=1)
     exact_m = range_m[beams, best]
@@ -207,7 +207,7 @@ def _reported(model: LidarModel, echoes: List[_Echoes], first_m: np.ndarray, rng
         measured_m = exact_m + noise_m
     near = heard[beams, best] & ~lost & (measured_m < model.range_min_m)
     answered = heard[beams, best] & ~lost & ~near & (measured_m <= model.range_max_m)
-    passed_m = np.where(first_m <= model.range_max_m, first_m, np.nan)  # by what did not come back
+    passed_m = np.where(first_m <= model.range_max_m, first_m, np.nan)  # passed by beams that did not return
     return TrueScan(
         np.where(answered, measured_m, np.where(near, -np.inf, np.inf)),
         np.where(answered, case[beams, best], BeamCase.UNCERTAIN).astype(np.uint8),
@@ -224,7 +224,7 @@ def _direct_echoes(
     first_m: np.ndarray,
     rng: np.random.Generator,
 ) -> List[_Echoes]:
-    """From every pane on the way and from the end of it; passing (B, K + 1) is the light that comes so far."""
+    """From every pane on the path and from its end; passing (B, K + 1) is the light that gets that far."""
     behind = np.array([BeamCase.DIFFUSE, BeamCase.FIRST_PENETRATION, BeamCase.SECOND_PENETRATION, BeamCase.UNCERTAIN])
     pane_power = _pane_power(model, surfaces, direct, rng)
     echoes = []
@@ -265,7 +265,7 @@ def _fan(model: LidarModel, map_from_laser: np.ndarray) -> _Fans:
 
 
 def _mirrored(fan: _Fans, surfaces: Surfaces, beams: np.ndarray, mirror: np.ndarray, start_m: np.ndarray) -> _Fans:
-    """The beams (R,) of the laser's fan after their mirrors (R,), as from the laser's images behind these."""
+    """The beams (R,) of the laser's fan after their mirrors (R,), as rays from the laser's images behind these."""
     panes, image = np.unique(mirror, return_inverse=True)
     from_m = surfaces.from_m[panes]
     line = surfaces.to_m[panes] - from_m
@@ -301,13 +301,13 @@ def _mirrored_echoes(
     first_m: np.ndarray,
     rng: np.random.Generator,
 ) -> List[_Echoes]:
-    """By the mirror image in the first and in the second glazing."""
+    """By reflection in the first and in the second glazing."""
     glazing = np.where(direct.met, surfaces.glazing[direct.pane], -1)
     beams = len(glazing)
     echoes: List[_Echoes] = []
     for mirror in range(2 if glazing.shape[1] else 0):
         is_mirror = direct.met & (glazing != glazing[:, :1]) if mirror else direct.met
-        at = np.argmax(is_mirror, axis=1)  # (B,) which pane mirrors
+        at = np.argmax(is_mirror, axis=1)  # (B,) the pane that mirrors
         rows = np.flatnonzero(is_mirror.any(axis=1))
         if not len(rows):
             break
@@ -317,7 +317,7 @@ def _mirrored_echoes(
         _, on_way = _pane_light(model, surfaces, ways)
         pane_power = _pane_power(model, surfaces, ways, rng)
         light = passing[rows, at] * reflected[rows, at]
-        before = direct.passed[rows, at]  # mapped glazings on the way to the mirror
+        before = direct.passed[rows, at]  # mapped glazings before the mirror
         known = direct.pane_mapped[rows, at] & (before == 0) & (direct.missing_m[rows] >= to_mirror_m)
         crossed_m = np.where((before > 0) | direct.pane_mapped[rows, at], first_m[rows], np.nan)
         later_m = np.where(ways.pane_mapped, ways.pane_m, np.inf).min(axis=1, initial=np.inf)
@@ -327,7 +327,7 @@ def _mirrored_echoes(
             mapped = ways.end_mapped if at_end else ways.pane_mapped[:, k]
             passed = ways.end_passed if at_end else ways.passed[:, k]
             power = (ways.end_power if at_end else pane_power[:, k]) * (light * on_way[:, k]) ** 2 / range_m**2
-            one = range_m - to_mirror_m < LARGEST_GAP_M  # it ended at what it was mirrored at, for the map
+            one = range_m - to_mirror_m < LARGEST_GAP_M  # in the map, it ended at the surface that mirrored it
             case = np.where(
                 known & mapped & (passed == 0) & (ways.missing_m >= range_m),
                 np.where(one, BeamCase.DIFFUSE, BeamCase.SPECULAR),
@@ -371,7 +371,7 @@ def _ways(building: Building, surfaces: Surfaces, fans: _Fans) -> _Ways:
     ray, surface, range_m, cos = ray[keep], surface[keep], range_m[keep], cos[keep]
     order = np.lexsort((range_m, ray))
     ray, surface, range_m, cos = ray[order], surface[order], range_m[order], cos[order]
-    place = np.arange(len(ray)) - np.searchsorted(ray, ray)  # of the pane on its way
+    place = np.arange(len(ray)) - np.searchsorted(ray, ray)  # of the pane on its path
     few = place < LARGEST_PANES
     most = int(place[few].max(initial=-1)) + 1
     at = ray[few], place[few]
@@ -380,14 +380,14 @@ def _ways(building: Building, surfaces: Surfaces, fans: _Fans) -> _Ways:
     pane_m[at], pane_cos[at], pane[at] = range_m[few], cos[few], surface[few]
     mapped[at] = surfaces.mapped[surface[few]] & building_map.is_drawn(building, fans.points(ray[few], range_m[few]))
     glazing = surfaces.glazing[pane]
-    opens = np.ones(mapped.shape, bool)  # the first sheet of its glazing on this way
+    opens = np.ones(mapped.shape, bool)  # the first sheet of its glazing on this path
     with np.errstate(invalid="ignore"):
         opens[:, 1:] = (glazing[:, 1:] != glazing[:, :-1]) & (np.diff(pane_m, axis=1) >= LARGEST_GAP_M)
     count = np.cumsum(mapped & opens, axis=1)
     end_passed = np.zeros(rays, int)
     if most:
         last_m = np.where(np.isfinite(pane_m), pane_m, -np.inf).max(axis=1)
-        behind = end_m - last_m >= LARGEST_GAP_M  # else what ends the way is one surface with the last pane
+        behind = end_m - last_m >= LARGEST_GAP_M  # else the end counts as one surface with the last pane
         end_passed = np.where(behind, count[:, -1], np.maximum(count[:, -1] - 1, 0))
     return _Ways(
         pane_m,
@@ -407,7 +407,7 @@ def _ways(building: Building, surfaces: Surfaces, fans: _Fans) -> _Ways:
 def _nearest(
     rays: int, ray: np.ndarray, surface: np.ndarray, range_m: np.ndarray, cos: np.ndarray
 ) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of crossings (C,) the nearest of each ray: range, inf without one, index of the surface, cos; all (rays,)."""
+    """The nearest of the crossings (C,) of each ray: range, inf if none, index of the surface, cos; all (rays,)."""
     order = np.lexsort((range_m, ray))
     first = order[np.flatnonzero(np.diff(ray[order], prepend=-1))]
     nearest_m, index, at_cos = np.full(rays, np.inf), np.zeros(rays, int), np.zeros(rays)
@@ -420,7 +420,7 @@ def _crossings(
 ) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Where rays cross the chosen surfaces: ray and surface by index, range [m], cos of the incidence; all (C,).
 
-    Seen from the centre of a fan a surface covers an interval of its beams: only those are worked out.
+    Seen from the centre of a fan, a surface covers an interval of beams: only those are computed.
     """
     from_m, to_m = surfaces.from_m[chosen], surfaces.to_m[chosen]
     sign = np.sign(fans.step_rad)[:, None]
@@ -431,7 +431,9 @@ def _crossings(
     )  # (F, S)
     span = angles.wrap(to_at - from_at)
     start = np.mod(np.where(span < 0.0, to_at, from_at), 2.0 * np.pi)
-    start = np.concatenate([start, start - 2.0 * np.pi], axis=1)  # what begins behind the last beam may reach the first
+    start = np.concatenate(
+        [start, start - 2.0 * np.pi], axis=1
+    )  # a surface that begins past the last beam may reach the first
     step = np.abs(fans.step_rad)[:, None]
     low = np.maximum(np.ceil(start / step).astype(int) - 1, fans.lowest[:, None])
     high = np.minimum(np.floor((start + np.tile(np.abs(span), 2)) / step).astype(int) + 1, fans.highest[:, None])
@@ -456,8 +458,8 @@ def _crossings(
 
 
 def _pane_light(model: LidarModel, surfaces: Surfaces, ways: _Ways) -> Tuple[np.ndarray, np.ndarray]:
-    """Share of the light that each pane (B, K) mirrors, of a glazing all its sheets; and the share that comes as far as
-    pane k, or for k = K through them all (B, K + 1).
+    """Share of the light that each pane (B, K) mirrors, with all sheets of its glazing; and the share that reaches pane k
+    or, for k = K, passes them all (B, K + 1).
     """
     coating = surfaces.coating[ways.pane] * model.coating
     is_mirror = surfaces.kind[ways.pane] == MIRROR
@@ -471,7 +473,7 @@ def _pane_light(model: LidarModel, surfaces: Surfaces, ways: _Ways) -> Tuple[np.
 
 
 def _pane_power(model: LidarModel, surfaces: Surfaces, ways: _Ways, rng: np.random.Generator) -> np.ndarray:
-    """Power (B, K) of what each pane itself sends back to the lidar, at 1 m."""
+    """Power (B, K) that each pane itself returns to the lidar, at 1 m."""
     incidence_rad = np.arccos(ways.cos)
     dirt = surfaces.dirt[ways.pane]
     if model.visibility == "lobe":

@@ -1,9 +1,9 @@
-"""GridMap -> Building: a floor of which there is only a map, with opaque walls where the map says that they are.
+"""GridMap -> Building: a floor known only from its map, with opaque walls where the map shows them.
 
-The floor is the largest part of the map's free space that a robot can be in. All that bounds it stands: occupied cells,
-and unknown ones, behind which a real floor might go on. Only specks of unknown cells with no occupied one in them are
-nothing, as for the atlas. Outlines go through the middles of the cells' faces and are straightened by less than a cell,
-so that walls at an angle have no steps.
+The floor is the largest part of the map's free space that a robot fits into. Everything that bounds it is a wall:
+occupied cells, and unknown ones, although a real floor might go on there. Only specks of unknown cells without an
+occupied one are ignored, as in the atlas. Outlines run through the middles of the cells' faces and are straightened by
+less than a cell, so that oblique walls have no steps.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from glass_nav.simulation.start_place import PASSAGE_M
 from glass_nav.world.grid_map import GridMap
 from glass_nav.world.wall_segments import outlines
 
-STRAIGHTENED_CELLS = 0.75  # the middles of the faces of any straight wall are nearer than this to a line
-SPECK_M = 0.25  # smaller things that are unknown through and through
+STRAIGHTENED_CELLS = 0.75  # the face middles of a straight wall lie nearer than this to a line
+SPECK_M = 0.25  # smaller things that are entirely unknown are ignored
 
 
 def build(grid_map: GridMap, name: str) -> Building:
@@ -31,7 +31,7 @@ def build(grid_map: GridMap, name: str) -> Building:
         name: of the building.
 
     Raises:
-        ValueError: nowhere in the map is room for a robot.
+        ValueError: the map has no room for a robot.
     """
     floor = grid_map.free | _specks(grid_map)
     room_m = ndimage.distance_transform_edt(np.pad(floor, 1))[1:-1, 1:-1] * grid_map.resolution_m
@@ -50,7 +50,7 @@ def build(grid_map: GridMap, name: str) -> Building:
 
 
 def _specks(grid_map: GridMap) -> np.ndarray:
-    """(H, W) bool: unknown cells in pieces that are small and hold nothing."""
+    """(H, W) bool: unknown cells in small pieces without an occupied cell."""
     pieces, count = ndimage.label(~grid_map.free, np.ones((3, 3), bool))
     nothing = np.ones(count + 1, bool)
     nothing[0] = False
@@ -61,7 +61,7 @@ def _specks(grid_map: GridMap) -> np.ndarray:
 
 
 def _straightened(outline: np.ndarray) -> np.ndarray:
-    """(k, 2) the corners of a closed line (n, 2) that matter, at least three."""
+    """(k, 2) the significant corners of a closed line (n, 2), at least three."""
     middles = 0.5 * (outline + np.roll(outline, -1, axis=0))
     begin = int(np.argmax(np.hypot(*(middles - middles.mean(axis=0)).T)))
     closed = np.concatenate([middles[begin:], middles[: begin + 1]])

@@ -1,7 +1,7 @@
-"""true motion -> what the wheels say: wrong radii, a wrong wheel base, slip.
+"""true motion -> what the wheels report: wrong radii, a wrong wheel base, slip.
 
-The parts are those of Borenstein, Feng, Measurement and correction of systematic odometry errors in mobile robots
-(1996): systematic ones, drawn once a robot, and others, drawn along the way. Poses and twists as in robot.py.
+The errors are those of Borenstein, Feng, Measurement and correction of systematic odometry errors in mobile robots
+(1996): systematic ones, drawn once per robot, and others, drawn as it drives. Poses and twists as in robot.py.
 """
 
 from __future__ import annotations
@@ -14,24 +14,24 @@ import numpy as np
 
 from glass_nav.simulation.robot import moved
 
-SPIN_S = 0.2  # a wheel that lost its grip takes so long to find it
-DRAWS = 7  # random numbers of a step, used or not: what one step meets does not change the others
+SPIN_S = 0.2  # time until a slipping wheel regains its grip
+DRAWS = 7  # random numbers per step, used or not: the events of one step do not change the others
 
 
 @dataclass(frozen=True)
 class OdometryParams:
-    """How wrong the wheels are, as standard deviations. With the defaults a drive of some 30 m ends 1 to 3 % of its
-    length beside the truth, which is ordinary for a calibrated indoor robot.
+    """How wrong the wheels are, as standard deviations. With the defaults a drive of 30 m ends 1 to 3 % of its
+    length from the truth, which is typical of a calibrated indoor robot.
     """
 
     wheel_base_m: float = 0.4
     wheel_radius_sigma: float = 0.008  # share, both wheels together: a floor's length, worn tyres
     wheel_mismatch_sigma: float = 0.0003  # share, one wheel against the other: bends what is straight
-    wheel_base_sigma: float = 0.008  # share: turns are reported too wide or too narrow
-    slip_m_per_sqrt_m: float = 0.008  # along the way, also sideways of an omnidirectional base
+    wheel_base_sigma: float = 0.008  # share: turns are reported too large or too small
+    slip_m_per_sqrt_m: float = 0.008  # along the path, and sideways for an omnidirectional base
     slip_rad_per_sqrt_m: float = 0.005
     slip_rad_per_sqrt_rad: float = 0.015
-    slip_event_per_m: float = 0.01  # how often a wheel spins on its spot
+    slip_event_per_m: float = 0.01  # how often a wheel spins in place
     slip_event_max_m: float = 0.04  # how far at most
 
     def __post_init__(self) -> None:
@@ -47,18 +47,18 @@ EXACT = OdometryParams(0.4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Odometry:
-    """Sums up what the wheels of one robot say; the frame odom begins where it begins."""
+    """Integrates what the wheels of one robot report; the frame odom is its start."""
 
     def __init__(self, p: OdometryParams, kind: str, rng: np.random.Generator) -> None:
         """
         Args:
             kind: of the base, "diff" or "omni".
-            rng: this robot's wheels and all that happens to them.
+            rng: draws this robot's wheels and everything that happens to them.
         """
         self._p, self._kind, self._rng = p, kind, rng
         radius, mismatch, base = rng.normal(size=3) * [p.wheel_radius_sigma, p.wheel_mismatch_sigma, p.wheel_base_sigma]
         forward, turn = 1.0 + radius, (1.0 + radius) / (1.0 + base)
-        # (3, 3) twist reported by twist made. Diff: each wheel tells its own radius; omni: three wheels, whose mismatch
+        # (3, 3) twist reported for twist made. Diff: each wheel has its own radius; omni: three wheels, whose mismatch
         # skews forward motion to the left and back.
         half_m = 0.5 * p.wheel_base_m
         if kind == "diff":
@@ -71,10 +71,10 @@ class Odometry:
             )
         self.odom_from_base = np.zeros(3)
         self.velocity = np.zeros(3)  # as reported: forward, left [m/s], turn [rad/s]
-        self._spin, self._spin_left_s = np.zeros(3), 0.0  # velocity reported by a wheel that spins, and until when
+        self._spin, self._spin_left_s = np.zeros(3), 0.0  # velocity reported by a spinning wheel, and its time left
 
     def step(self, twist: np.ndarray, dt_s: float) -> None:
-        """The base made this twist (3,) in this time."""
+        """Add a twist (3,) that the base made in this time."""
         p = self._p
         draws = self._rng.random(DRAWS)
         normals = _normal(draws[:2], draws[2:4])  # 4 of them
@@ -96,7 +96,7 @@ class Odometry:
         self.velocity = reported / dt_s
 
     def _spinning(self, how_far: float, which: float) -> np.ndarray:
-        """(3,) what one wheel tells that turns on its spot; both draws are of [0, 1)."""
+        """(3,) reported by one wheel that spins in place; both draws are in [0, 1)."""
         extra_m = self._p.slip_event_max_m * how_far
         turn = math.copysign(extra_m / self._p.wheel_base_m, which - 0.5)
         if self._kind == "diff":
@@ -106,6 +106,6 @@ class Odometry:
 
 
 def _normal(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """2 N normal numbers of 2 N uniform ones (Box, Muller, 1958): a fixed number of draws, the same in every numpy."""
+    """2 N normal numbers from 2 N uniform ones (Box, Muller, 1958): a fixed number of draws, the same in every numpy."""
     radius = np.sqrt(-2.0 * np.log1p(-a))
     return np.concatenate([radius * np.cos(2.0 * np.pi * b), radius * np.sin(2.0 * np.pi * b)])

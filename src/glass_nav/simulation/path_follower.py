@@ -1,6 +1,6 @@
-"""waypoints -> velocity commands: pure pursuit, which steers for a point of the path a little distance ahead.
+"""waypoints -> velocity commands: pure pursuit, which steers for a point a short distance ahead on the path.
 
-The point ahead runs on beyond the end, so that the steering stays calm there; an omnidirectional base drives to it
+The point ahead continues beyond the end, so that steering stays calm there; an omnidirectional base drives to it
 directly.
 W waypoints; poses, velocities as in robot.py.
 """
@@ -20,9 +20,9 @@ from glass_nav.geometry.polyline import Polyline
 from glass_nav.simulation.building import Building
 from glass_nav.simulation.robot import RobotParams
 
-TURN_ON_THE_SPOT_RAD = 1.0  # a point farther off to the side is turned to first
+TURN_ON_THE_SPOT_RAD = 1.0  # the base first turns towards a point farther off to the side
 FIRST = "first"  # the name that stands for a building's first path
-CREEP_M_S = 0.02  # so that braking arrives
+CREEP_M_S = 0.02  # so that it arrives despite braking
 
 
 class PathError(ValueError):
@@ -46,14 +46,14 @@ class PathFollowerParams:
 
 
 class PathFollower:
-    """Commands a base along a path, from its start to its end, and then to stand."""
+    """Commands a base along a path from start to end, then stops it."""
 
     def __init__(
         self, waypoints_m: np.ndarray, robot: RobotParams, p: PathFollowerParams = PathFollowerParams()
     ) -> None:
         """
         Args:
-            waypoints_m: (W, 2) in the frame map; points that repeat the one before are left out.
+            waypoints_m: (W, 2) in the frame map; repeated points are dropped.
 
         Raises:
             PathError: fewer than two different points, or one that is not finite.
@@ -66,16 +66,16 @@ class PathFollower:
 
     @property
     def start(self) -> np.ndarray:
-        """(3,) pose on the first point, with a view to the second."""
+        """(3,) pose at the first point, facing the second."""
         x, y = self._line.direction(0.0)
         return np.array([*self._line.points[0], math.atan2(y, x)])
 
     def back(self) -> "PathFollower":
-        """For the way back along the same path."""
+        """A follower for the same path backwards."""
         return PathFollower(self._line.points[::-1], self._robot, self._p)
 
     def command(self, map_from_base: np.ndarray) -> np.ndarray:
-        """(3,) velocity that brings a base at that pose on along the path; zero at its end."""
+        """(3,) velocity that moves a base at that pose along the path; zero at its end."""
         self.progress_m = self._line.nearest(
             np.asarray(map_from_base[:2], float), self.progress_m, 2.0 * self._p.lookahead_m
         )
@@ -100,7 +100,7 @@ class PathFollower:
         return pure_pursuit.along_arc(curvature, self._robot, speed, self._p.lateral_acceleration_m_s2)
 
     def _sliding(self, bearing: float, speed: float) -> np.ndarray:
-        """Straight to the point, turning towards it meanwhile."""
+        """Straight to the point, turning towards it on the move."""
         x, y = self._line.direction(self.progress_m)
         ahead = self._line.direction(self.progress_m + self._p.lookahead_m)
         turn = float(pure_pursuit.on_the_spot(bearing, self._robot)[2])
@@ -112,7 +112,7 @@ def find(wanted: str, building: Building) -> np.ndarray:
     """Waypoints (W, 2) [m] of a path.
 
     Args:
-        wanted: the name of a path of the building, "first" for the one that it has first, or a file; see load().
+        wanted: the name of a path of the building, "first" for its first one, or a file; see load().
 
     Raises:
         PathError: none of these.
@@ -135,7 +135,7 @@ def load(path: Path) -> np.ndarray:
     """Waypoints (W, 2) [m] of a file: yaml, a list of [x, y]; or lines of x and y, with a comma or a blank between.
 
     Raises:
-        PathError: no such file, or something else in it.
+        PathError: no such file, or it does not hold waypoints.
     """
     try:
         text = path.read_text()

@@ -1,4 +1,4 @@
-"""Where walking people are at a time."""
+"""Where walking people are at a given time."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from glass_nav.simulation.building import Person, Surfaces, outline_rows, surfac
 
 CORNERS = 12  # a person is a polygon
 REFLECTANCE = 0.4  # of trousers
-STEP_ASIDE_M = 0.45  # from the middle of the robot to the edge of a person: nearer than this nobody comes
+STEP_ASIDE_M = 0.45  # least distance from the robot's centre to a person's edge
 
 
 def position(person: Person, time_s: float) -> np.ndarray:
-    """(2,) place [m] of somebody who starts at the first waypoint, walks to the last and back, for ever."""
+    """(2,) place [m] of a person who walks from the first waypoint to the last and back, forever."""
     lengths = np.hypot(*np.diff(person.waypoints_m, axis=0).T)
     total = float(lengths.sum())
     walked = (person.speed_m_s * time_s) % (2.0 * total)
@@ -24,7 +24,7 @@ def position(person: Person, time_s: float) -> np.ndarray:
 
 
 def surfaces(people: Sequence[Person], time_s: float, robot_m: np.ndarray) -> Surfaces:
-    """Outlines of all people at a time, on no map; who would bump into the robot at robot_m (2,) has stepped aside."""
+    """Outlines of all people at a time, unmapped; they step aside for a robot at robot_m (2,)."""
     turn = 2.0 * np.pi * np.arange(CORNERS) / CORNERS
     circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     rows: List[Tuple[float, ...]] = []

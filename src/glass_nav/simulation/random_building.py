@@ -1,9 +1,8 @@
-"""A seed -> a floor that nobody drew: rooms along corridors that run in loops, doors, furniture, some walls of glass.
+"""Seed -> a random floor: rooms along corridors that form loops, doors, furniture, some glass walls.
 
-Corridors of several widths cross each other and cut the floor into blocks; some of their pieces are walled off, so that
-rings and dead ends are left. A block is a row or two of rooms with a door each, an open hall with columns, or nobody
-has been in it. Then the whole floor is skewed and turned: no two of its rooms are alike, and few of its angles are
-right. The same seed gives the same floor.
+Corridors of several widths cross and cut the floor into blocks; some pieces are walled off, which leaves rings and dead
+ends. A block is one or two rows of rooms with a door each, an open hall with columns, or unseen by the mapper. Then the
+whole floor is skewed and turned: no two rooms are alike, and few angles are right. The same seed gives the same floor.
 """
 
 from __future__ import annotations
@@ -18,12 +17,12 @@ from glass_nav.geometry import se2
 from glass_nav.simulation.building import MATERIALS, Building, Door, Pane, Thing, Wall, box
 
 CORRIDOR_M = (1.4, 3.0)  # width
-BLOCK_M = (4.5, 11.0)  # edge of what lies between corridors
+BLOCK_M = (4.5, 11.0)  # edge of a block between corridors
 ROOM_M = (2.8, 6.5)  # width of a room along its corridor
 TWO_ROWS_M = 8.0  # deeper blocks have rooms on both sides
 DOOR_M = (0.85, 1.2)  # width
 THIN_M, THICK_M = 0.12, 0.25  # walls within and around the floor
-BEND = 0.06  # walls lean by up to so much
+BEND = 0.06  # largest skew and bend of the walls
 DOOR_ROOM_M = 1.1  # kept free behind a door
 _CLOSED = 0.15  # share of the doors
 _WALLED_OFF = 0.15  # share of the pieces of corridor
@@ -32,10 +31,10 @@ _HALL, _UNSEEN = 0.2, 0.1  # share of the blocks
 
 @dataclass(frozen=True)
 class FloorParams:
-    """What is built."""
+    """Size of the floor and its share of glass."""
 
-    blocks: Tuple[int, int] = (3, 3)  # across and along: with one corridor less between them
-    glass: float = 0.4  # share of the rooms whose wall to the corridor is of glass
+    blocks: Tuple[int, int] = (3, 3)  # across and along, with corridors between them
+    glass: float = 0.4  # share of the rooms with a glass wall to the corridor
 
     def __post_init__(self) -> None:
         if min(self.blocks) < 2:
@@ -49,7 +48,7 @@ def build(seed: int, p: FloorParams = FloorParams()) -> Building:
 
     Args:
         seed: >= 0.
-        p: its size and how much glass.
+        p: its size and share of glass.
     """
     return _Floor(np.random.default_rng([seed, 0xF1002]), p).built(f"random_{seed}")
 
@@ -58,7 +57,7 @@ Line = Callable[[Tuple[float, float], Tuple[float, float]], np.ndarray]
 
 
 class _Floor:
-    """Walls, doors and things on a plan with right angles, in metres; built() skews it."""
+    """Walls, doors and things on a rectangular plan, in metres; built() skews it."""
 
     def __init__(self, rng: np.random.Generator, p: FloorParams) -> None:
         self._rng, self._p = rng, p
@@ -87,8 +86,8 @@ class _Floor:
         self._walls += [(corners[side : side + 2], THICK_M) for side in range(4)]
 
     def _corridors(self) -> None:
-        """Wall off some pieces at one end: outer ones, and between crossings those of one axis only, of which one
-        corridor is left whole, so that all crossings stay joined.
+        """Wall off some pieces at one end: outer ones and, between crossings, those of one axis only. One corridor of
+        that axis stays whole, so that all crossings remain connected.
         """
         cut = bool(self._rng.integers(2))
         for across, along, turned in ((self._x, self._y, False), (self._y, self._x, True)):
@@ -197,7 +196,7 @@ class _Floor:
         return middle
 
     def _furnish(self, along: Sequence[float], deep: Sequence[float], door: Tuple[float, float], turned: bool) -> None:
-        """Boxes, most of them turned; none at the door."""
+        """Boxes, most of them turned; none near the door."""
         for _ in range(int(self._rng.integers(0, 4))):
             length, width = self._rng.uniform(0.4, 1.7), self._rng.uniform(0.4, 0.8)
             reach = 0.5 * math.hypot(length, width) + 0.1

@@ -14,12 +14,12 @@ from typing import Tuple
 import numpy as np
 
 KINDS = ("diff", "omni")
-BISECTIONS = 20  # of the way to a contact: below a micrometre
+BISECTIONS = 20  # of the path to a contact: to below a micrometre
 
 
 @dataclass(frozen=True)
 class RobotParams:
-    """What the base can do. The defaults are those of a slow indoor robot of 50 kg."""
+    """Limits of the base. The defaults suit a slow indoor robot of 50 kg."""
 
     kind: str = "diff"  # "diff": two driven wheels, never sideways; "omni": any direction
     radius_m: float = 0.22  # of the round outline that stops at obstacles
@@ -27,7 +27,7 @@ class RobotParams:
     max_turn_rad_s: float = 1.5
     max_acceleration_m_s2: float = 0.8
     max_turn_acceleration_rad_s2: float = 3.0
-    braking_factor: float = 1.0  # it slows down so many times as hard as it accelerates
+    braking_factor: float = 1.0  # deceleration over acceleration
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -45,7 +45,7 @@ class RobotParams:
 
 
 class Obstacles:
-    """What stands on the floor, as segments: how near is the nearest?"""
+    """Obstacles on the floor as segments: how near is the nearest?"""
 
     def __init__(self, segments_m: np.ndarray) -> None:
         """
@@ -55,7 +55,7 @@ class Obstacles:
         segments_m = np.asarray(segments_m, float).reshape(-1, 2, 2)
         self._start_m = segments_m[:, 0]
         self._along_m = segments_m[:, 1] - segments_m[:, 0]
-        self._length2 = np.maximum((self._along_m**2).sum(axis=1), 1e-12)  # a point is a short segment
+        self._length2 = np.maximum((self._along_m**2).sum(axis=1), 1e-12)  # a point counts as a short segment
 
     def clearance(self, point_m: np.ndarray) -> float:
         """Distance [m] from a point (2,) to the nearest segment, inf where there is none."""
@@ -82,7 +82,7 @@ def arc(twist: np.ndarray) -> np.ndarray:
 
 
 def moved(pose: np.ndarray, twist: np.ndarray) -> np.ndarray:
-    """(3,) pose after a twist: compose(pose, arc(twist)), for one pose and without numpy, five times as fast."""
+    """(3,) pose after a twist: compose(pose, arc(twist)), for one pose, without numpy: five times as fast."""
     x, y, yaw = pose.tolist()
     ahead, aside, turn = arc(twist).tolist()
     cos, sin = math.cos(yaw), math.sin(yaw)
@@ -96,7 +96,7 @@ def moved(pose: np.ndarray, twist: np.ndarray) -> np.ndarray:
 
 
 class Robot:
-    """A base that takes commands: its pose, its velocity, and whether an obstacle stops it."""
+    """A base that takes commands: its pose, its velocity, and whether an obstacle blocks it."""
 
     def __init__(self, params: RobotParams, map_from_base: np.ndarray, obstacles: Obstacles) -> None:
         self.params = params
@@ -104,18 +104,18 @@ class Robot:
         self.velocity = np.zeros(3)
         self.blocked = False  # the last step ended at an obstacle
         self._obstacles = obstacles
-        self._room_m = 0.0  # the nearest obstacle is at least so far away
+        self._room_m = 0.0  # lower bound of the distance to the nearest obstacle
 
     @property
     def standing(self) -> bool:
         return not self.velocity.any()
 
     def step(self, command: np.ndarray, dt_s: float) -> np.ndarray:
-        """Move for a time.
+        """Move for a given time.
 
         Args:
-            command: (3,) velocity that is wanted; beyond the base's limits it gets as near as it can.
-            dt_s: short: the velocity changes evenly within it, and the way bends with its mean.
+            command: (3,) wanted velocity; beyond the base's limits it gets as close as possible.
+            dt_s: short: within it the velocity changes linearly, and the path is the arc of its mean.
 
         Returns:
             (3,) twist that the base made, up to the obstacle if there is one in the way.
@@ -130,7 +130,7 @@ class Robot:
         self.blocked = False
         parts = max(1, math.ceil(math.hypot(mean[0], mean[1]) * dt_s / (0.5 * self.params.radius_m)))  # no jump over
         made = np.zeros(3)
-        for _ in range(parts):  # of the mean velocity, which is one arc: their twists add up
+        for _ in range(parts):  # each at the mean velocity, along one arc: their twists add up
             twist = mean * (dt_s / parts)
             share = self._free_share(twist)
             made = made + share * twist
@@ -141,7 +141,7 @@ class Robot:
         return made
 
     def _accelerated(self, command: np.ndarray, dt_s: float) -> "Tuple[np.ndarray, np.ndarray]":
-        """The velocity at the end of the time, and its mean over it: a ramp, then what is wanted."""
+        """The velocity at the end of the time, and its mean over it: a ramp, then the wanted velocity."""
         p = self.params
         wanted = command.copy()
         if p.kind == "diff":
@@ -158,7 +158,7 @@ class Robot:
             [math.hypot(change[0], change[1]) / (brakes[0] * p.max_acceleration_m_s2)] * 2
             + [abs(change[2]) / (brakes[1] * p.max_turn_acceleration_rad_s2)]
         )
-        share = np.minimum(dt_s / np.maximum(ramps_s, 1e-12), 1.0)  # of the change that is reached
+        share = np.minimum(dt_s / np.maximum(ramps_s, 1e-12), 1.0)  # of the wanted change that is reached
         end = np.where(share < 1.0, self.velocity + share * change, wanted)
         mean = end - 0.5 * share * change * np.minimum(ramps_s / dt_s, 1.0)
         return end, mean
@@ -172,7 +172,7 @@ class Robot:
         def clearance(share: float) -> float:
             return self._obstacles.clearance(moved(self.map_from_base, share * twist)[:2])
 
-        allowed = min(self.params.radius_m, clearance(0.0))  # it may always leave, and turn on the spot
+        allowed = min(self.params.radius_m, clearance(0.0))  # it may always move away, and turn in place
         self._room_m = clearance(1.0)
         if self._room_m >= allowed - 1e-9:
             return 1.0

@@ -1,7 +1,7 @@
-"""Building, lidar, robot, wheels -> what a robot records on its way, and the truth about it.
+"""Building, lidar, robot, wheels -> what a robot records as it drives, and the ground truth.
 
-One seed makes all of it: the furniture that moved, the lidar's noise, the robot's wheels. The same seed gives the same
-bytes, and the noise of one part does not depend on what another one draws. Times are simulated; nothing waits.
+One seed determines everything: the moved furniture, the lidar's noise, the robot's wheels. The same seed gives the same
+bytes, and the noise of one part does not depend on the draws of another. Times are simulated; nothing waits.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from glass_nav.simulation.odometry import Odometry, OdometryParams
 from glass_nav.simulation.path_follower import PathFollower, PathFollowerParams
 from glass_nav.simulation.robot import Obstacles, Robot, RobotParams
 
-START_NS = 1_600_000_000 * 10**9  # of every run: a stamp that looks like one and says nothing about when it was made
-CONTROL_S = 0.02  # the base gets a command, and the wheels are read, at least so often
-STUCK_S = 5.0  # a follower that makes no way for so long gives up; a turn on the spot takes 3 s
-LASER = (0.12, 0.0, 0.0)  # in front of the middle
+START_NS = 1_600_000_000 * 10**9  # of every run: a plausible stamp, independent of when it was made
+CONTROL_S = 0.02  # longest time between commands to the base and readings of its wheels
+STUCK_S = 5.0  # a follower without progress for this long gives up; a turn in place takes 3 s
+LASER = (0.12, 0.0, 0.0)  # in front of the robot's centre
 EMITTER = (0.0, 0.0, 0.0)  # of the landmark scanner
 
 
 class SimulationError(ValueError):
-    """A run that cannot go on; one line."""
+    """A run that cannot continue; one line."""
 
 
 @dataclass(frozen=True)
@@ -45,20 +45,20 @@ class OdometrySample:
 
 @dataclass(frozen=True)
 class Frame:
-    """One turn of the lidar, and where the robot truly was."""
+    """One sweep of the lidar, and the true pose of the robot."""
 
     stamp_ns: int  # of the first beam
-    map_from_base: np.ndarray  # (3,) truth, then
-    odom_from_base: np.ndarray  # (3,) then
+    map_from_base: np.ndarray  # (3,) truth at the stamp
+    odom_from_base: np.ndarray  # (3,) at the stamp
     scan: Scan
     truth: TrueScan
-    odometry: Tuple[OdometrySample, ...]  # all readings since the frame before, the last one at the last beam
+    odometry: Tuple[OdometrySample, ...]  # all readings since the previous frame, the last one at the last beam
     blocked: bool  # an obstacle stopped the robot since then
 
 
 @dataclass(frozen=True)
 class _Moment:
-    """Where the robot was, and what odometry said."""
+    """Where the robot was, and what odometry reported."""
 
     stamp_ns: int
     map_from_base: np.ndarray  # (3,)
@@ -87,11 +87,11 @@ class Simulation:
         Args:
             base_from_laser: (3,) where the laser sits.
             seed: >= 0.
-            changed_share: of the movable things that somebody moved since the map was drawn.
-            start: (3,) map_from_base; the building's own when not given, and drive() begins at its path's start.
-            turn_time_s: the lidar takes from its first beam to its last one; 0: all at one moment.
-            scanner: looks for the building's tags, if there is one.
-            base_from_emitter: (3,) where that sits.
+            changed_share: of the movable things that were moved since the map was drawn.
+            start: (3,) map_from_base; by default the building's own; drive() then begins at the start of its path.
+            turn_time_s: from the first beam of a sweep to the last; 0: all at one moment.
+            scanner: searches for the building's tags, if given.
+            base_from_emitter: (3,) where the scanner sits.
 
         Raises:
             ValueError: a value out of its range, or no room for the robot at the start.
@@ -124,7 +124,7 @@ class Simulation:
         self._robot = self._robot_at(building.start if start is None else np.asarray(start, float))
         self._start_given = start is not None
         self._readings: List[OdometrySample] = [self.reading]
-        self._track: List[_Moment] = [self._moment]  # of the last turn of the lidar
+        self._track: List[_Moment] = [self._moment]  # of the last sweep of the lidar
         self.base_from_emitter = np.array(base_from_emitter, float)
         self._scanner = None if scanner is None else LandmarkScanner(scanner, self.building)
 
@@ -139,16 +139,16 @@ class Simulation:
 
     @property
     def reading(self) -> OdometrySample:
-        """What the wheels say now."""
+        """What the wheels report now."""
         return OdometrySample(self.stamp_ns, self._wheels.odom_from_base, self._wheels.velocity)
 
     @property
     def blocked(self) -> bool:
-        """An obstacle stops the robot, now."""
+        """Whether an obstacle blocks the robot now."""
         return self._robot.blocked
 
     def step(self, dt_s: float, command: np.ndarray) -> Frame:
-        """Move for that time and look: move() and look()."""
+        """Move for a time and take a scan: move() and look()."""
         self.move(dt_s, command)
         return self.look()
 
@@ -177,7 +177,7 @@ class Simulation:
         ]
 
     def look(self) -> Frame:
-        """One turn of the lidar, which ends now. Before there was time for one it is of one moment."""
+        """One sweep of the lidar, which ends now. If no sweep fits into the time so far, all beams are taken at once."""
         model = self.lidar_model
         turn_ns = self._turn_ns if self._turn_ns <= self._time_ns else 0
         stamp_ns = self.stamp_ns - turn_ns
@@ -199,7 +199,7 @@ class Simulation:
                 self._lidar_rng,
             )
         angles_rad = model.angles_rad
-        ranges_m = truth.ranges_m.astype(np.float32)  # all that a LaserScan holds
+        ranges_m = truth.ranges_m.astype(np.float32)  # the precision of a LaserScan
         scan = scan_from_fields(
             stamp_ns,
             ranges_m,
@@ -218,8 +218,8 @@ class Simulation:
         return Frame(stamp_ns, map_from_base, odom_from_base, scan, truth, readings or (self.reading,), blocked)
 
     def follower(self, path: "Union[str, np.ndarray]", p: PathFollowerParams = PathFollowerParams()) -> PathFollower:
-        """For a path by name or file, see path_follower.find(), or waypoints (W, 2). Puts a robot that has not moved
-        yet at its start.
+        """For a path by name or file, see path_follower.find(), or waypoints (W, 2). A robot that has not moved yet
+        is put at its start.
 
         Raises:
             PathError: no such path, or none that can be driven.
@@ -233,11 +233,11 @@ class Simulation:
         return follower
 
     def drive(self, path: "Union[str, np.ndarray]", p: PathFollowerParams = PathFollowerParams()) -> Iterator[Frame]:
-        """Follow a path; a frame at once and then one at every turn of the lidar, until the robot stands at the end.
+        """Follow a path; yields a frame at once and one at every sweep, until the robot stands at the end.
 
         Raises:
             PathError: no such path.
-            SimulationError: something stands in the way.
+            SimulationError: something blocks the path.
         """
         follower = self.follower(path, p)
         yield self.look()
@@ -255,7 +255,7 @@ class Simulation:
                 )
 
     def follow(self, follower: PathFollower) -> Frame:
-        """Along the path until the next turn of the lidar."""
+        """Drive along the path until the next sweep."""
         for end_ns in self._control_times(round(self.scan_period_s * 1e9)):
             self._control(end_ns, follower.command(self.map_from_base))
         return self.look()

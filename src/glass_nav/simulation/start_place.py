@@ -1,4 +1,4 @@
-"""Where a robot wakes up: a random place of a building, or one that is given in words."""
+"""Where a robot wakes up: a random place in a building, or one given as text."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from glass_nav.simulation import building_map
 from glass_nav.simulation.building import Building, distances
 
 RANDOM = "random"
-ROOM_M = 0.45  # to the nearest surface: it can turn, and drive off in any direction
-PASSAGE_M = 0.3  # from its middle to a wall, where it gets through
+ROOM_M = 0.45  # to the nearest surface: it can turn and drive off in any direction
+PASSAGE_M = 0.3  # from its centre to a wall, where it passes through
 _STREAM = 0x57A27  # of the seed: no other part of a simulation draws from it
 _TRIES = 1000
 
@@ -23,7 +23,7 @@ def start(words: str, building: Building, seed: int) -> Optional[np.ndarray]:
 
     Args:
         words: "x y yaw" [m, m, rad], or "random".
-        building: as it is now, furniture moved.
+        building: as it is now, with moved furniture.
         seed: of the random place.
 
     Raises:
@@ -43,12 +43,12 @@ def start(words: str, building: Building, seed: int) -> Optional[np.ndarray]:
 
 
 def random_place(building: Building, rng: np.random.Generator, passage_m: float = PASSAGE_M) -> np.ndarray:
-    """(3,) map_from_base with room to every surface, where a robot can come from the building's own start.
+    """(3,) map_from_base with room to every surface, that a robot can reach from the building's own start.
 
     Args:
         building: as it is now.
         rng: draws the place.
-        passage_m: from the middle of the narrowest gap on the way there to its walls; 0: through every gap.
+        passage_m: half the width of the narrowest gap that it passes on its way; 0: every gap.
 
     Raises:
         ValueError: no room anywhere.
@@ -65,6 +65,6 @@ def random_place(building: Building, rng: np.random.Generator, passage_m: float 
         pick = int(rng.integers(len(rows)))
         point_m = grid.centres(rows[pick], columns[pick])
         yaw = float(rng.uniform(-math.pi, math.pi))
-        if distances(point_m[None], from_m, to_m).min() >= ROOM_M:  # what the map does not know, too
+        if distances(point_m[None], from_m, to_m).min() >= ROOM_M:  # unmapped surfaces count, too
             return np.array([*point_m, yaw])
     raise ValueError(f"{building.name}: no place with {ROOM_M:g} m of room around it")

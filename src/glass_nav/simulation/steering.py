@@ -1,4 +1,4 @@
-"""Who steers the simulated robot, and when its time goes on."""
+"""Who steers the simulated robot, and when its time advances."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 
 from glass_nav.simulation.path_follower import PathFollower
 
-COMMAND_TIMEOUT_NS = 500_000_000  # a robot whose driver fell silent stops
-START_WAIT_S = 30.0  # for the localization's first answer, before the path begins without
-BEHIND_S = 1.0  # of the wall clock: more is not made up for
+COMMAND_TIMEOUT_NS = 500_000_000  # a robot without commands for this long stops
+START_WAIT_S = 30.0  # for the localization's first answer; then the path begins without it
+BEHIND_S = 1.0  # behind the wall clock: longer delays are not caught up
 
 _log = logging.getLogger(__name__)
 
@@ -21,19 +21,19 @@ _log = logging.getLogger(__name__)
 class Audience:
     """Who follows the robot."""
 
-    answers: int  # transforms map -> odom that were heard
+    answers: int  # received transforms map -> odom
     listeners: int  # to its scans
     waited_s: float  # since the start, by the wall clock
 
 
 class Steering:
-    """A command goes before the path while it is fresh; a path begins once somebody follows it."""
+    """A fresh command takes precedence over the path; a path begins once somebody listens."""
 
     def __init__(self, follower: Optional[PathFollower], repeat: bool, wait_for_answer: bool) -> None:
         """
         Args:
             follower: of the path, None: commands only.
-            repeat: back to the start of the path and so on, for ever.
+            repeat: drive back and forth along the path forever.
             wait_for_answer: a listener must have answered with its pose.
         """
         self._follower, self._repeat, self._wait_for_answer = follower, repeat, wait_for_answer
@@ -60,7 +60,7 @@ class Steering:
         return self._follower.command(map_from_base)
 
     def _may_drive(self, follower: PathFollower, audience: Audience) -> bool:
-        """Before anybody listens, they would miss its start."""
+        """Wait for listeners, who would miss the start."""
         if self._driving:
             return True
         self._driving = audience.listeners > 0
@@ -81,11 +81,11 @@ class Pace:
         self._stamp_ns, self._due_s = stamp_ns, now_s
 
     def wait_s(self, stamp_ns: int, factor: float, now_s: float) -> float:
-        """How long to wait until that simulated time is due; negative: that much too late, and not made up for.
+        """How long to wait until that simulated time is due; negative: that much too late, and not caught up.
 
         Args:
             stamp_ns: simulated time.
-            factor: simulated seconds in a second; 0: as fast as possible.
+            factor: simulated seconds per second; 0: as fast as possible.
             now_s: the wall clock.
         """
         if factor == 0.0:

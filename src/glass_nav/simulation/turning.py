@@ -12,8 +12,8 @@ from glass_nav.simulation import lidar
 from glass_nav.simulation.building import Building
 from glass_nav.simulation.lidar import LidarModel, TrueScan
 
-SECTOR_S = 0.002  # the robot turns by 0.1 degrees in it at 1 rad/s
-MIN_BEAMS = 2  # of a sector
+SECTOR_S = 0.002  # at 1 rad/s the robot turns by 0.1 degrees meanwhile
+MIN_BEAMS = 2  # in a sector
 
 
 def scan(
@@ -24,15 +24,15 @@ def scan(
     start_ns: int,
     rng: np.random.Generator,
 ) -> TrueScan:
-    """One turn of the lidar, its first beam at the first pose and its last beam at the last one.
+    """One sweep of the lidar, its first beam at the first pose and its last beam at the last one.
 
     Args:
         model: the lidar.
-        building: its people walk on meanwhile.
-        map_from_laser: poses over the turn.
+        building: its people keep walking.
+        map_from_laser: poses during the sweep.
         turn_ns: from the first beam to the last one.
-        start_ns: of the building's clock, in the stamps of map_from_laser.
-        rng: as of lidar.scan().
+        start_ns: zero of the building's clock, in the stamps of map_from_laser.
+        rng: as in lidar.scan().
     """
     sectors = int(np.clip(round(turn_ns * 1e-9 / SECTOR_S), 1, model.beams // MIN_BEAMS))
     parts = []

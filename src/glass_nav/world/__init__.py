@@ -1,1 +1,1 @@
-"""The map: cells and metres, and the files maps come in."""
+"""The map: cells, metres, and map files."""

@@ -1,7 +1,7 @@
 """The free space of a map in a few kilobytes: enough to count the cells in which another map differs from it.
 
-Two drawings of one floor may differ in the few cells that a line just touches; a hash of the map only says that they
-are not the same.
+Two drawings of one floor may differ in the few cells that a line just touches; a hash only shows that the maps are not
+identical.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ class FreeSpace:
 
     @classmethod
     def of(cls, grid_map: GridMap) -> "FreeSpace":
-        """Of a map."""
+        """The free space of a map."""
         return cls(grid_map.place, np.packbits(grid_map.free).tobytes())
 
     @classmethod
     def from_text(cls, place: str, text: str) -> "FreeSpace":
-        """What `text` gave.
+        """Decode the text that `text` returned.
 
         Raises:
             ValueError: it cannot be decoded, or is of another size.
@@ -57,11 +57,11 @@ class FreeSpace:
 
     @property
     def free_cells(self) -> int:
-        """How many are free."""
+        """Number of free cells."""
         return int(np.unpackbits(np.frombuffer(self.packed, np.uint8)).sum())
 
     def cells_that_differ(self, grid_map: GridMap) -> Optional[int]:
-        """In how many cells one is free and the other is not; None: the cells lie elsewhere or have another size."""
+        """Number of cells that are free in only one of the two; None if their cells differ in place or size."""
         if grid_map.place != self.place:
             return None
         ours, theirs = (np.frombuffer(packed, np.uint8) for packed in (self.packed, FreeSpace.of(grid_map).packed))

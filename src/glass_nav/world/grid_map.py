@@ -1,7 +1,7 @@
 """The map of one floor: an occupancy grid with its place in the frame `map`.
 
 Rows and columns as in nav_msgs/OccupancyGrid: occupancy[row, column], row 0 at the grid's own y = 0.
-H rows, W columns. The grid may be turned in the map (a map_server origin with yaw).
+H rows, W columns. The grid may be rotated in the map (a map_server origin with yaw).
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ FREE_PERCENT = 25
 
 @dataclass(frozen=True)
 class GridMap:
-    """Cells of one floor. Glass is occupied like any wall."""
+    """Cells of one floor. Glass is occupied, like any wall."""
 
     occupancy: np.ndarray  # (H, W) int8: 0 free ... 100 occupied [percent], -1 unknown
-    resolution_m: float  # edge of a cell
+    resolution_m: float  # edge length of a cell
     map_from_grid: np.ndarray  # (3,) pose of the outer corner of cell [0, 0] in the frame map
 
     def __post_init__(self) -> None:
@@ -50,7 +50,7 @@ class GridMap:
 
     @cached_property
     def fingerprint(self) -> str:
-        """SHA-256 of cells and place, in hex: equal for the map in a file and for the same one out of a message."""
+        """SHA-256 of cells and place, in hex: equal for the same map from a file and from a message."""
         digest = hashlib.sha256(self.place.encode())
         digest.update(np.ascontiguousarray(self.occupancy).tobytes())
         return digest.hexdigest()

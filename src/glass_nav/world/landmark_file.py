@@ -1,11 +1,11 @@
 """landmarks.yaml <-> LandmarkMap. Lengths in m, angles in degrees, all in the frame map:
 
     sigma: 0.01               # how well the positions were surveyed; default 0.01
-    view_deg: 90              # of all tags below that do not say otherwise; default 90
+    view_deg: 90              # for all tags without their own; default 90
     range: 15                 # likewise; default 15
     landmarks:
       - {id: A1, position: [3.2, 4.5], facing_deg: -90}   # its detector looks down, along -y
-      - {id: 17, position: [9.0, 4.5]}                    # no direction: seen from all sides
+      - {id: 17, position: [9.0, 4.5]}                    # no direction: visible from all sides
 
 An id is a word or a whole number; in bearings it is a string, "17".
 """
@@ -24,12 +24,12 @@ from glass_nav.world.landmark_map import RANGE_M, VIEW_RAD, LandmarkMap
 
 KEYS = ("id", "position", "facing_deg", "view_deg", "range")
 DEFAULTS = ("view_deg", "range")
-MIN_DISTANCE_M = 0.01  # of two landmarks
+MIN_DISTANCE_M = 0.01  # between two landmarks
 SECTIONS = ("sigma", *DEFAULTS, "landmarks")
 
 
 class LandmarkError(ValueError):
-    """A landmark file that cannot be used; one line: the file, which landmark, what was given, what is allowed."""
+    """A landmark file is unusable; one line: the file, which landmark, what was given, what is allowed."""
 
 
 def load(path: "Union[str, os.PathLike[str]]") -> LandmarkMap:
@@ -46,7 +46,7 @@ def load(path: "Union[str, os.PathLike[str]]") -> LandmarkMap:
 
 
 def save(landmarks: LandmarkMap, path: "Union[str, os.PathLike[str]]", remark: str = "") -> None:
-    """Write a file that load() reads as an equal map; a remark becomes its first line."""
+    """Write a file that load() reads as an equal map; the remark is its first line."""
     lines = [f"# {remark}"] if remark else []
     lines += [
         "# Lengths in m, angles in degrees, in the frame map.",
@@ -72,7 +72,7 @@ def from_items(
     """Landmarks from parsed yaml, one mapping each.
 
     Raises:
-        ValueError: "landmark 3 ...", what is wrong in one line.
+        ValueError: "landmark 3 ...", one line about what is wrong.
     """
     ids: List[str] = []
     rows: List[List[float]] = []
@@ -137,7 +137,7 @@ def _check_keys(who: str, item: Mapping[Any, Any], known: Sequence[str]) -> None
 
 
 def _check_places(ids: Sequence[str], positions_m: np.ndarray) -> None:
-    """Two tags back to back are apart by their cases; nearer is a line copied and not changed."""
+    """Even tags back to back are apart by their cases; nearer ones are a line copied without a change."""
     for number, name in enumerate(ids):
         near = np.hypot(*(positions_m[number + 1 :] - positions_m[number]).T) < MIN_DISTANCE_M
         if near.any():
@@ -177,6 +177,6 @@ def _number_text(value: float) -> str:
 
 
 def _id_text(name: str) -> str:
-    """Quoted, where yaml would take the id for something else than a word or a plain number."""
+    """The id, quoted if yaml would not read it as a word or a plain number."""
     plain = name.isdigit() and str(int(name)) == name
     return name if plain else "'" + name.replace("'", "''") + "'"

@@ -1,7 +1,7 @@
-"""Landmarks of one floor with their places in the frame map: tags that tell their id when a beam hits them.
+"""Landmarks of one floor with their places in the frame map: tags that report their id when a beam hits them.
 
 N landmarks, M points. A tag's detector looks in one direction and sees beams from within an angle and a range (seed
-document landmark_bearings.txt, sec. 3: 90 degrees, 15 m); a landmark without a direction is seen from all sides.
+document landmark_bearings.txt, sec. 3: 90 degrees, 15 m); a landmark without a direction is visible from all sides.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ class UnknownLandmark(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class LandmarkMap:
-    """Where the landmarks are and from where they can be seen, walls not counted."""
+    """Where the landmarks are and from where they are visible, ignoring walls."""
 
     ids: Tuple[str, ...]
     positions_m: np.ndarray  # (N, 2) in map
-    facing_rad: np.ndarray  # (N,) direction in map that the detector looks in, NaN: to all sides
-    view_rad: np.ndarray  # (N,) whole angle that it sees beams from
+    facing_rad: np.ndarray  # (N,) viewing direction of the detector in map, NaN: all sides
+    view_rad: np.ndarray  # (N,) full angle within which it sees beams
     range_m: np.ndarray  # (N,)
-    sigma_m: float = 0.01  # standard deviation of x and of y of the positions
+    sigma_m: float = 0.01  # standard deviation of each coordinate of the positions
 
     def __post_init__(self) -> None:
         count = len(self.ids)
@@ -74,7 +74,7 @@ class LandmarkMap:
         return landmark_id in self._number
 
     def numbers(self, ids: Sequence[str]) -> np.ndarray:
-        """(M,) int: which landmarks these are.
+        """(M,) int: indices of these landmarks.
 
         Raises:
             UnknownLandmark: one of them is not on the map.
@@ -89,12 +89,12 @@ class LandmarkMap:
             raise UnknownLandmark(f"landmark {name!r} is not on the map, which has {shown or 'none'}{hint}") from None
 
     def in_view(self, points_m: np.ndarray, range_share: float = 1.0, slack_rad: float = 0.0) -> np.ndarray:
-        """Whether landmarks can be seen from points (..., 2), if nothing stands between.
+        """Whether landmarks are visible from points (..., 2) if nothing stands between.
 
         Args:
             points_m: in map.
-            range_share: of the landmarks' range that is allowed.
-            slack_rad: by which the view is wider to either side.
+            range_share: allowed share of the landmarks' range.
+            slack_rad: added to the view on either side.
 
         Returns:
             (..., N) bool.
@@ -106,14 +106,14 @@ class LandmarkMap:
     def reaches(
         self, way_m: np.ndarray, which: "Union[slice, np.ndarray]", range_share: float = 1.0, slack_rad: float = 0.0
     ) -> np.ndarray:
-        """(..., M) as in_view(), for ways (..., M, 2) from M of the landmarks, chosen by `which`, to a point each."""
+        """(..., M) as in_view(), for vectors (..., M, 2) from M of the landmarks, chosen by `which`, to a point each."""
         near = np.hypot(way_m[..., 0], way_m[..., 1]) <= self.range_m[which] * range_share
         off = np.abs(angles.wrap(np.arctan2(way_m[..., 1], way_m[..., 0]) - self.facing_rad[which]))
         all_round = np.isnan(off)
         return near & (all_round | (np.where(all_round, 0.0, off) <= 0.5 * self.view_rad[which] + slack_rad))
 
     def joined(self, other: "LandmarkMap") -> "LandmarkMap":
-        """Both; sigma is that of this map."""
+        """Both maps joined; sigma is that of this one."""
         return LandmarkMap(
             self.ids + other.ids,
             np.concatenate([self.positions_m, other.positions_m]),

@@ -1,8 +1,8 @@
 """Files -> GridMap and back: map_server's yaml with its image, MRPT's .gridmap and .gridmap.gz.
 
 The yaml means here what it means to map_server of ROS 1, including its habit of averaging an alpha
-channel in with the colours in mode trinary. What map_server takes without a word and cannot mean
-(thresholds out of order, a resolution of 0, an unknown mode) is refused.
+channel with the colours in mode trinary. Values that map_server silently accepts but that make no sense
+(thresholds out of order, a resolution of 0, an unknown mode) are refused.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_
 
 
 class MapError(ValueError):
-    """A map file that cannot be used; one line: the file, what was given, what is allowed."""
+    """A map file is unusable; one line: the file, what was given, what is allowed."""
 
 
 def load(path: "Union[str, os.PathLike[str]]") -> GridMap:
@@ -40,20 +40,20 @@ def load(path: "Union[str, os.PathLike[str]]") -> GridMap:
 
 
 def save(grid_map: GridMap, path_yaml: "Union[str, os.PathLike[str]]", image_suffix: str = ".pgm") -> None:
-    """Write a map_server yaml, and beside it the image of the same name; load() gives an equal map, but for 99 percent,
-    which mode scale does not have: it comes back as 98.
+    """Write a map_server yaml, and beside it the image of the same name. load() gives an equal map, but 99 percent, which
+    mode scale does not have, becomes 98.
 
-    The image has that suffix (.pgm, .png) and is in mode trinary; for a map with percentages between 0 and 100 it is a
-    .png in mode scale with the unknown cells transparent.
+    The image has the given suffix (.pgm, .png) and is in mode trinary; for a map with percentages between 0 and 100 it
+    is a .png in mode scale with the unknown cells transparent.
     """
     path_yaml = Path(path_yaml)
     path_image = path_yaml.with_suffix(image_suffix)
     occupancy = grid_map.occupancy.astype(int)
     graded = not np.isin(occupancy, (UNKNOWN, 0, 100)).all()
-    free, occupied = (0.002, 0.998) if graded else (0.196, 0.65)  # those of map_saver, or nearly all graded
+    free, occupied = (0.002, 0.998) if graded else (0.196, 0.65)  # map_saver's, or nearly everything graded
     if graded:
         path_image = path_yaml.with_suffix(".png")
-        step = (occupied - free) / 98.0  # mode scale has 98 of them for 1..98, and two greys or more in each
+        step = (occupied - free) / 98.0  # mode scale has 98 steps for 1..98, each of at least two greys
         probability = np.select(
             [occupancy <= 0, occupancy == 100], [0.0, 1.0], free + step * (np.minimum(occupancy, 98) - 0.5)
         )
@@ -80,7 +80,7 @@ def _load_yaml(path: Path) -> GridMap:
     if not (isinstance(origin, list) and len(origin) == 3 and all(_is_number(value) for value in origin)):
         raise MapError(f"{path}: origin must be [x, y, yaw] in m, m, rad, got {origin!r}")
     negate = fields["negate"]
-    if negate not in (0, 1):  # True == 1: yaml's true and false are taken as well
+    if negate not in (0, 1):  # True == 1: yaml's true and false are accepted as well
         raise MapError(f"{path}: negate must be 0 or 1, got {negate!r}")
     mode = fields.get("mode", "trinary")
     if mode not in MODES:
@@ -140,7 +140,7 @@ def _channels(path: Path, path_image: Path) -> np.ndarray:
         raise MapError(f"{path}: its image {path_image} does not exist")
     Image = _image_module()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # floors of 200 m are no attack
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large floors are legitimate
         try:
             image = Image.open(path_image)
         except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as err:
@@ -155,7 +155,7 @@ def _channels(path: Path, path_image: Path) -> np.ndarray:
     if image.mode.startswith("I"):  # 16 bit: the high byte, as SDL shows it to map_server
         grey = np.asarray(image).astype(np.int64) >> 8
         return np.clip(grey, 0, 255).astype(np.uint8)[..., None]
-    if image.mode == "P":  # map_server would take the index in the palette for the colour
+    if image.mode == "P":  # map_server would read the palette index as the colour
         image = image.convert("RGBA" if "transparency" in image.info else "RGB")
     elif image.mode == "LA":
         image = image.convert("RGBA")
@@ -171,10 +171,10 @@ def _occupancy(channels: np.ndarray, mode: str, negate: bool, occupied: float, f
     averaged = channels[..., :3] if has_alpha and mode != "trinary" else channels
     count = averaged.shape[-1]
     total = averaged[..., 0] if count == 1 else averaged.sum(axis=-1, dtype=np.uint16)  # (H, W)
-    grey = np.arange(255 * count + 1) / count  # of every total there can be: maps have millions of cells
+    grey = np.arange(255 * count + 1) / count  # for every possible total: maps have millions of cells
     if negate:
         grey = 255.0 - grey
-    if mode == "raw":  # 255 is how -1 looks in a byte; above 100 there is no percentage
+    if mode == "raw":  # -1 is 255 in a byte; above 100 there is no percentage
         return np.where(grey <= 100.0, np.floor(grey), UNKNOWN).astype(np.int8)[total]
     probability = (255.0 - grey) / 255.0
     between = np.full(grey.shape, float(UNKNOWN))
@@ -188,7 +188,7 @@ def _occupancy(channels: np.ndarray, mode: str, negate: bool, occupied: float, f
 
 
 def _load_mrpt(path: Path) -> GridMap:
-    from glass_nav import _mrpt_io  # compiled; yaml maps do without it
+    from glass_nav import _mrpt_io  # compiled; yaml maps do not need it
 
     if not path.is_file():
         raise MapError(f"{path}: does not exist")
@@ -206,6 +206,6 @@ def _reason(err: Exception) -> str:
 
 
 def name_of(path: Path) -> str:
-    """What people and atlases call a map: the file's stem, or its folder's name where all maps are called map.yaml."""
+    """Name of a map for people and atlases: the file's stem, or its folder's name if it is called map.yaml."""
     stem = path.name.partition(".")[0]
     return path.resolve().parent.name if stem == "map" else stem

@@ -1,8 +1,8 @@
-"""GridMap -> the line segments that its walls show to free space.
+"""GridMap -> line segments of its walls as seen from free space.
 
 The outline of free space is followed face by face, a face being a side between a free cell and another. Segments are
 fitted to the centres of the occupied cells behind the faces: beams that end at a wall draw it there. Glass is a wall.
-Mappers leave gaps in walls and unknown cells before them, so those close to an occupied one count as occupied.
+Mappers leave gaps in walls and unknown cells before them, so unknown cells close to an occupied one count as occupied.
 F faces, S segments.
 """
 
@@ -17,13 +17,13 @@ from scipy import ndimage
 from glass_nav.geometry import se2, segments
 from glass_nav.world.grid_map import GridMap
 
-TOLERANCE_CELLS = 1.5  # a wall that a mapper left rough is still one
-FINE_TOLERANCE_CELLS = 1.0  # to place a scan on: what stands out of a wall shall not tilt it
-CLOSE_CELLS = 2  # of an occupied cell, an unknown one is wall
+TOLERANCE_CELLS = 1.5  # a wall that was mapped rough is still one segment
+FINE_TOLERANCE_CELLS = 1.0  # for placing a scan: what stands out of a wall must not tilt it
+CLOSE_CELLS = 2  # an unknown cell this close to an occupied one is wall
 MIN_LENGTH_M = 0.3
-GAP_M = 0.3  # of unknown cells, within one wall
+GAP_M = 0.3  # of unknown cells within one wall
 
-_STEP = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])  # along a face: east, north, west, south; free to the left
+_STEP = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])  # along a face: east, north, west, south; free space to the left
 _BEHIND = np.array([[0, -1], [1, 0], [0, 1], [-1, 0]])  # from the free cell to the one behind the face
 _START = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])  # corner of the free cell where the face starts
 
@@ -38,7 +38,7 @@ class WallSegments:
 
 
 def walls_closed(grid_map: GridMap) -> GridMap:
-    """The map with the unknown cells in and before its walls occupied."""
+    """The map with unknown cells in and before its walls marked occupied."""
     near = ndimage.binary_dilation(grid_map.occupied, np.ones((3, 3), bool), iterations=CLOSE_CELLS)
     occupancy = np.where(near & (grid_map.occupancy < 0), np.int8(100), grid_map.occupancy)
     return GridMap(occupancy, grid_map.resolution_m, grid_map.map_from_grid)
@@ -93,7 +93,7 @@ def _faces(free: np.ndarray) -> "tuple[np.ndarray, np.ndarray]":
 
 
 def _loops(cell: np.ndarray, side: np.ndarray) -> List[np.ndarray]:
-    """Faces in their order along each closed outline; where two outlines touch, free space is cut at the corner."""
+    """Faces in order along each closed outline; where two outlines touch, free space is cut at the corner."""
     width = int(cell[:, 0].max()) + 2 if len(cell) else 1
     start = cell + _START[side]
     end = start + _STEP[side]
@@ -120,7 +120,7 @@ def _loops(cell: np.ndarray, side: np.ndarray) -> List[np.ndarray]:
 
 
 def _without_gaps(loop: np.ndarray, wall: np.ndarray, gap: int) -> List[np.ndarray]:
-    """The faces of walls of a closed outline, cut where as many faces in a row are none; else at a corner."""
+    """The wall faces of a closed outline, cut where as many consecutive faces are no wall; else at a corner."""
     at = np.flatnonzero(wall[loop])
     if not len(at):
         return []

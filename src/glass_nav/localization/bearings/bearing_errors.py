@@ -1,9 +1,9 @@
-"""How far off will a position from bearings be?  Step angle -> limits of the error, covariance, sigma over a map.
+"""How wrong will a position from bearings be?  Step angle -> limits of the error, covariance, sigma over a map.
 
-Seed document landmark_bearings.txt (Tsukiyama 2009), sec. 3: an emitter that turns in steps reads the angle between two
-landmarks wrong by up to one step; Tables 1 and 2 are the position errors of one triple at the limits and halfway to
-them. To first order every error of a bearing moves the position the more, the farther the landmarks are, the narrower
-they stand and the nearer the robot is to the circle through them. M points, N landmarks.
+Seed document landmark_bearings.txt (Tsukiyama 2009), sec. 3: an emitter that turns in steps measures the angle between two
+landmarks with an error of up to one step; Tables 1 and 2 list the position errors of one triple at these limits and
+halfway to them. To first order a bearing error moves the position more if the landmarks are farther away or closer
+together, or if the robot is nearer to the circle through them. M points, N landmarks.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ STEPS = (-1.0, -0.5, 0.0, 0.5, 1.0)  # of the document's tables
 
 
 def step_sigma(step_rad: float) -> float:
-    """Standard deviation [rad] of a bearing read in steps: anywhere within half a step to either side."""
+    """Standard deviation [rad] of a bearing read in steps: uniform within half a step to either side."""
     return step_rad / float(np.sqrt(12.0))
 
 
 def limits_of_error(landmarks_m: np.ndarray, point_m: np.ndarray, step_rad: float) -> np.ndarray:
-    """The document's table: position errors when the two angles between three landmarks are read wrong.
+    """The document's table: position errors if the two angles between three landmarks are wrong.
 
     Args:
         landmarks_m: (3, 2) in map.
@@ -43,9 +43,9 @@ def limits_of_error(landmarks_m: np.ndarray, point_m: np.ndarray, step_rad: floa
 
 
 def covariance(landmarks: LandmarkMap, map_from_base: np.ndarray, sigma_rad: float) -> np.ndarray:
-    """(3, 3) of x [m], y [m], yaw [rad] of a robot that stands at a pose (3,) and sees all of the landmarks.
+    """(3, 3) of x [m], y [m], yaw [rad] of a robot at a pose (3,) that sees all of the landmarks.
 
-    To first order: the inverse of the information of the bearings, which includes how unsure the landmarks are.
+    To first order: the inverse of the information of the bearings, which includes the landmarks' uncertainty.
 
     Raises:
         ValueError: the landmarks do not fix the pose.
@@ -67,7 +67,7 @@ def covariance(landmarks: LandmarkMap, map_from_base: np.ndarray, sigma_rad: flo
 def information_sums(
     points_m: np.ndarray, positions_m: np.ndarray, visible: np.ndarray, sigma_rad: float, place_sigma_m: float = 0.0
 ) -> np.ndarray:
-    """What sigma_from_sums() needs, as a sum over landmarks: maps with one more landmark are an addition.
+    """Terms of sigma_from_sums(), to be summed over landmarks: one more landmark is one addition.
 
     Args:
         points_m: (M, 2).
@@ -90,8 +90,8 @@ def information_sums(
 def sigma_from_sums(sums: np.ndarray) -> np.ndarray:
     """(...) largest standard deviation of the position [m] from information_sums() (..., 6), summed over the landmarks.
 
-    inf where the landmarks do not fix a position. The heading is worked out as well as it can be: its share of the
-    information is taken off (Schur complement).
+    inf where the landmarks do not fix a position. The unknown heading's share of the information is subtracted
+    (Schur complement).
     """
     total = np.where(sums[..., 0] > 0.0, sums[..., 0], 1.0)
     xx = sums[..., 3] - sums[..., 1] * sums[..., 1] / total
@@ -108,7 +108,7 @@ def expected_sigma(landmarks: LandmarkMap, points_m: np.ndarray, visible: np.nda
     Args:
         landmarks: N of them.
         points_m: (M, 2).
-        visible: (M, N) bool: the landmark is seen from the point.
+        visible: (M, N) bool: the landmark is visible from the point.
         sigma_rad: of a bearing.
     """
     sums = information_sums(points_m, landmarks.positions_m, visible, sigma_rad, landmarks.sigma_m).sum(axis=1)

@@ -34,8 +34,8 @@ def intersect(landmarks_m: np.ndarray, angles_rad: np.ndarray) -> Tuple[np.ndarr
         angles_rad: (T, 3) directions in the frame of the sensor.
 
     Returns:
-        map_from_sensor (T, 3), NaN where the two circles are one; and misfit_rad (T,), by how much the direction to
-        the worst of the three differs from the measured one: 0, or pi where no place sees them like that.
+        map_from_sensor (T, 3), NaN where the two circles are one; and misfit_rad (T,), the largest
+        difference between a direction from there and the measured one: 0, or pi where no place matches.
     """
     b = landmarks_m[:, 1]
     ax, ay = (landmarks_m[:, 0] - b).T
@@ -69,7 +69,7 @@ def off_circle(landmarks_m: np.ndarray, angles_rad: np.ndarray, sigma_rad: np.nd
         sigma_rad: (T, 3) standard deviation of each.
 
     Returns:
-        (T,) the least of the three pairs; below about 3 the position is anybody's guess.
+        (T,) the least of the three pairs; below about 3 the position is arbitrary.
     """
     one, other = np.roll(landmarks_m, -1, axis=1) - landmarks_m, np.roll(landmarks_m, -2, axis=1) - landmarks_m
     inscribed = np.arctan2(other[..., 1], other[..., 0]) - np.arctan2(one[..., 1], one[..., 0])  # (T, 3) at each

@@ -1,4 +1,4 @@
-"""Bearings as they come -> fixes, and when a fix becomes the initial pose of the localization."""
+"""Incoming bearings -> fixes, and when a fix becomes the initial pose of the localization."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class FixParams:
     """How fixes are made, and when one is sent to initialpose. Units by REP 103."""
 
     method: str = "least_squares"  # or "document": the average over all triples
-    window_s: float = 90.0  # bearings older than this, against the newest, are forgotten
-    max_age_s: float = 120.0  # of the fix that ~send_initialpose sends
+    window_s: float = 90.0  # bearings older than the newest by more than this are dropped
+    max_age_s: float = 120.0  # of a fix that ~send_initialpose sends
     rescue_states: str = "UNKNOWN LOST GLOBAL_SEARCH"  # of the localization: a fix goes to initialpose; "": never
     rescue_period_s: float = 10.0
-    min_position_sigma_m: float = 0.05  # of initialpose: particles in one point would not find the scan's best place
+    min_position_sigma_m: float = 0.05  # of initialpose: particles at one point would not find the scan's best pose
     min_heading_sigma_rad: float = 0.02
 
     def __post_init__(self) -> None:
@@ -44,7 +44,7 @@ class FixParams:
 
 @dataclass(frozen=True)
 class PlacedFix:
-    """A fix, with what it was made of and the odometry at its stamp."""
+    """A fix, with its bearings and the odometry at its stamp."""
 
     fix: Fix
     bearings: LandmarkBearings
@@ -54,7 +54,7 @@ class PlacedFix:
 class LandmarkFixes:
     """The newest bearing of each landmark, and the last fix.
 
-    A sensor takes up to a minute for a turn; the bearings of one fix are carried along by odometry.
+    A sweep of the sensor takes up to a minute; odometry carries the bearings of one fix along.
     """
 
     def __init__(self, landmarks: LandmarkMap, p: FixParams, limits: TriangulationLimits, drift: OdometryDrift) -> None:
@@ -68,20 +68,20 @@ class LandmarkFixes:
         self.restart("no bearings came yet")
 
     def restart(self, why_none: str) -> None:
-        """Forget everything: nothing has come yet, or time has jumped."""
+        """Forget everything: at the start, or after time has jumped."""
         self._newest: Dict[str, Tuple[LandmarkBearing, np.ndarray]] = {}  # with odom_from_base at its stamp
         self._last: Optional[PlacedFix] = None
         self._sent_ns = self._rescued_ns = 0  # stamps of fixes
         self.localization_state = ""  # not reported yet
-        self.why_none = why_none  # there is no newer fix
+        self.why_none = why_none  # why there is no newer fix
 
     def take(
         self, taken: Sequence[Tuple[LandmarkBearing, np.ndarray]], base_from_sensor: np.ndarray
     ) -> Optional[PlacedFix]:
-        """Add bearings, each with odom_from_base (3,) at its stamp; a fix, None without a known landmark.
+        """Add bearings, each with odom_from_base (3,) at its stamp; returns a fix, or None without a known landmark.
 
         Raises:
-            TriangulationError: there is no fix; why_none says why, too.
+            TriangulationError: there is no fix; why_none holds the reason, too.
         """
         self._newest.update({bearing.landmark_id: (bearing, odometry) for bearing, odometry in taken})
         if not self._newest:
@@ -109,7 +109,7 @@ class LandmarkFixes:
 
     @property
     def rescue_states(self) -> List[str]:
-        """States of the localization in which a fix goes to initialpose unasked."""
+        """States of the localization in which a fix goes to initialpose without a request."""
         return self._p.rescue_states.split()
 
     def due_for_rescue(self) -> Optional[PlacedFix]:
@@ -137,7 +137,7 @@ class LandmarkFixes:
     def initial_pose(self, last: PlacedFix, stamp_ns: int, odom_from_base: np.ndarray) -> Fix:
         """A fix carried along to the newest odometry; it counts as sent.
 
-        Whoever receives it need not remember the odometry of a whole turn. Its covariance is widened, see FixParams.
+        The receiver need not store the odometry of a whole sweep. Its covariance is widened, see FixParams.
         """
         self._sent_ns = last.fix.stamp_ns
         step = se2.compose(se2.inverse(last.odom_from_base), odom_from_base)

@@ -1,10 +1,10 @@
-"""Map, landmarks -> where a robot can find itself by their bearings, and where one more tag helps most.
+"""Map, landmarks -> where a robot can localize by their bearings, and where one more tag helps most.
 
-Points are places of the map where a robot may stand; a landmark is seen from one if its range and view allow it and no
-wall stands between. Each point costs its expected standard deviation, as far as CAP_M; a point without three landmarks
-costs CAP_M and as much again for each that is missing, so that the first tag of three is worth something too. The
-best place for another tag is where the mean cost falls most; the next one is searched with that tag in place.
-Taken for granted: a sensor that looks all round, and that a tag can hang on everything that is occupied on the map.
+Points are places of the map where a robot may stand; a landmark is visible from one if its range and view allow it and
+no wall stands between. The cost of a point is its expected standard deviation, at most CAP_M; a point without three
+landmarks costs CAP_M, plus CAP_M for each that is missing, so that the first tag of three has a value too. The best
+place for another tag lowers the mean cost most; the next one is searched with that tag in place.
+Assumptions: the sensor looks all round, and a tag can hang on everything that is occupied on the map.
 M points, N landmarks, K candidates.
 """
 
@@ -24,24 +24,24 @@ from glass_nav.world.landmark_map import RANGE_M, VIEW_RAD, LandmarkMap
 
 CAP_M = 1.0
 CLEARANCE_M = 0.25  # of a point from walls: a robot has a body
-NORMAL_CELLS = 4  # around a wall cell that decide which side of it is free
+NORMAL_CELLS = 4  # around a wall cell, to decide which side of it is free
 OFF_WALL_M = 0.05  # a tag sticks out of its wall
 TILTS_RAD = np.radians([0.0, 45.0, -45.0])  # a tag may be tilted against its wall, to look along a corridor
-WALL_SLACK_CELLS = 3.0  # a tag on a wall is hidden by that wall's own cells otherwise
+WALL_SLACK_CELLS = 3.0  # otherwise the cells of its own wall hide a tag
 
 
 @dataclass(frozen=True)
 class Suggestion:
-    """One more tag and what it is good for, the ones before it in place."""
+    """One more tag and its benefit, with the earlier ones in place."""
 
     position_m: np.ndarray  # (2,)
     facing_rad: float
     sigma_m: np.ndarray  # (M,) expected with it
-    seen: np.ndarray  # (M,) int landmarks in sight
+    seen: np.ndarray  # (M,) int visible landmarks
 
 
 def points(grid_map: GridMap, spacing_m: float) -> np.ndarray:
-    """(M, 2) places where a robot may stand, as far apart as spacing_m.
+    """(M, 2) places where a robot may stand, spacing_m apart.
 
     Raises:
         ValueError: there are none.
@@ -58,7 +58,7 @@ def points(grid_map: GridMap, spacing_m: float) -> np.ndarray:
 
 
 def visible(walls: RayCaster, landmarks: LandmarkMap, points_m: np.ndarray) -> np.ndarray:
-    """(M, N) bool: the landmark is seen from the point."""
+    """(M, N) bool: the landmark is visible from the point."""
     seen = landmarks.in_view(points_m)
     point, landmark = np.nonzero(seen)
     if not len(point):
@@ -83,7 +83,7 @@ def candidates(grid_map: GridMap, spacing_m: float) -> LandmarkMap:
     rise = ndimage.correlate(free, np.tile(offsets[:, None], (1, len(offsets))).astype(float), mode="constant")
     run = ndimage.correlate(free, np.tile(offsets, (len(offsets), 1)).astype(float), mode="constant")
     up, right = (part[rows + NORMAL_CELLS, columns + NORMAL_CELLS] for part in (rise, run))
-    sure = np.hypot(up, right) > 2.0 * len(offsets)  # else free to both sides: it is no use to guess
+    sure = np.hypot(up, right) > 2.0 * len(offsets)  # else free on both sides: the normal would be a guess
     rows, columns, up, right = rows[sure], columns[sure], up[sure], right[sure]
     normal = np.arctan2(up, right) + grid_map.map_from_grid[2]
     place = grid_map.centres(rows, columns) + OFF_WALL_M * np.stack([np.cos(normal), np.sin(normal)], axis=-1)
@@ -107,11 +107,11 @@ def suggest(
     sigma_rad: float,
     count: int,
 ) -> List[Suggestion]:
-    """The best places for more tags, one after the other; fewer than count if no more helps.
+    """The best places for more tags, one after the other; fewer than count if no more help.
 
     Args:
         walls: of the map.
-        landmarks: those there are.
+        landmarks: the existing ones.
         seen: (M, N) bool, from visible().
         points_m: (M, 2).
         places: K candidates.
@@ -142,7 +142,7 @@ def suggest(
             )[:, 0]
         )
         number = number + could[:, best]
-        could[:, best] = False  # it hangs there now
+        could[:, best] = False  # occupied now
         suggestions.append(
             Suggestion(places.positions_m[best], float(places.facing_rad[best]), _sigma(number, sums), number)
         )
@@ -159,7 +159,7 @@ def _gain(
     sigma_rad: float,
     place_sigma_m: float,
 ) -> float:
-    """By how much the mean cost falls with a tag there; only points that see it change."""
+    """Decrease of the mean cost by a tag there; only points that see it change."""
     at = np.flatnonzero(could)
     more = bearing_errors.information_sums(
         points_m[at], position_m[None], np.ones((len(at), 1), bool), sigma_rad, place_sigma_m

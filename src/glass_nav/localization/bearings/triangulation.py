@@ -3,11 +3,11 @@
 Seed document landmark_bearings.txt (Tsukiyama 2009): every three bearings give a pose (inscribed_circles.py), and with
 four landmarks the four poses should be averaged; average() does that. Ours beyond it: triangulate() starts from the
 triples, finds the least-squares pose of all bearings with its covariance, leaves out one bearing that contradicts
-the others, and refuses, with the reason, what would be a guess. N bearings, T triples.
+the others, and refuses, with the reason, to guess. N bearings, T triples.
 
-Of four bearings of which one is wrong, every three fit some place exactly: geometry alone shows that something is
-wrong, not what. Which one it is follows only if no other choice of three puts the robot where those landmarks can be
-seen from (their range, their direction); if several do, the fix is refused. From five on the bearings decide.
+If one of four bearings is wrong, every three fit some place exactly: geometry alone shows that one is wrong, not which.
+It can be identified only if no other choice of three puts the robot where those landmarks are visible (by range and
+direction); if several do, the fix is refused. With five or more, the bearings decide.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from glass_nav.world.landmark_map import LandmarkMap
 
 _FLIPPED_RAD = 0.5 * np.pi  # misfit of a triple: 0 or pi
 _DRIVEN_M = 1e-9  # sensor places nearer to each other than this are one
-_ROUNDS = 8  # of the triples of a robot that drives
+_ROUNDS = 8  # of the triples of a moving robot
 _STEPS, _HALVINGS = 20, 6  # of the least squares
 _SMALL_STEP = 1e-11  # [m, rad] that ends them
 _ONE_PLACE = 16.3  # chi-square of 3 degrees of freedom at 0.999: two fits of the same place
-_CLEARLY_WORSE = 9.0  # of two chi-squares: odds of 90 to 1
-_RANGE_SHARE, _VIEW_SLACK_RAD = 1.25, np.radians(15.0)  # by which a tag may surpass what its map says
+_CLEARLY_WORSE = 9.0  # difference of two chi-squares: odds of 90 to 1
+_RANGE_SHARE, _VIEW_SLACK_RAD = 1.25, np.radians(15.0)  # by which a tag may exceed its mapped range and view
 
 
 class TriangulationError(ValueError):
-    """Bearings that give no pose to rely on; one line says why."""
+    """The bearings give no reliable pose; one line says why."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class TriangulationLimits:
 
     min_off_circle_sigmas: float = 3.0  # how clearly a triple must distinguish the robot from one on its circle
     max_position_sigma_m: float = 0.5  # along the worst direction
-    max_misfit_chance: float = 0.001  # of right bearings that are taken for contradictory
+    max_misfit_chance: float = 0.001  # probability that correct bearings count as contradictory
 
     def __post_init__(self) -> None:
         for name in ("min_off_circle_sigmas", "max_position_sigma_m"):
@@ -59,9 +59,9 @@ class TriangulationLimits:
 
 @dataclass(frozen=True, eq=False)
 class Triples:
-    """What each three of N bearings say."""
+    """The poses that triples of N bearings give."""
 
-    members: np.ndarray  # (T, 3) which bearings
+    members: np.ndarray  # (T, 3) indices of the bearings
     map_from_base: np.ndarray  # (T, 3) NaN where the two circles are one
     off_circle: np.ndarray  # (T,) standard deviations from the circle through its landmarks
     flipped: np.ndarray  # (T,) bool: no place sees the three in these directions
@@ -95,7 +95,7 @@ def triangulate(
 
     Raises:
         TriangulationError: fewer than three bearings; the robot is near the circle, or the line, through the landmarks;
-            the bearings contradict each other; a landmark could not be seen from there; the position is too unsure.
+            the bearings contradict each other; a landmark is not visible from there; the position is too uncertain.
         UnknownLandmark: an id that is not on the map.
     """
     seen = _enough(bearings, landmarks)
@@ -138,7 +138,7 @@ def average(
     """The mean of the poses of all usable triples, as the document advises; its covariance to first order.
 
     Raises:
-        As triangulate(), but for contradictions among the bearings, which it does not look for.
+        As triangulate(), except that contradictions among the bearings are not detected.
     """
     seen = _enough(bearings, landmarks)
     found = _triples(seen, limits)
@@ -165,7 +165,7 @@ def carried_along(fix: Fix, stamp_ns: int, base_from_later: np.ndarray, drift: O
     """The fix at a later stamp, moved by odometry's step (3,) since; less certain by its drift."""
     pose = se2.compose(fix.map_from_base, base_from_later)
     dx, dy = pose[:2] - fix.map_from_base[:2]
-    by_fix = np.array([[1.0, 0.0, -dy], [0.0, 1.0, dx], [0.0, 0.0, 1.0]])  # an error of the heading swings the step
+    by_fix = np.array([[1.0, 0.0, -dy], [0.0, 1.0, dx], [0.0, 0.0, 1.0]])  # a heading error rotates the step
     way_m, turn_rad = float(np.hypot(dx, dy)), abs(float(angles.wrap(base_from_later[2])))
     heading = drift.bearing_drift_rad_per_m * way_m + drift.bearing_drift_per_rad * turn_rad
     more = np.diag(np.square([drift.bearing_drift_per_m * way_m] * 2 + [heading]))
@@ -194,7 +194,7 @@ def _triples(seen: Sightings, limits: TriangulationLimits) -> Triples:
     middle_m = origin_m.mean(axis=1)
     aside_m = origin_m - middle_m[:, None]
     poses, misfit = inscribed_circles.intersect(landmarks_m, direction)
-    if np.abs(aside_m).max() > _DRIVEN_M:  # seen from one place, the landmarks would be shifted by as much
+    if np.abs(aside_m).max() > _DRIVEN_M:  # seen from one place, the landmarks appear shifted by this
         still_m = landmarks_m
         for _ in range(_ROUNDS):
             cos, sin = angles.cos_sin(np.nan_to_num(poses[:, 2:]))
@@ -217,7 +217,7 @@ def _why_no_triple(bearings: LandmarkBearings, seen: Sightings, found: Triples) 
     near = ~found.flipped
     if not near.any():
         return _contradiction(bearings)
-    worst = int(np.argmax(np.where(near, found.off_circle, -np.inf)))  # the least bad of them
+    worst = int(np.argmax(np.where(near, found.off_circle, -np.inf)))  # the best of them
     names = _listed([bearings.ids[number] for number in found.members[worst]])
     centre, radius = inscribed_circles.circle(seen.landmarks_m[found.members[worst]])
     where = (
@@ -244,7 +244,7 @@ def _misfits(seen: Sightings, found: Triples) -> np.ndarray:
 
 
 def _best_fit(seen: Sightings, chosen: np.ndarray, found: Triples, misfit: np.ndarray) -> Optional[_Fit]:
-    """Least squares of the chosen bearings (N,) bool, from their triple that fits them best; None without one."""
+    """Least squares of the chosen bearings (N,) bool, from their best-fitting triple; None without one."""
     inside = found.usable & chosen[found.members].all(axis=1)
     if not inside.any():
         return None
@@ -275,7 +275,7 @@ def _fit(seen: Sightings, pose: np.ndarray) -> Optional[_Fit]:
             if now <= cost:
                 break
             step = 0.5 * step
-        else:  # no better anywhere along the step: rounding
+        else:  # no improvement along the step: rounding
             break
         pose, sight, residual = tried, there, left
         variance = bearing_model.variances(seen, sight)
@@ -308,7 +308,7 @@ def _without_one(
 ) -> Fix:
     """Leave one bearing out, if that leaves only one place."""
     rivals: List[Tuple[_Fit, np.ndarray]] = []
-    open_ids: List[str] = []  # of which the others leave the place open: they cannot be cleared, nor convicted
+    open_ids: List[str] = []  # without these the place is undetermined: they can be neither cleared nor blamed
     for number, name in enumerate(bearings.ids):
         chosen = np.arange(len(bearings)) != number
         fit = _best_fit(seen, chosen, found, misfit)

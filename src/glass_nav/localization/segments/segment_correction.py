@@ -1,14 +1,14 @@
 """Scan, segment map, rough pose -> corrected pose, and how well it fits: Emse, Ecf and both together.
 
 Seed document segment_localization.txt, after MacKenzie and Dudek, Precise positioning using model-based maps (ICRA
-1994). Each end point of a beam belongs to the segment nearest to it; it pulls the robot across that segment's line,
-the nearer the harder, and the neighbourhood c in which points have a say shrinks: c(t) = c(0) (1 - t / T). The
+1994). Each end point of a beam belongs to the nearest segment and pulls the robot perpendicular to that segment's
+line. Nearer points pull harder, and the neighbourhood c of points that count shrinks: c(t) = c(0) (1 - t / T). The
 document's formulas are lost in the transcript; the sigmoid c^m / (d^m + c^m) with m = 2 is given in words.
 
-`method: document` moves by the weighted mean of the perpendicular displacements, all points together. How to correct
-the orientation the document only asks; ours (`correct_orientation`) turns the robot after each move by the weighted
-least squares of what is left. `method: least_squares` solves for x, y and yaw at once and leaves alone what no segment
-constrains: the document's hallway effect, for walls of any direction.
+`method: document` moves by the weighted mean of the perpendicular displacements, all points together. The
+document leaves open how to correct the orientation; ours (`correct_orientation`) turns the robot after each move by
+weighted least squares of the residuals. `method: least_squares` solves for x, y and yaw at once and does not move along
+directions that no segment constrains: the document's hallway effect, for walls of any direction.
 
 Combined quality, ours too: Ecf s^2 / (s^2 + Emse), Emse of the points within the outlier limit. N points, S segments.
 """
@@ -36,9 +36,9 @@ class SegmentCorrectionParams:
     neighbourhood_m: float = 1.0  # c(0); c of the classification factor is the last c(t)
     iterations: int = 15  # T
     correct_orientation: bool = True
-    least_constraint: float = 0.01  # share of the points' pull in a direction, below which it is left alone
-    outlier_m: float = 0.15  # a point further from its segment belongs to no wall
-    fit_scale_m: float = 0.05  # s: root of Emse that halves the combined quality
+    least_constraint: float = 0.01  # share of the points' pull below which a direction is not corrected
+    outlier_m: float = 0.15  # a point further from its segment is an outlier
+    fit_scale_m: float = 0.05  # s: root of Emse at which the combined quality halves
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -58,7 +58,7 @@ class SegmentQuality:
 
     points: int  # finite ones
     mse_m2: float  # Emse: mean squared distance of all points; NaN: no points, inf: no segments
-    mse_inliers_m2: float  # the same of those within the outlier limit; NaN: there are none
+    mse_inliers_m2: float  # Emse of points within the outlier limit; NaN: none
     inlier_share: float  # 0..1
     classification_factor: float  # Ecf: mean of c^m / (d^m + c^m), 0..1; 0 without points or segments
     combined: float  # Ecf s^2 / (s^2 + Emse of the inliers), 0..1
@@ -72,11 +72,11 @@ class SegmentCorrection:
     before: SegmentQuality  # at the pose given
     after: SegmentQuality  # at the corrected one
     free: np.ndarray  # (K, 3) orthonormal directions of x [m], y [m], yaw [lever m] that no segment constrains
-    lever_m: float  # length that turns yaw into a distance, for free; 0: no points
+    lever_m: float  # length by which free scales yaw to a distance; 0: no points
 
     @property
     def free_heading_rad(self) -> Optional[float]:
-        """Along which direction of the map the position is not constrained, in [0, pi); None: no or every direction."""
+        """Direction of the map in which the position is unconstrained, in [0, pi); None: no or every direction."""
         shifts = self.free[:, :2]
         if len(self.free) != 1 or float(np.hypot(*shifts[0])) < 0.5:
             return None
@@ -84,7 +84,7 @@ class SegmentCorrection:
 
 
 class SegmentCorrector:
-    """The walls of one map, prepared to correct many poses."""
+    """The walls of one map, prepared for correcting many poses."""
 
     def __init__(self, segments_m: np.ndarray, params: SegmentCorrectionParams = SegmentCorrectionParams()) -> None:
         """
@@ -93,13 +93,13 @@ class SegmentCorrector:
             params: how to correct.
 
         Raises:
-            ValueError: segments that are none.
+            ValueError: invalid segments.
         """
         self._index = SegmentIndex(segments_m)
         self._params = params
 
     def correct(self, points_m: np.ndarray, map_from_base: np.ndarray) -> SegmentCorrection:
-        """Move a rough pose so that end points come to lie on the segments.
+        """Move a rough pose so that the end points lie on the segments.
 
         Args:
             points_m: (N, 2) end points of beams in the robot's frame; rows that are not finite are left out.
@@ -129,7 +129,7 @@ class SegmentCorrector:
         return SegmentCorrection(pose, before, self._judged(pull.distance_m), free, lever_m)
 
     def quality(self, points_m: np.ndarray, map_from_base: np.ndarray) -> SegmentQuality:
-        """How well end points (N, 2) in the robot's frame fit at a pose (3,), which is not moved."""
+        """How well end points (N, 2) in the robot's frame fit at a pose (3,), without moving it."""
         return self._judge(_finite(points_m), np.asarray(map_from_base, float))
 
     def _neighbourhoods_m(self) -> np.ndarray:
@@ -187,7 +187,7 @@ class SegmentCorrector:
 
 
 def votes(distance_m: np.ndarray, neighbourhood_m: float) -> np.ndarray:
-    """(N,) weights of points so far from their segments: c^m / (d^m + c^m), the document's sigmoid."""
+    """(N,) weights of points by their distances from their segments: c^m / (d^m + c^m), the document's sigmoid."""
     c = neighbourhood_m**STEEPNESS
     return c / (distance_m**STEEPNESS + c)
 

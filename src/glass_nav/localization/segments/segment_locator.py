@@ -1,10 +1,10 @@
-"""One scan, rough pose -> corrected pose, by the beams that ended at walls: segments and cases alternate.
+"""One scan, rough pose -> corrected pose, by the beams that ended at walls: corrections and cases alternate.
 
 Beams are classified at a pose (case_votes.py), and a pose is corrected by beams of known case (segment_correction.py),
 so each needs the other. First all beams pull, from the rough pose and others around it, and the result with the most
-points near walls counts. Then only beams of case 1, 3 and 4 pull, classified anew at each corrected pose. A mirrored
+points near walls is kept. Then only beams of case 1, 3 and 4 pull, reclassified at each corrected pose. A mirrored
 (2) or uncertain beam (0) ends nowhere on the map and must not pull; one that passed panes pulls on the wall behind.
-Unlike the particle filter this learns no glass. B beams.
+Unlike the particle filter, this does not learn where glass is. B beams.
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ from glass_nav.sensing.wall_thickness import wall_thickness
 from glass_nav.world import wall_segments
 from glass_nav.world.grid_map import GridMap
 
-_AROUND_M, _AROUND_RAD, _AROUND = 0.3, np.radians(4.0), 8  # starts beside the rough pose
-_ROUNDS = 3  # of cases, then correction
-_AGAIN = 0.5  # of the first neighbourhood: the pose is nearly right by then
-_MIDDLE = 0.5  # of a wall, where a beam ends in it
-_MIN_ENDS = 20  # of known beams, that a pose is corrected by
-_SAME = np.array([1e-3, 1e-3, 1e-4])  # [m, m, rad] less is no move
+_AROUND_M, _AROUND_RAD, _AROUND = 0.3, np.radians(4.0), 8  # initial poses around the rough one
+_ROUNDS = 3  # of classification, then correction
+_AGAIN = 0.5  # of the first neighbourhood: by then the pose is nearly right
+_MIDDLE = 0.5  # of a wall: where beams end in it
+_MIN_ENDS = 20  # beams of known case needed to correct a pose
+_SAME = np.array([1e-3, 1e-3, 1e-4])  # [m, m, rad] smaller moves count as none
 
 
 @dataclass(frozen=True)
 class Located:
-    """A scan put on the walls of the map."""
+    """A scan aligned with the walls of the map."""
 
-    correction: SegmentCorrection  # before: at the rough pose; both qualities are of the beams that pulled at last
+    correction: SegmentCorrection  # before: at the rough pose; both qualities are of the beams that pulled last
     case: np.ndarray  # (B,) uint8 of each beam at the corrected pose
-    used: np.ndarray  # (B,) bool: the beams that pulled at last
+    used: np.ndarray  # (B,) bool: the beams that pulled last
 
 
 class SegmentLocator:
@@ -102,7 +102,7 @@ class SegmentLocator:
 
 
 def _kept_where_free(found: SegmentCorrection, rough: np.ndarray) -> np.ndarray:
-    """(3,) the corrected pose, along directions that no segment constrains at the rough one, wherever it started."""
+    """(3,) the corrected pose, moved back to the rough one along directions that no segment constrains."""
     if not len(found.free) or not found.lever_m:
         return found.map_from_base
     lever = np.array([1.0, 1.0, found.lever_m])

@@ -9,7 +9,7 @@ from glass_nav.ros import conversions
 from glass_nav.sensing.bearings import LandmarkBearing
 from glass_nav.sensing.mounting import Mounting
 
-LONGEST_TURN_S = 300.0  # of a sensor: a node that receives bearings remembers odometry for so long
+LONGEST_TURN_S = 300.0  # of a sensor's sweep: nodes that receive bearings keep odometry for this long
 
 
 def bearings_from_msg(msg: LandmarkBearingsMsg, mounting: Mounting) -> List[LandmarkBearing]:
@@ -42,7 +42,7 @@ def bearings_from_msg(msg: LandmarkBearingsMsg, mounting: Mounting) -> List[Land
 
 
 def msg_from_bearings(stamp_ns: int, taken: Sequence[LandmarkBearing], frame: str) -> LandmarkBearingsMsg:
-    """The message of one turn that ended at stamp_ns."""
+    """The message of one sweep that ended at stamp_ns."""
     return LandmarkBearingsMsg(
         header=conversions.header(stamp_ns, frame),
         ids=[bearing.landmark_id for bearing in taken],

@@ -1,10 +1,10 @@
 """landmarks_node: where is a robot that sees landmarks in these directions?
 
-Wiring only; the answer comes from triangulation. Callbacks store, one loop works.
+Wiring only; triangulation computes the answer. Callbacks only store, one loop works.
 
-Bearings come as the sensor turns, up to a minute for a turn. The newest bearing of each landmark within ~window_s is
-kept; each message, once odometry is there for all of its stamps, gives a fix at the stamp of its last bearing, older
-ones carried along by odometry. A turn that gives no fix says why, in the log and to whoever asks.
+Bearings come as the sensor turns; a sweep takes up to a minute. The newest bearing of each landmark within ~window_s is
+kept. Each message, once odometry is available for all of its stamps, gives a fix at the stamp of its last bearing;
+odometry carries older ones along. If a sweep gives no fix, the reason is logged and returned by ~send_initialpose.
 
 Subscribes: landmark_bearings (LandmarkBearings), localization_status (LocalizationStatus; launch/landmarks.launch
     remaps it to glass_localization/status), tf odom <- base <- sensor.
@@ -12,8 +12,8 @@ Publishes: ~pose (PoseWithCovarianceStamped in map, of base at the last bearing)
     initialpose (PoseWithCovarianceStamped, the fix carried along to the newest odometry): on request, and once for each
     fix while the localization is in one of ~rescue_states, at most every ~rescue_period_s, so that it can settle;
     ~markers (MarkerArray, latched): the landmarks, and lines to those of the last fix.
-Services: ~send_initialpose (std_srvs/Trigger): the last fix to initialpose; refused, with the reason, if there is none
-    younger than ~max_age_s.
+Services: ~send_initialpose (std_srvs/Trigger): the last fix to initialpose; rejected, with the reason, if there is
+    none younger than ~max_age_s.
 Parameters: LandmarksNodeParams, TriangulationLimits, OdometryDrift, read once; explained in config/landmarks.yaml.
 """
 
@@ -50,7 +50,7 @@ SERVICE_TIMEOUT_S = 10.0
 
 @dataclass(frozen=True)
 class NodeParams:
-    """What the node itself needs. Units by REP 103."""
+    """Parameters of the node itself. Units by REP 103."""
 
     landmark_file: str = ""  # landmarks.yaml; must be given
     transform_wait_s: float = 1.0  # how long a message waits for odometry at its stamps
@@ -86,7 +86,7 @@ class LandmarksNode:
     def __init__(self, p: LandmarksNodeParams) -> None:
         """
         Raises:
-            LandmarkError: the landmark file cannot be used; one line.
+            LandmarkError: the landmark file is unusable; one line.
             ValueError: it has fewer than three landmarks.
         """
         self._p = p.node
@@ -97,7 +97,7 @@ class LandmarksNode:
             raise ValueError(f"{self._p.landmark_file}: {err}") from err
         self._log = LogThrottle()
         self._inbox = Mailbox(bearings=100, states=10, commands=20)
-        self._waiting: "List[tuple[float, LandmarkBearingsMsg]]" = []  # arrival [s], for their odometry
+        self._waiting: "List[tuple[float, LandmarkBearingsMsg]]" = []  # arrival [s]; they wait for odometry
         self._clock = LoopClock()
 
         self._tf = tf2_ros.Buffer(rospy.Duration(bearing_messages.LONGEST_TURN_S))
@@ -143,7 +143,7 @@ class LandmarksNode:
     # -- bearings
 
     def _work_off(self) -> None:
-        """Messages in the order in which they came, as soon as tf has what they need."""
+        """Messages in order of arrival, as soon as tf has what they need."""
         while self._waiting:
             arrival_s, msg = self._waiting[0]
             missing = self._missing_transform(msg)
@@ -159,7 +159,7 @@ class LandmarksNode:
                 self._refuse(str(err))
 
     def _missing_transform(self, msg: LandmarkBearingsMsg) -> str:
-        """The first transform that the message lacks, in words; "" if none."""
+        """The first transform missing for the message, in words; "" if none."""
         sensor = conversions.frame_id(msg.header.frame_id)
         if not self._tf.can_transform(self._p.base_frame_id, sensor, rospy.Time(0)):
             return f"transform {self._p.base_frame_id} <- {sensor or 'the sensor (frame_id is empty)'}"
@@ -169,7 +169,7 @@ class LandmarksNode:
         return ""
 
     def _take(self, msg: LandmarkBearingsMsg) -> None:
-        """One message, its transforms there: a fix, or why there is none."""
+        """One message whose transforms are available: a fix, or why there is none."""
         mounting = conversions.mounting_from_transform(
             self._tf.lookup_transform(
                 self._p.base_frame_id, conversions.frame_id(msg.header.frame_id), rospy.Time(0)

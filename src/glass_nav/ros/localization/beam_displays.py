@@ -31,8 +31,8 @@ _POINT_M = 0.08  # edge of the square at the end of a beam
 _LINE_M = 0.018  # width of the line from the surface to that end
 _LINE_ALPHA = 0.6
 _TEXT_M = 0.4  # height of a capital letter
-_TEXT_ABOVE_M = 0.75  # of the robot: up, and to the north, which is up on the screen when seen from above
-_REASON_WIDTH = 48  # letters of a line
+_TEXT_ABOVE_M = 0.75  # of the robot: up and to the north, which is up on the screen in a top view
+_REASON_WIDTH = 48  # characters per line
 
 
 # -- cloud
@@ -58,13 +58,13 @@ def beam_cloud(scan: Scan, cases: BeamCases, height_m: float, base_frame: str) -
 def beam_markers(scan: Scan, cases: BeamCases, surface: SurfaceScan, height_m: float, base_frame: str) -> MarkerArray:
     """A namespace per case, which names it beside rviz' checkbox: squares where its beams end, and lines there from the surface they met first.
 
-    For publishing only: `points` stay empty. A case without beams has one line of no length, so that rviz
-    knows its namespace and shows its checkbox from the first scan on.
+    For publishing only: `points` stay empty. A case without beams has one line of zero length, so that rviz
+    shows the checkbox of its namespace from the first scan on.
 
     Args:
-        scan: a lidar's turn.
+        scan: of one lidar.
         cases: of its beams.
-        surface: where each beam met the first surface of the map; lines are drawn of those that were cut.
+        surface: where each beam met the first surface of the map; cut beams get a line.
         height_m: of the lidar above the robot's frame.
         base_frame: the robot's frame.
     """
@@ -91,13 +91,13 @@ def beam_markers(scan: Scan, cases: BeamCases, surface: SurfaceScan, height_m: f
 def status_marker(
     map_from_base: Optional[np.ndarray], map_frame: str, state: str, reason: str, used_share: float
 ) -> Marker:
-    """The state in words above the robot, in the map's frame; at the map's origin while it is nowhere yet.
+    """The state in words above the robot, in the map's frame; at the map's origin before it has a pose.
 
     Args:
         map_from_base: (3,) where the robot is.
         map_frame: frame of the map.
-        state, reason: as ~status says them; the reason is shown if there is something to know.
-        used_share: of the beams that a case explains; NaN without a scan.
+        state, reason: as in ~status; the reason is shown if it matters.
+        used_share: of beams that a case explains; NaN without a scan.
     """
     x, y, _ = np.zeros(3) if map_from_base is None else map_from_base
     text = state if np.isnan(used_share) else f"{state}, {100.0 * used_share:.0f} % of the beams explained"
@@ -118,7 +118,7 @@ def status_marker(
 
 
 def _wrapped(text: str) -> str:
-    """Broken at spaces: rviz does not break lines itself."""
+    """The text broken at spaces: rviz does not break lines itself."""
     lines = [""]
     for word in text.split():
         if lines[-1] and len(lines[-1]) + 1 + len(word) > _REASON_WIDTH:

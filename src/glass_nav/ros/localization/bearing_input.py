@@ -1,4 +1,4 @@
-"""Bearings to landmarks, from their topic until a scan takes them into the filter."""
+"""Bearings to landmarks, stored from their topic until a scan passes them to the filter."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ WAITING = 100  # messages that may wait for a scan
 
 
 class BearingInput:
-    """Lets bearings wait for a scan that is not older, and says what cannot be used; nothing without ~landmark_file."""
+    """Stores bearings until a scan that is not older, and logs unusable ones; inactive without ~landmark_file."""
 
     def __init__(self, p: LocalizationNodeParams, tf: tf2_ros.Buffer, log: LogThrottle) -> None:
         """
         Raises:
-            LandmarkError: the landmark file cannot be used; one line.
+            LandmarkError: the landmark file is unusable; one line.
         """
         self._p, self._tf, self._log = p, tf, log
         self._landmarks = landmark_file.load(p.landmark_file) if p.landmark_file else landmark_map.NONE
         self._waiting: Deque[LandmarkBearings] = deque(maxlen=WAITING)
 
     def subscribe(self, put: Callable[[LandmarkBearings], None]) -> None:
-        """Listen, if there are landmarks; put is called by other threads."""
+        """Subscribe, if there are landmarks; put is called by other threads."""
         if len(self._landmarks):
             rospy.Subscriber("landmark_bearings", LandmarkBearings, put, queue_size=10)
 
     def receive(self, msg: LandmarkBearings) -> None:
-        """Let a message wait for the next scan."""
+        """Store a message for the next scan."""
         self._waiting.append(msg)
 
     def give(self, localizer: Localizer, scan_ns: int) -> None:
-        """Hand the filter what is not newer than the scan that it is about to see, and whose odometry is there then."""
+        """Pass the filter all bearings with odometry that are not newer than the scan that follows."""
         for msg in list(self._waiting):
             if conversions.ns_from_stamp(msg.header.stamp) > scan_ns:
                 continue
@@ -54,11 +54,11 @@ class BearingInput:
                 self._log.warn(f"bearings not used: {err}")
 
     def restart(self) -> None:
-        """Forget what waits: time has jumped."""
+        """Drop stored messages: time has jumped."""
         self._waiting.clear()
 
     def _add(self, localizer: Localizer, msg: LandmarkBearings) -> None:
-        """One message, those of its bearings that are to known landmarks."""
+        """The bearings of one message to known landmarks."""
         mounting = conversions.mounting_from_transform(
             self._tf.lookup_transform(
                 self._p.base_frame_id, conversions.frame_id(msg.header.frame_id), rospy.Time(0)

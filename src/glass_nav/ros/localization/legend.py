@@ -1,6 +1,6 @@
 """What the colours in rviz mean, as a picture: rviz has no display for a legend, but one for images.
 
-Drawn by PIL with the font that it carries in itself: no font file is needed.
+PIL draws it with its built-in font: no font file is needed.
 """
 
 from __future__ import annotations

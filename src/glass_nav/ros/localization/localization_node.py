@@ -1,19 +1,19 @@
 """localization_node: where is the robot in a map of walls and glass? Also startable as `amcl`.
 
-Wiring only; the answer comes from the Localizer. Callbacks store, one loop works: nothing else touches the filter.
+Wiring only; the Localizer computes the answer. Callbacks only store; one loop alone touches the filter.
 
 Subscribes: scan (LaserScan; or each of ~scan_topics), initialpose (PoseWithCovarianceStamped), map (OccupancyGrid, if
-    ~use_map_topic), global_localization_area (PolygonStamped in the map's frame: the robot is searched for in it),
+    ~use_map_topic), global_localization_area (PolygonStamped in the map's frame: where to search for the robot),
     landmark_bearings (LandmarkBearings, if ~landmark_file is given), tf odom <- base <- laser.
 Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseArray, latched), tf map -> odom,
     ~status (LocalizationStatus, latched), ~beam_cases (BeamCases), /diagnostics;
     scan_surfaces (LaserScan): the scan for a costmap, with each beam cut at the first surface of the map that it
-    passed or was mirrored at. Stamp, frame and beams are the scan's; its `intensities` say 0 as measured, 1 cut,
-    and -1 for all beams while the pose is not trusted: the scan is passed on raw then. One for every scan that
-    is used; none for a scan that is refused or has no transforms, as nobody knows where it would have to be cut;
-    ~glass_map (OccupancyGrid, latched): probability of glass of each wall cell [percent], -1 where nothing is known;
+    passed or was mirrored at. Stamp, frame and beams are the scan's; its `intensities` are 0 as measured, 1 cut,
+    and -1 for all beams while the pose is not trusted: the scan is then passed on raw. One for every scan that is
+    used; none for a scan that is rejected or has no transforms, because it is unknown where to cut it;
+    ~glass_map (OccupancyGrid, latched): probability of glass by wall cell [percent], -1 where unknown;
     for rviz, while somebody listens: ~beam_cloud (PointCloud2), ~beam_markers (MarkerArray, a namespace per case
-    and one for the status), ~wall_markers (MarkerArray, latched: the glass map without what is unknown), ~legend
+    and one for the status), ~wall_markers (MarkerArray, latched: the known cells of the glass map), ~legend
     (Image, latched).
 Services: global_localization, request_nomotion_update (Empty), set_map (SetMap), ~set_parameters (Reconfigure, with
     its topics ~parameter_descriptions and ~parameter_updates). Calls static_map (GetMap).
@@ -61,7 +61,7 @@ from glass_nav.world import landmark_file
 from glass_nav.world.grid_map import GridMap
 
 NO_SCAN_WARNING_S = 15.0  # as AMCL
-SETTLING_S = 5.0  # a player of a launch file needs some seconds: no warning before
+SETTLING_S = 5.0  # a player in a launch file needs some seconds: no warning before
 SERVICE_TIMEOUT_S = 30.0
 
 
@@ -118,7 +118,7 @@ class LocalizationNode:
             for command in mail["commands"]:
                 command()
             self._maps.request()
-            mail["scans"] += self._inbox.take_now("scans")  # a new map takes a while
+            mail["scans"] += self._inbox.take_now("scans")  # loading a new map takes a while
             if self._session.waits_for_pose and mail["scans"]:
                 mail["scans"], self._scans.last_arrival_s = [], self._clock.now_s
             for msg in mail["scans"]:
@@ -199,7 +199,7 @@ class LocalizationNode:
             rospy.logwarn(f"global_localization_area refused: {err}")
 
     def _take_parameters(self, values: Dict[str, Any]) -> None:
-        """Other parameters; what the filter knows stays. ParamError if one cannot be used, and then none is."""
+        """Change parameters; the filter keeps what it knows. ParamError if one is invalid: then none changes."""
         p = params.changed(self._p, values, rospy.get_name())
         self._session.reconfigure(p.session)
         self._p = p
@@ -222,7 +222,7 @@ class LocalizationNode:
         self._bearings.give(session.localizer, scan.stamp_ns)
         try:
             estimate = session.update(scan, odom_from_base, self._clock.now_s)
-        except ValueError as err:  # ScanError, and what the filter cannot work out: a robot drives on by odometry
+        except ValueError as err:  # ScanError, or the filter fails: the robot drives on by odometry
             self._pass_over(raw.stamp_ns, str(err))
             return
         self._health.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
@@ -236,7 +236,7 @@ class LocalizationNode:
         self._memory.take(estimate, session.grid_map.digest, self._p.node.save_pose_rate, self._clock.now_s)
 
     def _pass_over(self, stamp_ns: int, why: str) -> None:
-        """A scan that cannot be used: the pose moves on with the odometry all the same."""
+        """A scan was rejected: the pose still moves on with the odometry."""
         self._scans.refuse(why)
         if self._session.estimate is not None:
             self._outputs.send_transform(stamp_ns, self._session.estimate.map_from_odom)
@@ -265,7 +265,7 @@ class LocalizationNode:
         self._session.restart(why, self._clock.now_s)
 
     def _report(self) -> None:
-        """Once a second: diagnostics, and in words what is missing if no scan is being used."""
+        """Once a second: publish diagnostics, and log what is missing if no scan is being used."""
         if time.monotonic() < self._next_report_s:
             return
         self._next_report_s = time.monotonic() + 1.0
@@ -309,7 +309,7 @@ def _parameter_file() -> Optional[Path]:
 
 
 def main(name: str = "glass_localization") -> None:
-    """Start the node; exit code 2 if a parameter or the landmark file cannot be used."""
+    """Start the node; exit code 2 if a parameter or the landmark file is unusable."""
     rospy.init_node(name, disable_signals=True)
     if "--run-from-bag" in rospy.myargv():
         rospy.logfatal(

@@ -1,4 +1,4 @@
-"""Where the map comes from: the service static_map, asked until it answers, or the topic map."""
+"""Where the map comes from: the service static_map, called until it answers, or the topic map."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from glass_nav.ros.localization.params import LocalizationNodeParams
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.world.grid_map import GridMap
 
-SETTLING_S = 5.0  # map server and player of a launch file need some seconds: no warning before
+SETTLING_S = 5.0  # map server and player in a launch file need some seconds: no warning before
 REQUEST_PERIOD_S = 0.5
 UseMap = Callable[[GridMap, str, str], None]  # map, frame_id of its message, where it came from in words
 
 
 class MapSource:
-    """Asks for the first map, and passes on every map that is one."""
+    """Requests the first map, and passes on every valid map."""
 
     def __init__(self, p: LocalizationNodeParams, log: LogThrottle, use: UseMap) -> None:
         """
         Args:
             p: whether the map comes by topic, and whether newer ones count.
-            log: for what is said at every attempt.
+            log: limits the lines of repeated attempts.
             use: called with each map.
         """
         self._p, self._log, self._use = p, log, use
@@ -59,7 +59,7 @@ class MapSource:
             self._log.error(self.trouble)
 
     def take_topic(self, msg: OccupancyGrid) -> None:
-        """A map of the topic; one that is none is refused, and the map before it stays."""
+        """A map from the topic; an invalid one is rejected, and the previous map stays."""
         if self._taken and self._p.first_map_only:
             return
         origin = f"topic {rospy.resolve_name('map')}"
@@ -69,6 +69,6 @@ class MapSource:
             rospy.logerr(f"the map of {origin} is refused: {err}")
 
     def take(self, grid_map: GridMap, frame: str, origin: str) -> None:
-        """Pass a map on; there is one then, and none is asked for any more."""
+        """Pass a map on; after that none is requested."""
         self._use(grid_map, frame, origin)
         self._taken, self.trouble = True, None

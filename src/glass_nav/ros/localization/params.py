@@ -1,8 +1,8 @@
 """The private parameters of the localization node: the parameter server -> validated dataclasses.
 
-Names and defaults are AMCL's where AMCL has the parameter. Parameters of AMCL that mean nothing to
-this filter are taken off first, so that launch files written for amcl load; whatever else is unknown
-is refused with the nearest known name; as amcl, which takes no notice of such names, it is left out and said.
+Names and defaults are AMCL's where AMCL has the parameter. Parameters of AMCL without a meaning for
+this filter are removed first, so that launch files written for amcl load. Other unknown names are rejected with the
+nearest known name; started as amcl, which ignores such names, the node skips them with a warning.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ __all__ = ["LocalizationNodeParams", "LocalizationParams", "ParamError", "locali
 
 @dataclass(frozen=True)
 class LocalizationNodeParams:
-    """What the node itself needs: frames, map, start, rates. Units by REP 103."""
+    """Parameters of the node itself: frames, map, initial pose, rates. Units by REP 103."""
 
     odom_frame_id: str = "odom"
     base_frame_id: str = "base_link"
     global_frame_id: str = "map"
-    scan_topics: Tuple[str, ...] = ()  # of several lidars; none: scan
+    scan_topics: Tuple[str, ...] = ()  # of several lidars; empty: scan
     tf_broadcast: bool = True
-    publish_tf_before_localized: bool = True  # False: map -> odom goes out once the state has been LOCALIZED
+    publish_tf_before_localized: bool = True  # False: map -> odom is published once the state has been LOCALIZED
     transform_tolerance: float = 0.1  # [s] how far ahead of the scan map -> odom is stamped
     transform_wait_s: float = 1.0  # [s] how long a scan waits for odom <- base <- laser
     use_map_topic: bool = False
     first_map_only: bool = False
     gui_publish_rate: float = -1.0  # [Hz] of particlecloud, ~beam_cloud, ~beam_markers; <= 0: no limit
-    glass_map_period_s: float = 2.0  # [s] ~glass_map goes out no more often
-    save_pose_rate: float = 0.5  # [Hz]; <= 0: only when the node ends
+    glass_map_period_s: float = 2.0  # [s] shortest time between messages of ~glass_map
+    save_pose_rate: float = 0.5  # [Hz]; <= 0: only at shutdown
     std_warn_level_x: float = 0.2  # [m]
     std_warn_level_y: float = 0.2  # [m]
     std_warn_level_yaw: float = 0.1  # [rad]
@@ -98,7 +98,7 @@ class LocalizationParams:
         return SessionParams(self.localizer, self.start, self.rules, self.pose_file)
 
 
-# Of the node's own parameters, those that may change while it runs; of the filter's, all.
+# The node's own parameters that may change while it runs; of the filter's, all may.
 CHANGEABLE = (
     "tf_broadcast",
     "publish_tf_before_localized",
@@ -122,7 +122,7 @@ def changeable(p: LocalizationParams) -> Dict[str, Any]:
 
 
 def changed(p: LocalizationParams, values: Mapping[str, Any], owner: str) -> LocalizationParams:
-    """The parameters with other values of those that may change.
+    """The parameters with new values for those that may change.
 
     Raises:
         ParamError: a wrong type, or a value out of its range.
@@ -138,7 +138,7 @@ def localization_params(mapping: Mapping[str, Any], owner: str) -> Tuple[Localiz
         owner: the node's name, the first word of an error.
 
     Raises:
-        ParamError: a name nobody knows, a wrong type, a value out of its range.
+        ParamError: an unknown name, a wrong type, a value out of its range.
     """
     ours, unused = amcl_parameters.without_unused(mapping, LocalizationParams)
     return params.load(LocalizationParams, amcl_parameters.adapted(ours, LocalizationParams), owner), unused
@@ -147,7 +147,7 @@ def localization_params(mapping: Mapping[str, Any], owner: str) -> Tuple[Localiz
 def without_unknown(mapping: Mapping[str, Any], owner: str) -> Tuple[Dict[str, Any], List[str]]:
     """The mapping without the names that neither this node nor AMCL has, and a line on each of them.
 
-    AMCL reads what it knows and no more, so launch files of robots carry names of other nodes and of long ago.
+    AMCL ignores other names, so launch files of robots carry those of other nodes and of older versions.
     """
     known = {*params.names(LocalizationParams), *amcl_parameters.NAMES}
     unknown = [name for name in mapping if name not in known]

@@ -1,4 +1,4 @@
-"""All that the localization node says of a scan, and when: tf, pose, particles, status, cases, surfaces, for rviz."""
+"""All that the localization node publishes, and when: tf, pose, particles, status, cases, surfaces, displays."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Publishers:
         self._was_localized = False
         self._last_transform_ns = 0
         self._particles_pace, self._beams_pace, self._glass_pace = RateLimiter(), RateLimiter(), RateLimiter()
-        self._glass_is_news = False  # since it was last sent
+        self._glass_is_news = False  # changed since it was last sent
         self._broadcaster = tf2_ros.TransformBroadcaster()
         self._poses = rospy.Publisher("amcl_pose", PoseWithCovarianceStamped, queue_size=2, latch=True)
         self._particles = rospy.Publisher("particlecloud", PoseArray, queue_size=2, latch=True)
@@ -49,25 +49,25 @@ class Publishers:
         self._legend.publish(legend.image_msg(self._frame))
 
     def reconfigure(self, p: LocalizationNodeParams) -> None:
-        """Other parameters from now on."""
+        """Change the parameters."""
         self._p = p
 
     def start_over(self) -> None:
-        """The pose that was known is no more: stamps may go back, and tf waits for LOCALIZED where it shall."""
+        """The pose is no longer known: stamps may go back, and tf waits for LOCALIZED again if so configured."""
         self._was_localized = False
         self._last_transform_ns = 0
         self.glass_is_news()
 
     def glass_is_news(self) -> None:
-        """There is another glass map than the one that was sent."""
+        """The glass map has changed since it was sent."""
         self._glass_is_news = True
 
     def send(self, placed: PlacedScan, estimate: Estimate, now_s: float, pose_is_news: bool) -> None:
-        """All about one scan that was used.
+        """Publish everything about one scan that was used.
 
         Args:
             placed: the scan.
-            estimate: what the filter says of it.
+            estimate: of the filter, for this scan.
             now_s: ROS time.
             pose_is_news: publish the pose even if this scan did not move the particles.
         """
@@ -94,7 +94,7 @@ class Publishers:
         self._show_beams(placed, estimate, now_s)
 
     def send_transform(self, stamp_ns: int, map_from_odom: np.ndarray) -> None:
-        """tf map -> odom, if it is wanted. Never two of one stamp: tf warns of each."""
+        """tf map -> odom, if wanted. Never two with one stamp: tf warns about each."""
         if not self._p.tf_broadcast or not (self._was_localized or self._p.publish_tf_before_localized):
             return
         stamp_ns = max(stamp_ns, self._last_transform_ns + 1)  # another lidar's scan may be older
@@ -105,7 +105,7 @@ class Publishers:
         )
 
     def send_trouble(self, estimate: Optional[Estimate], state: LocalizationState, trouble: str) -> None:
-        """~status, and the words in rviz, while no scan is being used.
+        """~status, and its text in rviz, while no scan is being used.
 
         Args:
             estimate: the last one, None before the first.
@@ -120,7 +120,7 @@ class Publishers:
             )
 
     def send_glass_map(self, localizer: Localizer, grid_map: GridMap, stamp_ns: int, now_s: float) -> None:
-        """The glass map, if it is news to somebody and it is time."""
+        """The glass map, if it has changed, somebody listens and it is due."""
         listeners = self._glass_map.get_num_connections() + self._wall_markers.get_num_connections()
         if not (self._glass_is_news and listeners and self._glass_pace.is_due(now_s, self._p.glass_map_period_s)):
             return
@@ -130,7 +130,7 @@ class Publishers:
         self._wall_markers.publish(wall_display.wall_markers(self._frame, grid_map, glass))
 
     def _show_beams(self, placed: PlacedScan, estimate: Estimate, now_s: float) -> None:
-        """The beams for rviz, if it listens and it is time."""
+        """The beams for rviz, if it listens and they are due."""
         listeners = self._beam_cloud.get_num_connections(), self._beam_markers.get_num_connections()
         if not any(listeners) or not self._beams_pace.is_due(now_s, period_s(self._p.gui_publish_rate)):
             return

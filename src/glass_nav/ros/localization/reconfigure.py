@@ -1,8 +1,8 @@
 """The protocol of dynamic_reconfigure, so that rqt_reconfigure and dynparam tune the running node.
 
-What can be changed, and to what, follows from the dataclasses that hold the parameters: there is no .cfg file beside
-them. dynamic_reconfigure's own server is not used: it clamps in silence what is out of range, and writes every default
-to the parameter server, where it looks as if somebody had asked for it.
+The dataclasses of the parameters define what can be changed, and to what; there is no .cfg file. dynamic_reconfigure's
+own server is not used: it silently clamps values that are out of range, and writes every default to the parameter
+server, where it looks as if somebody had set it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from glass_nav.localization.particle_filter.importance_weights import WEIGHT_MOD
 from glass_nav.localization.particle_filter.motion import MODELS
 from glass_nav.params import ParamError
 
-RESTORE = "restore_defaults"  # AMCL's: back to what the node was started with
+RESTORE = "restore_defaults"  # AMCL's: back to the values at the start
 CHOICES = {"vote_mode": VOTE_MODES, "weight_mode": WEIGHT_MODES, "odom_model_type": MODELS}
 _TYPES = {bool: "bool", int: "int", float: "double", str: "str"}
 _UNBOUNDED = {bool: (False, True), int: (-(2**31), 2**31 - 1), float: (float("-inf"), float("inf")), str: ("", "")}
@@ -39,9 +39,9 @@ class ReconfigureServer:
     def __init__(self, values: Mapping[str, Any], descriptions: Mapping[str, str], apply: Apply) -> None:
         """
         Args:
-            values: name -> value of those that can be changed; of the types bool, int, float and str.
-            descriptions: what they mean, as far as known.
-            apply: called by other threads with all values; raises ValueError for what cannot be used.
+            values: name -> value of those that can be changed: bool, int, float or str.
+            descriptions: their meanings, as far as known.
+            apply: called by other threads with all values; raises ValueError for invalid ones.
         """
         self._lock = threading.Lock()
         self._values = dict(values)
@@ -59,12 +59,12 @@ class ReconfigureServer:
                 self._change(_values_from_msg(request.config))
             except (ValueError, TimeoutError) as err:
                 rospy.logwarn(f"parameters stay as they are: {err}")
-                self._publish()  # so that a window shows what is in force
+                self._publish()  # so that a client shows the values in effect
                 raise rospy.ServiceException(str(err)) from err
             return ReconfigureResponse(self._publish())
 
     def _change(self, wanted: Dict[str, Any]) -> None:
-        """Those that are new; ValueError if one cannot be used, and then none is."""
+        """The changed values; ValueError if one is invalid: then none is applied."""
         values = dict(self._started_with if wanted.pop(RESTORE, False) else self._values)
         unused = sorted(amcl_parameters.NAMES.intersection(wanted).difference(values))
         if unused:
@@ -84,7 +84,7 @@ class ReconfigureServer:
             rospy.loginfo("parameters now: " + ", ".join(f"{name} {value}" for name, value in changed.items()))
 
     def _publish(self) -> Config:
-        """What is in force, told to whoever listens."""
+        """Publish the values in effect."""
         msg = encode_config({**self._values, RESTORE: False, "groups": _GROUP})
         self._updates.publish(msg)
         return msg
@@ -103,7 +103,7 @@ _GROUP: Dict[str, Any] = {
 
 
 def description_msg(values: Mapping[str, Any], descriptions: Mapping[str, str]) -> ConfigDescription:
-    """What can be changed, for the clients. No bounds: a value out of them would be clamped there, not refused here."""
+    """What can be changed, for the clients. No bounds: clients would clamp a value that the node should reject."""
     group: Dict[str, Any] = dict(
         _GROUP,
         groups=[],
@@ -130,7 +130,7 @@ def description_msg(values: Mapping[str, Any], descriptions: Mapping[str, str]) 
 
 
 def _edit_method(name: str) -> str:
-    """For rqt_reconfigure: a choice of the values that there are, as the Python text that it evaluates."""
+    """For rqt_reconfigure: the possible values, as the Python text that it evaluates."""
     if name not in CHOICES:
         return ""
     return str(
@@ -142,7 +142,7 @@ def _edit_method(name: str) -> str:
 
 
 def _values_from_msg(msg: Config) -> Dict[str, Any]:
-    """Name -> value of all that the message asks for."""
+    """Name -> value of all that the message sets."""
     return {
         each.name: kind(each.value)
         for kind, group in ((bool, msg.bools), (int, msg.ints), (float, msg.doubles), (str, msg.strs))
@@ -151,7 +151,7 @@ def _values_from_msg(msg: Config) -> Dict[str, Any]:
 
 
 def explanations(path: Optional[Path]) -> Dict[str, str]:
-    """Name -> comment in a parameter file of ours, `name: value  # comment`, continued in lines of comment alone."""
+    """Name -> comment in a parameter file of ours, `name: value  # comment`, continued in lines with only a comment."""
     if path is None or not path.is_file():
         return {}
     found: Dict[str, List[str]] = {}

@@ -1,6 +1,6 @@
-"""The glass map as rviz shows it best: squares on the walls, in a namespace each for solid, undecided and glass.
+"""The glass map for rviz: squares on the walls, in a namespace each for solid, undecided and glass.
 
-rviz' Map display can show `~glass_map` too, but paints all cells of which nothing is known over the map below.
+rviz' Map display can show `~glass_map` too, but its unknown cells cover the map below.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ _HEIGHT_M = -0.02  # below beams of a lidar at height 0; the map itself is drawn
 
 
 def wall_markers(map_frame: str, grid_map: GridMap, glass: np.ndarray) -> MarkerArray:
-    """A square of one cell's size on each wall cell of which something is known; for publishing only.
+    """A square of one cell's size on each wall cell with a known probability; for publishing only.
 
     Args:
         map_frame: frame of the map.
         grid_map: the map.
-        glass: (H, W) probability of glass of each wall cell [percent], -1 where nothing is known.
+        glass: (H, W) probability of glass by wall cell [percent], -1 where unknown.
     """
     header = conversions.header(0, map_frame)  # stamp 0: for every time
     kinds = glass < SOLID_BELOW, (glass >= SOLID_BELOW) & (glass < GLASS_FROM), glass >= GLASS_FROM

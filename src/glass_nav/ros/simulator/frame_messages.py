@@ -1,4 +1,4 @@
-"""What the simulator saw -> ROS messages. B beams."""
+"""Simulator frames -> ROS messages. B beams."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from glass_nav.sensing.scan import Scan
 from glass_nav.simulation.lidar import TrueScan
 from glass_nav.simulation.simulation import Frame, OdometrySample
 
-START_DEVIATION = np.array([0.1, 0.1, 0.05])  # m, m, rad: how sure somebody is who points at the robot on a map
+START_DEVIATION = np.array([0.1, 0.1, 0.05])  # m, m, rad: of a person who points at the robot on a map
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def ground_truth_msg(frame: Frame, names: FrameNames) -> PoseStamped:
 
 
 def initial_pose_msg(frame: Frame, names: FrameNames) -> PoseWithCovarianceStamped:
-    """Where the robot is, as somebody gives it with rviz."""
+    """The robot's pose, as a person gives it with rviz."""
     msg = PoseWithCovarianceStamped(header=conversions.header(frame.stamp_ns, names.map))
     msg.pose.pose = conversions.pose_from_planar(frame.map_from_base)
     spatial = np.zeros((6, 6))

@@ -1,14 +1,14 @@
-"""simulator_node: a robot in a building of walls and glass, in simulated time, with the truth about every beam.
+"""simulator_node: a robot in a building of walls and glass, in simulated time, with the ground truth of every beam.
 
-Wiring only; the robot is simulation.Simulation. One loop moves it; callbacks store.
+Wiring only; the robot is simulation.Simulation. One loop moves it; callbacks only store.
 
-Subscribes: cmd_vel (Twist; goes before the path), tf map -> odom (only to know whether and
-    how far the localization has come).
+Subscribes: cmd_vel (Twist; takes precedence over the path), tf map -> odom (only to know whether the localization
+    runs and keeps up).
 Publishes: /clock, scan (LaserScan), odom (Odometry), tf odom -> base_link and base_link -> laser (static),
-    landmark_bearings (LandmarkBearings, at the end of each turn of the scanner, if the building has tags), tf base_link
+    landmark_bearings (LandmarkBearings, at the end of each sweep of the scanner, if the building has tags), tf base_link
     -> emitter (static),
     ground_truth (PoseStamped in map) and true_beams (TrueBeams) with the stamps of scan, ~blocked (Bool, latched: an
-    obstacle stops the robot), initialpose (if ~give_initial_pose), map and map_metadata (latched, if ~serve_map).
+    obstacle blocks the robot), initialpose (if ~give_initial_pose), map and map_metadata (latched, if ~serve_map).
 Services: static_map (GetMap, if ~serve_map).
 Parameters: SimulatorNodeParams, read once; explained in config/simulator.yaml.
 """
@@ -47,34 +47,34 @@ from glass_nav.simulation.robot import RobotParams
 from glass_nav.simulation.simulation import CONTROL_S, Frame, Simulation
 from glass_nav.simulation.steering import Audience, Pace, Steering
 
-ANSWER_WAIT_S = 1.0  # as fast as it can: so long for map -> odom of a scan, by the wall clock
+ANSWER_WAIT_S = 1.0  # at full speed: longest wait for map -> odom of a scan, by the wall clock
 
 
 @dataclass(frozen=True)
 class SimulatorNodeParams:
     """Private parameters of the node. Units by REP 103."""
 
-    building: str = "glass_office"  # yaml file, folder with building.yaml, or name of one in maps/
+    building: str = "glass_office"  # yaml file, folder with building.yaml, or the name of a building in maps/
     opaque: bool = False  # the same building with film on all glass; the map is the same
     start: str = ""  # "x y yaw" in the map, or "random" by the seed; empty: the path's
     path: str = ""  # name, file of waypoints, or "first"; "none" or empty: cmd_vel only
     path_speed_m_s: float = 0.6
-    repeat_path: bool = False  # back to its start and so on, for ever
+    repeat_path: bool = False  # back and forth along the path, forever
     lidar: str = "sensitive"  # sensitive, weak, coated
     beams: int = 0  # 0: the lidar's own
     echo: str = ""  # first, strongest, last; empty: the lidar's own
     robot: str = "diff"  # diff, omni
-    braking_factor: float = 1.0  # it slows down so many times as hard as it accelerates
+    braking_factor: float = 1.0  # deceleration over acceleration
     seed: int = 0
     changed: float = 0.0  # share of the movable furniture that moved since the map was drawn
     scan_rate_hz: float = 10.0
     turn_time_s: float = 0.0  # from the first beam of a scan to the last one
-    speed_factor: float = 1.0  # simulated seconds in a second; 0: as fast as the localization follows
+    speed_factor: float = 1.0  # simulated seconds per second; 0: as fast as the localization follows
     laser_x_m: float = 0.12  # where the laser sits on the robot
     laser_y_m: float = 0.0
     laser_yaw_rad: float = 0.0
     landmark_reading_deg: float = 1.0  # steps in which bearings to tags are read
-    landmark_move_s: float = 0.8  # of the scanner: four tags take about 60 s a turn
+    landmark_move_s: float = 0.8  # of the scanner: a sweep of four tags takes about 60 s
     emitter_x_m: float = 0.0  # where the landmark scanner sits on the robot
     emitter_y_m: float = 0.0
     emitter_yaw_rad: float = 0.0
@@ -110,19 +110,19 @@ class SimulatorNodeParams:
 
 @dataclass(frozen=True)
 class _Drive:
-    """What the parameters ask for, built and checked."""
+    """The objects that the parameters describe, built and checked."""
 
     simulation: Simulation
     follower: Optional[PathFollower]
 
 
 class SimulatorNode:
-    """Wiring only: time goes on by a step, messages out."""
+    """Wiring only: each step advances time and publishes messages."""
 
     def __init__(self, p: SimulatorNodeParams) -> None:
         """
         Raises:
-            ValueError: a building, path, lidar or robot that cannot be used; one line.
+            ValueError: an invalid building, path, lidar or robot; one line.
         """
         self._p = p
         drive = _drive(p)
@@ -131,7 +131,7 @@ class SimulatorNode:
         self._names = FrameNames(p.global_frame_id, p.odom_frame_id, p.base_frame_id, p.laser_frame_id)
         self._log = LogThrottle()
         self._inbox = Mailbox(commands=1)
-        self._newcomers = Mailbox(publish=10)  # to one node each that has begun to listen to initialpose
+        self._newcomers = Mailbox(publish=10)  # one for each new subscriber of initialpose
         self._blocked = False
         self._answers = 0  # transforms map -> odom; counted by the thread of tf
         self._answers_used, self._answering = 0, False
@@ -192,7 +192,7 @@ class SimulatorNode:
         elif wait_s < 0.0:
             self._log.warn(f"slower than ~speed_factor {factor:g} asks for: behind by {-wait_s:.1f} s", 30.0)
 
-    # -- callbacks of other threads: they store
+    # -- callbacks of other threads: they only store
 
     def _hear_localization(self, msg: TFMessage) -> None:
         for transform in msg.transforms:
@@ -216,7 +216,7 @@ class SimulatorNode:
     # -- output
 
     def _publish_reading(self) -> None:
-        """Time, and what the wheels say."""
+        """Publish the time and what the wheels report."""
         reading = self._simulation.reading
         self._clock.publish(Clock(conversions.stamp_from_ns(reading.stamp_ns)))
         self._transforms.publish(
@@ -250,14 +250,14 @@ class SimulatorNode:
             publish(frame_messages.initial_pose_msg(frame, names))
 
     def _serve_map(self) -> None:
-        """What the package draws of the building."""
+        """The map that the package draws of the building."""
         stamp = conversions.stamp_from_ns(self._simulation.stamp_ns)
         grid_map = building_map.draw(self._simulation.building, self._p.map_resolution_m)
         self._map = ServedMap()
         self._map.give(conversions.msg_from_map(grid_map, stamp, self._names.map))
 
     def _await_answer(self, ending: threading.Event) -> None:
-        """Let the localization keep up: wait for its transform of this scan, unless it has fallen silent."""
+        """Let the localization keep up: wait for its transform of this scan, unless it has stopped answering."""
         until_s = time.monotonic() + (ANSWER_WAIT_S if self._answering else 0.0)
         while self._answers == self._answers_used and time.monotonic() < until_s and not ending.wait(0.001):
             pass
@@ -266,7 +266,7 @@ class SimulatorNode:
 
 
 class _Listener(rospy.SubscribeListener):
-    """Notes who begins to listen."""
+    """Reports new subscribers."""
 
     def __init__(self, newcomers: Mailbox) -> None:
         super().__init__()
@@ -277,7 +277,7 @@ class _Listener(rospy.SubscribeListener):
 
 
 def _drive(p: SimulatorNodeParams) -> _Drive:
-    """The simulation and its path; ValueError in one line."""
+    """The simulation and its path; ValueError with one line."""
     model = lidar.preset(p.lidar)
     if p.beams:
         model = replace(model, beams=p.beams)
@@ -300,7 +300,7 @@ def _drive(p: SimulatorNodeParams) -> _Drive:
         scanner=scanner if len(building.tags) else None,
         base_from_emitter=np.array([p.emitter_x_m, p.emitter_y_m, p.emitter_yaw_rad]),
     )
-    if p.path in ("", "none"):  # roslaunch cannot hand on an empty argument of its command line
+    if p.path in ("", "none"):  # roslaunch cannot pass on an empty command-line argument
         return _Drive(simulation, None)
     return _Drive(simulation, simulation.follower(p.path, PathFollowerParams(speed_m_s=p.path_speed_m_s)))
 

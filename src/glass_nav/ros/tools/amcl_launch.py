@@ -50,7 +50,7 @@ WORTH_KNOWING = {
 
 
 class LaunchError(ValueError):
-    """A launch file without parameters of amcl in it; one line."""
+    """The launch file has no usable parameters of amcl; one line."""
 
 
 @dataclass(frozen=True)
@@ -119,10 +119,10 @@ def explained(node: AmclNode, source: str) -> str:
     """Our parameters as yaml, which rosparam and `glass_nav replay --params` load, with comments.
 
     Raises:
-        ParamError: a value that the node would refuse.
+        ParamError: a value that the node would reject.
     """
     known, unknown = without_unknown(node.values, source)
-    localization_params(known, source)  # the node would refuse it, too
+    localization_params(known, source)  # the node would reject it, too
     taken, unused = amcl_parameters.without_unused(known, LocalizationParams)
     adapted = amcl_parameters.adapted(taken, LocalizationParams)
     defaults = params.as_mapping(LocalizationParams())

@@ -1,7 +1,7 @@
 """bag_player: waits until the localization has its map, then becomes `rosbag play` with the same arguments.
 
-Calls: request_nomotion_update (Empty), which the localization refuses until it is ready.
-Parameters: ~wait_s (default 60), the longest wait; then it plays all the same, and says so.
+Calls: request_nomotion_update (Empty), which the localization rejects until it is ready.
+Parameters: ~wait_s (default 60), the longest wait; after it, the bag is played anyway, with a warning.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ ASK_PERIOD_S = 0.2
 
 
 def main() -> None:
-    """Wait, then play; exit code 2 for a ~wait_s that is none."""
+    """Wait, then play; exit code 2 for an invalid ~wait_s."""
     rospy.init_node("player", disable_signals=True)
     wait_s = rospy.get_param("~wait_s", 60.0)
     if isinstance(wait_s, bool) or not isinstance(wait_s, (int, float)) or not wait_s >= 0.0:

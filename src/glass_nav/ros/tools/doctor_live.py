@@ -1,6 +1,6 @@
-"""glass_nav doctor --live: listens to every lidar, tf and odometry for some seconds, and examines what was heard.
+"""glass_nav doctor --live: listens to every lidar, tf and odometry for some seconds, and examines what it received.
 
-Started by `glass_nav doctor` as a process of its own. Publishes nothing.
+`glass_nav doctor` starts it as a separate process. Publishes nothing.
 Subscribes: every topic of LaserScan and Odometry, tf, tf_static; map (OccupancyGrid), unless a map file is given.
 """
 
@@ -33,7 +33,7 @@ MAP_WAIT_S = 1.0
 
 
 class Listener:
-    """Keeps what comes, until it has been long enough."""
+    """Collects messages until enough time has passed."""
 
     def __init__(self) -> None:
         self.seen = Observed("the running robot")
@@ -88,7 +88,7 @@ def _now_ns() -> int:
 
 
 def served_map() -> Optional[GridMap]:
-    """Of static_map or of the topic map; None: nobody gives one."""
+    """The map of static_map or of the topic map; None: nobody provides one."""
     try:
         rospy.wait_for_service("static_map", timeout=MAP_WAIT_S)
         return conversions.map_from_msg(rospy.ServiceProxy("static_map", GetMap)().map)

@@ -18,7 +18,7 @@ from glass_nav.world import map_file
 
 
 class MapNode:
-    """One map, given to whoever asks."""
+    """Serves one map."""
 
     def __init__(self, path: str, frame: str) -> None:
         self._frame = conversions.frame_id(frame)
@@ -49,7 +49,7 @@ class MapNode:
 
 
 def main() -> None:
-    """Start the node; exit code 2 without a file name, 3 if the file is no map."""
+    """Start the node; exit code 2 without a file name, 3 if the file is not a map."""
     rospy.init_node("map_node")
     arguments: List[str] = rospy.myargv()[1:]
     path = rospy.get_param("~map_file", arguments[0] if len(arguments) == 1 else "")

@@ -1,4 +1,4 @@
-"""A map as map_server gives it: the latched topics map and map_metadata, and the service static_map."""
+"""A map as map_server serves it: the latched topics map and map_metadata, and the service static_map."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from nav_msgs.srv import GetMap, GetMapResponse
 
 
 class ServedMap:
-    """One map, given to whoever asks."""
+    """Serves one map."""
 
     def __init__(self) -> None:
         self._maps = rospy.Publisher("map", OccupancyGrid, queue_size=1, latch=True)
@@ -19,7 +19,7 @@ class ServedMap:
         self._msg: OccupancyGrid  # once there is one
 
     def give(self, msg: OccupancyGrid) -> None:
-        """This map from now on."""
+        """Serve this map from now on."""
         self._msg = msg
         self._maps.publish(msg)
         self._metadata.publish(msg.info)
