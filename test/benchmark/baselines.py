@@ -296,4 +296,4 @@ OURS: Dict[str, Callable[[LocalizerParams, GridMap, np.random.Generator], Locali
     "ours_oracle": OracleCases,
 }
 LOCALIZERS = (*OURS, *SETTINGS)
-BASELINES = ("ours_case1", *SETTINGS)  # honest: they know what a localizer can know; ours_oracle is told more
+BASELINES = ("ours_case1", *SETTINGS)  # honest: they know what a localizer can know; ours_oracle is given more

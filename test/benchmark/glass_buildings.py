@@ -8,7 +8,7 @@
 
 Every building x lidar x seed is driven once, and every localizer gets the same scans, odometry and start. A seed
 seeds the drive, the lidar, the odometry, the start and the localizer. Baselines: test/benchmark/baselines.py;
-ours_oracle is given the true cases: it is not a baseline but an upper bound for the weights. Ratios are those of the
+ours_oracle is given the true cases: it is not a baseline but shows what the weights could reach. Ratios are those of the
 means over lidars and seeds, against the best baseline of that figure in that building. Seeds from 100 on were used in
 development; those from 200 on were not. Exit code 1 when a bar is missed.
 """
@@ -43,7 +43,9 @@ from glass_nav.localization.localizer import Estimate
 from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.vocabulary import CASES_IN_ORDER
 
-START_DEVIATION = np.array([0.1, 0.1, np.radians(3.0)])  # of the pose the localizers are told, and what they are told
+START_DEVIATION = np.array(
+    [0.1, 0.1, np.radians(3.0)]
+)  # of the pose that the localizers are given, and what they assume
 FIGURES = ("position_rmse_m", "position_median_m", "yaw_mean_deg")
 
 
@@ -163,12 +165,14 @@ def print_confusion(runs: Sequence[Run]) -> None:
     if not parts:
         return
     confusion = sum(parts, case_scores.none_yet()).confusion
-    print("| true \\ told | " + " | ".join(case.label for case in CASES_IN_ORDER) + " | beams |\n|---|" + "---|" * 6)
+    print(
+        "| true \\ reported | " + " | ".join(case.label for case in CASES_IN_ORDER) + " | beams |\n|---|" + "---|" * 6
+    )
     for true in CASES_IN_ORDER:
         row = confusion[true]
         print(
             f"| {true.label} | "
-            + " | ".join(f"{100 * row[told] / max(row.sum(), 1):.1f} %" for told in CASES_IN_ORDER)
+            + " | ".join(f"{100 * row[reported] / max(row.sum(), 1):.1f} %" for reported in CASES_IN_ORDER)
             + f" | {row.sum()} |"
         )
 
@@ -228,10 +232,10 @@ def print_surfaces(runs: Sequence[Run]) -> None:
         "| building | lidar | beams at panes | of them cut within 0.15 m | cut elsewhere | of the others cut | "
         "scans trusted |\n|" + "---|" * 7
     )
-    told = [each for each in runs if each.localizer == "ours" and each.surfaces is not None]
-    groups = unique((each.building, each.lidar) for each in told)
+    reported = [each for each in runs if each.localizer == "ours" and each.surfaces is not None]
+    groups = unique((each.building, each.lidar) for each in reported)
     for group in [*groups, ("all", "all")]:
-        parts = [each.surfaces for each in told if group in ((each.building, each.lidar), ("all", "all"))]
+        parts = [each.surfaces for each in reported if group in ((each.building, each.lidar), ("all", "all"))]
         figures = sum((part for part in parts if part is not None), SurfaceScores()).metrics()
         elsewhere = figures["at_pane_cut"] - figures["at_pane_cut_near"]
         print(

@@ -115,7 +115,7 @@ def main() -> int:
             share = result.metrics()["case_share"]
             rows.append({"log": name, "seed": seed, **agreement.summary(), "case_share": share})
             print(
-                f"| {name} | {seed} | {agreement.told} | {100 * agreement.wall_share:.2f} % | "
+                f"| {name} | {seed} | {agreement.reported} | {100 * agreement.wall_share:.2f} % | "
                 + (
                     f"{agreement.other} | {agreement.precision:.2f} | {agreement.recall:.2f}"
                     if other_m is not None

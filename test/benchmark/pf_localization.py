@@ -275,7 +275,7 @@ def run(job: Job) -> Dict[str, Any]:
         answer = localize(config, most_s)
     if len(answer.grid_from_base) != len(steps) and not answer.out_of_time:
         raise RuntimeError(
-            f"{name}: pf-localization got {len(steps)} scans and told {len(answer.grid_from_base)} poses"
+            f"{name}: pf-localization got {len(steps)} scans and reported {len(answer.grid_from_base)} poses"
         )
     map_from_base = se2.compose(track.grid_map.map_from_grid, answer.grid_from_base)
     way_m = np.array([step.way_m for step in steps[: len(map_from_base)]])

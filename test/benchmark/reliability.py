@@ -71,18 +71,18 @@ def without_guess(track: tracks.Track, rng: np.random.Generator) -> List[Told]:
 
 
 def _follow(localizer: Localizer, moments: List[tracks.Moment]) -> List[Told]:
-    told = []
+    reported = []
     for moment in moments:
         estimate = localizer.update(moment.scan, moment.odom_from_base)
         if estimate.updated:
-            told.append(
+            reported.append(
                 Told(
                     float(estimate.confidence),
                     tracks.is_right(estimate.map_from_base, moment.map_from_base),
                     estimate.state == LocalizationState.LOCALIZED,
                 )
             )
-    return told
+    return reported
 
 
 def run(job: Tuple[str, int]) -> List[Told]:
@@ -93,37 +93,39 @@ def run(job: Tuple[str, int]) -> List[Told]:
     return carried(track, rng) + started_wrong(track, rng) + without_guess(track, rng)
 
 
-def table(told: np.ndarray, right: np.ndarray) -> Tuple[List[str], float]:
+def table(reported: np.ndarray, right: np.ndarray) -> Tuple[List[str], float]:
     """Rows of the table, and the expected calibration error."""
-    which = np.clip(np.digitize(told, CLASSES) - 1, 0, len(CLASSES) - 2)
+    which = np.clip(np.digitize(reported, CLASSES) - 1, 0, len(CLASSES) - 2)
     rows, error = [], 0.0
     for index in range(len(CLASSES) - 1):
         chosen = which == index
         if chosen.any():
             rows.append(
-                f"| {CLASSES[index]:.1f} to {CLASSES[index + 1]:.1f} | {told[chosen].mean():.2f} | "
+                f"| {CLASSES[index]:.1f} to {CLASSES[index + 1]:.1f} | {reported[chosen].mean():.2f} | "
                 f"{right[chosen].mean():.2f} | {int(chosen.sum())} |"
             )
-            error += chosen.mean() * abs(told[chosen].mean() - right[chosen].mean())
+            error += chosen.mean() * abs(reported[chosen].mean() - right[chosen].mean())
     return rows, float(error)
 
 
-def draw(told: np.ndarray, right: np.ndarray, path: Path) -> None:
+def draw(reported: np.ndarray, right: np.ndarray, path: Path) -> None:
     """The reliability plot: reported against true, and how often each was reported."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    which = np.clip(np.digitize(told, CLASSES) - 1, 0, len(CLASSES) - 2)
+    which = np.clip(np.digitize(reported, CLASSES) - 1, 0, len(CLASSES) - 2)
     used = [index for index in range(len(CLASSES) - 1) if np.any(which == index)]
     figure, (axes, counts) = plt.subplots(2, 1, figsize=(5, 6), sharex=True, gridspec_kw={"height_ratios": [3, 1]})
-    axes.plot([0, 1], [0, 1], color="0.6", label="told = true")
-    axes.plot([told[which == index].mean() for index in used], [right[which == index].mean() for index in used], "o-")
+    axes.plot([0, 1], [0, 1], color="0.6", label="reported = true")
+    axes.plot(
+        [reported[which == index].mean() for index in used], [right[which == index].mean() for index in used], "o-"
+    )
     axes.set(ylabel="share of the poses that are right", ylim=(-0.02, 1.02))
     axes.legend()
-    counts.hist(told, bins=CLASSES, color="0.5")
-    counts.set(xlabel="reliability that is told", ylabel="poses", yscale="log")
+    counts.hist(reported, bins=CLASSES, color="0.5")
+    counts.set(xlabel="reliability that is reported", ylabel="poses", yscale="log")
     figure.tight_layout()
     figure.savefig(str(path), dpi=110)
 
@@ -142,21 +144,21 @@ def main() -> int:
         for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)
     ]
     with multiprocessing.Pool(arguments.jobs) as pool:
-        everything = [told for each in pool.imap(run, jobs) for told in each]
-    told = np.array([each.reliability for each in everything])
+        everything = [reported for each in pool.imap(run, jobs) for reported in each]
+    reported = np.array([each.reliability for each in everything])
     right = np.array([each.right for each in everything])
     localized = np.array([each.localized for each in everything])
-    rows, error = table(told, right)
-    print("| told | mean told | right | poses |\n|---|---|---|---|\n" + "\n".join(rows))
+    rows, error = table(reported, right)
+    print("| reported | mean reported | right | poses |\n|---|---|---|---|\n" + "\n".join(rows))
     print(
-        f"\nexpected calibration error {error:.3f} over {len(told)} poses; wrong among LOCALIZED "
+        f"\nexpected calibration error {error:.3f} over {len(reported)} poses; wrong among LOCALIZED "
         f"{np.mean(~right[localized]):.4f} of {int(localized.sum())}"
     )
     if arguments.out is not None:
         arguments.out.mkdir(parents=True, exist_ok=True)
-        draw(told, right, arguments.out / "reliability.png")
+        draw(reported, right, arguments.out / "reliability.png")
         (arguments.out / "reliability.json").write_text(
-            json.dumps({"error": error, "told": told.tolist(), "right": right.tolist()})
+            json.dumps({"error": error, "reported": reported.tolist(), "right": right.tolist()})
         )
     return 0
 

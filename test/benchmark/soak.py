@@ -301,8 +301,10 @@ class Soak:
 
         if self._last_tf is None:
             return math.inf
-        told = se2.compose(conversions.planar_from_transform(self._last_tf[1]), self._simulation.reading.odom_from_base)
-        return float(np.hypot(*(told - self._simulation.map_from_base)[:2]))
+        reported = se2.compose(
+            conversions.planar_from_transform(self._last_tf[1]), self._simulation.reading.odom_from_base
+        )
+        return float(np.hypot(*(reported - self._simulation.map_from_base)[:2]))
 
     def _status(self, name: str) -> int:
         """A figure of the node's process; 0 once it is gone."""

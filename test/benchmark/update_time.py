@@ -160,7 +160,7 @@ def main() -> int:
     for name, each in found.items():
         if name != CLASSIFY:
             print(f"  {name:28s} {each:6.1f}   ours is {found['ours'] / each:.2f} times that")
-    print(f"  {arguments.classified_beams} beams classified, told and cut: {found[CLASSIFY]:.1f} ms")
+    print(f"  {arguments.classified_beams} beams classified, reported and cut: {found[CLASSIFY]:.1f} ms")
     limits += [
         (
             f"{arguments.limit_ratio:g} times the same filter with the field's weights",

@@ -229,7 +229,7 @@ def run(job: Job) -> Dict[str, Any]:
     }
 
 
-def told(found: Dict[str, Any]) -> str:
+def reported(found: Dict[str, Any]) -> str:
     """One run in one line."""
     verdict = ", right" if found["right"] else ", WRONG" if found["wrong"] else ""
     return (
@@ -306,7 +306,7 @@ def main() -> None:
     with ProcessPoolExecutor(arguments.jobs) as pool:
         for found in pool.map(run, jobs):
             runs.append(found)
-            print(told(found), file=sys.stderr, flush=True)
+            print(reported(found), file=sys.stderr, flush=True)
             if arguments.out:
                 arguments.out.write_text(json.dumps(runs, indent=1))
     print(

@@ -41,11 +41,12 @@ class WiredRobot:
     def __init__(
         self, simulation: Simulation, driver_params: DriveParams, atlas: Atlas, session: SearchSession
     ) -> None:
-        """Args:
-        simulation: of the robot.
-        driver_params: of its driver.
-        atlas: for goals.
-        session: of the search, not started yet.
+        """
+        Args:
+            simulation: of the robot.
+            driver_params: of its driver.
+            atlas: for goals.
+            session: of the search, not started yet.
         """
         self.simulation, self.session = simulation, session
         self.driver = Driver(driver_params, atlas=atlas, now_s=simulation.stamp_ns * 1e-9)

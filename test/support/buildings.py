@@ -30,9 +30,10 @@ class Building:
         panes: Sequence[Tuple[float, ...]] = (),
         walls: Sequence[Tuple[float, ...]] = (),
     ) -> None:
-        """Args:
-        outline: corners of the outer wall, in order.
-        panes, walls: x0, y0, x1, y1 of what stands inside.
+        """
+        Args:
+            outline: corners of the outer wall, in order.
+            panes, walls: x0, y0, x1, y1 of what stands inside.
         """
         corners = np.array(outline, float)
         outer = np.hstack([corners, np.roll(corners, -1, axis=0)])

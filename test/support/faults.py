@@ -67,10 +67,12 @@ def scans(change: Callable[[int, Any], Any]) -> Change:
             if topic != "/scan":
                 changed.append((topic, heard_ns, message))
                 continue
-            told = change(index, copy.deepcopy(message))
+            reported = change(index, copy.deepcopy(message))
             index += 1
             changed += [
-                (topic, heard_ns, each) for each in (told if isinstance(told, list) else [told]) if each is not None
+                (topic, heard_ns, each)
+                for each in (reported if isinstance(reported, list) else [reported])
+                if each is not None
             ]
         return changed
 
@@ -93,9 +95,9 @@ def links(change: Callable[[int, Any], Any], child: str = "base_link") -> Change
                 if each.child_frame_id.lstrip("/") != child:
                     kept.append(each)
                     continue
-                told = change(index, each)
+                reported = change(index, each)
                 index += 1
-                kept += [one for one in (told if isinstance(told, list) else [told]) if one is not None]
+                kept += [one for one in (reported if isinstance(reported, list) else [reported]) if one is not None]
             message.transforms = kept
             changed.append((topic, heard_ns, message))
         return changed
@@ -157,16 +159,16 @@ def with_planar(transform: Any, pose: np.ndarray) -> Any:
 
 def odometry_steps(change: Callable[[np.ndarray], np.ndarray]) -> Change:
     """change(step) of each step (3,) from one transform odom -> base to the next, in the robot's frame."""
-    state: Dict[str, Optional[np.ndarray]] = {"true": None, "told": None}
+    state: Dict[str, Optional[np.ndarray]] = {"true": None, "reported": None}
 
     def each(_: int, transform: Any) -> Any:
         pose = planar(transform)
         if state["true"] is None:
-            state["told"] = pose
+            state["reported"] = pose
         else:
             step = se2.compose(se2.inverse(state["true"]), pose)
-            state["told"] = se2.compose(state["told"], change(step))
+            state["reported"] = se2.compose(state["reported"], change(step))
         state["true"] = pose
-        return with_planar(transform, state["told"])
+        return with_planar(transform, state["reported"])
 
     return links(each)

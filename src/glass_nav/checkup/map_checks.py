@@ -29,9 +29,10 @@ class ScansOnMap:
     """Scans of one lidar, looked for in one map."""
 
     def __init__(self, grid_map: GridMap, points_m: Sequence[np.ndarray]) -> None:
-        """Args:
-        grid_map: with free and occupied cells.
-        points_m: of each scan, (B, 2) finite end points in the robot's frame.
+        """
+        Args:
+            grid_map: with free and occupied cells.
+            points_m: of each scan, (B, 2) finite end points in the robot's frame.
         """
         usable = [points for points in points_m if len(points) >= _MIN_POINTS]
         chosen = np.unique(np.linspace(0, len(usable) - 1, SCANS).astype(int)) if usable else []

@@ -39,8 +39,9 @@ class EarlierScan:
     """A scan that others are laid over."""
 
     def __init__(self, points_m: np.ndarray) -> None:
-        """Args:
-        points_m: (B, 2) finite end points in the lidar's frame.
+        """
+        Args:
+            points_m: (B, 2) finite end points in the lidar's frame.
         """
         low, high = points_m.min(axis=0) - 1.0, points_m.max(axis=0) + 1.0
         columns, rows = np.ceil((high - low) / CELL_M).astype(int)

@@ -74,12 +74,13 @@ class Driver:
         backend: Optional[TaskTo] = None,
         now_s: float = 0.0,
     ) -> None:
-        """Args:
-        p: of the driver.
-        names: of the inputs, for people.
-        atlas: for goals in its map; None: there is none.
-        backend: drives to poses of the map; None: the driver itself does, along the edges of the atlas.
-        now_s: the time.
+        """
+        Args:
+            p: of the driver.
+            names: of the inputs, for people.
+            atlas: for goals in its map; None: there is none.
+            backend: drives to poses of the map; None: the driver itself does, along the edges of the atlas.
+            now_s: the time.
         """
         self._p, self._rules = p, p.rules
         self._edge = EdgeDriver(p.edge)

@@ -39,12 +39,13 @@ class PlaceTasks:
     def __init__(
         self, p: DriveParams, driver: EdgeDriver, map_frame: str, atlas: Optional[Atlas], backend: Optional[TaskTo]
     ) -> None:
-        """Args:
-        p: of the driver.
-        driver: that sees the obstacles.
-        map_frame: in which poses must be given.
-        atlas: None: there is none.
-        backend: drives to poses in place of our own route follower; None: ours does.
+        """
+        Args:
+            p: of the driver.
+            driver: that sees the obstacles.
+            map_frame: in which poses must be given.
+            atlas: None: there is none.
+            backend: drives to poses in place of our own route follower; None: ours does.
         """
         self._p, self._driver, self._map_frame, self._atlas, self._backend = p, driver, map_frame, atlas, backend
         self._map: Optional[GridMap] = None

@@ -45,11 +45,12 @@ class RouteFollower:
         p: RouteFollowerParams = RouteFollowerParams(),
         final_yaw_rad: Optional[float] = None,
     ) -> None:
-        """Args:
-        points_m: (M, 2), M >= 1.
-        limits: of the base.
-        p: how.
-        final_yaw_rad: to stand with at the end; None: as it comes.
+        """
+        Args:
+            points_m: (M, 2), M >= 1.
+            limits: of the base.
+            p: how.
+            final_yaw_rad: to stand with at the end; None: as it comes.
         """
         points = polyline.distinct(np.asarray(points_m, float))
         self._end_m = points[-1]

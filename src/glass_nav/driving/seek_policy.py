@@ -7,8 +7,9 @@ class SeekPolicy:
     """Told what happens to the robot, it says whether to seek; only so often in a row without success."""
 
     def __init__(self, attempts: int) -> None:
-        """Args:
-        attempts: tasks of the search that may fail in a row, >= 1; then it is for others to go on.
+        """
+        Args:
+            attempts: tasks of the search that may fail in a row, >= 1; then it is for others to go on.
         """
         self._attempts = attempts
         self.reset()

@@ -84,7 +84,8 @@ class EdgeTask:
         rank: Optional[int] = None,
         may_choose: bool = False,
     ) -> None:
-        """Args:
+        """
+        Args:
             driver: asked at once to seek or to leave.
             p: of the recovery.
             limits: of the base.
@@ -196,14 +197,15 @@ class GoTask:
         goal: "int | np.ndarray",
         final_yaw_rad: Optional[float] = None,
     ) -> None:
-        """Args:
-        planner: of the atlas.
-        driver: that sees the obstacles.
-        follower: how routes are followed.
-        p: of the recovery.
-        limits: of the base.
-        goal: a node, or a point (2,) of the map.
-        final_yaw_rad: to stand with; None: as it comes.
+        """
+        Args:
+            planner: of the atlas.
+            driver: that sees the obstacles.
+            follower: how routes are followed.
+            p: of the recovery.
+            limits: of the base.
+            goal: a node, or a point (2,) of the map.
+            final_yaw_rad: to stand with; None: as it comes.
         """
         self._planner, self._driver, self._follower_params, self._limits = planner, driver, follower, limits
         self._recovery, self._stall = Recovery(p, limits), Stall()

@@ -9,8 +9,9 @@ class Polyline:
     """Straight pieces from point to point."""
 
     def __init__(self, points: np.ndarray) -> None:
-        """Args:
-        points: (W, 2), at least two, consecutive ones different; see distinct().
+        """
+        Args:
+            points: (W, 2), at least two, consecutive ones different; see distinct().
         """
         self.points = points
         self._lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)

@@ -33,7 +33,8 @@ class SegmentIndex:
     """Segments, prepared for many queries."""
 
     def __init__(self, segments: np.ndarray, square: float = 0.25, margin: float = 2.0) -> None:
-        """Args:
+        """
+        Args:
             segments: (S, 4) x1 y1 x2 y2; S = 0 is allowed.
             square: edge length of the squares.
             margin: how far the squares reach beyond the segments; points further out are looked up slowly.

@@ -90,10 +90,11 @@ class GlobalSearch:
     """Follows all candidates until one is far ahead."""
 
     def __init__(self, matcher: ScanMatcher, field: DistanceField, params: SearchParams) -> None:
-        """Args:
-        matcher: of the whole map or a part.
-        field: of the map.
-        params: when a place is accepted.
+        """
+        Args:
+            matcher: of the whole map or a part.
+            field: of the map.
+            params: when a place is accepted.
         """
         self._matcher, self._field, self._params = matcher, field, params
         self._tracker = PoseTracker(_MAX_BEHIND, _MAX_CANDIDATES)

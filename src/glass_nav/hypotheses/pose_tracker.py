@@ -20,9 +20,10 @@ class PoseTracker:
     """Carries poses by odometry and keeps the best of those that have become one; what a pose scored is its owner's."""
 
     def __init__(self, max_behind: float, max_poses: int) -> None:
-        """Args:
-        max_behind: a pose whose score is further behind the best is dropped.
-        max_poses: that are kept.
+        """
+        Args:
+            max_behind: a pose whose score is further behind the best is dropped.
+            max_poses: that are kept.
         """
         self.poses = np.zeros((0, 3))  # (K, 3) map_from_base
         self._max_behind, self._max_poses = max_behind, max_poses

@@ -35,7 +35,8 @@ class ScanMatcher:
     """Matches scans against every pose in the free cells of one map."""
 
     def __init__(self, grid_map: GridMap, field: DistanceField, area: Optional[np.ndarray] = None) -> None:
-        """Args:
+        """
+        Args:
             grid_map: the robot is in one of its free cells.
             field: of that map.
             area: (H, W) bool: in one of these cells, None: anywhere.

@@ -37,9 +37,10 @@ class LocalizationHealth:
     """The entries about one situation; some cover the time since the last report."""
 
     def __init__(self, warn_deviations: np.ndarray, counts: ScanCounts) -> None:
-        """Args:
-        warn_deviations: (3,) standard deviations of x [m], y [m], yaw [rad] above which the pose is a warning.
-        counts: of the scans, as they go on.
+        """
+        Args:
+            warn_deviations: (3,) standard deviations of x [m], y [m], yaw [rad] above which the pose is a warning.
+            counts: of the scans, as they go on.
         """
         self.warn_deviations = warn_deviations
         self._counts, self._reported = counts, replace(counts)

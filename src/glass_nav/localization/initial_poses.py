@@ -34,11 +34,12 @@ class InitialPoses:
     """The start that was asked for last, until there is a scan to make it with."""
 
     def __init__(self, default: StartPose, start_without_guess: bool, file: PoseFile, odometry_at: OdometryAt) -> None:
-        """Args:
-        default: where to start if nothing else is known.
-        start_without_guess: search the whole map then instead.
-        file: the pose of the last run.
-        odometry_at: moves a given pose forward to the scan that it meets.
+        """
+        Args:
+            default: where to start if nothing else is known.
+            start_without_guess: search the whole map then instead.
+            file: the pose of the last run.
+            odometry_at: moves a given pose forward to the scan that it meets.
         """
         self._file, self._odometry_at = file, odometry_at
         self._waiting: Optional[_Waiting] = None

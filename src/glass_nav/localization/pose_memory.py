@@ -20,10 +20,11 @@ class PoseMemory:
     """Keeps poses that can be trusted: none while the robot is lost or being searched for."""
 
     def __init__(self, file: PoseFile, keep: Callable[[SavedPose], None], warn: Callable[[str], None]) -> None:
-        """Args:
-        file: where the pose is written.
-        keep: called with every pose that is due, whether or not the file needs it.
-        warn: called with a line if something fails with an OSError.
+        """
+        Args:
+            file: where the pose is written.
+            keep: called with every pose that is due, whether or not the file needs it.
+            warn: called with a line if something fails with an OSError.
         """
         self._path = file.path if file.pose_file else None
         self._keep, self._warn = keep, warn

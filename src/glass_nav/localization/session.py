@@ -55,12 +55,13 @@ class LocalizationSession:
         now_s: float,
         on_start_over: Callable[[], None],
     ) -> None:
-        """Args:
-        params: as the node was started with.
-        odometry_at: moves a given pose forward to the scan that it meets.
-        time_is_simulated: a jump back means that the robot starts over too.
-        now_s: ROS time.
-        on_start_over: called whenever the pose that was known no longer holds.
+        """
+        Args:
+            params: as the node was started with.
+            odometry_at: moves a given pose forward to the scan that it meets.
+            time_is_simulated: a jump back means that the robot starts over too.
+            now_s: ROS time.
+            on_start_over: called whenever the pose that was known no longer holds.
         """
         self._params, self._time_is_simulated, self._on_start_over = params, time_is_simulated, on_start_over
         self._rng = params.rules.rng

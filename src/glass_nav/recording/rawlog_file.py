@@ -105,10 +105,11 @@ class _RecordTransforms(Transforms):
         odometry: "Union[Trajectory, np.ndarray]",
         laser_pose: Optional[Tuple[float, float, float]],
     ) -> None:
-        """Args:
-        sensor_pose: x, y, z [m], yaw, pitch, roll [rad] on the robot.
-        odometry: stamped, or the pose (3,) at the record.
-        laser_pose: x, y, yaw to be used instead of the record's.
+        """
+        Args:
+            sensor_pose: x, y, z [m], yaw, pitch, roll [rad] on the robot.
+            odometry: stamped, or the pose (3,) at the record.
+            laser_pose: x, y, yaw to be used instead of the record's.
         """
         self._sensor_pose, self._odometry, self._laser_pose = sensor_pose, odometry, laser_pose
 

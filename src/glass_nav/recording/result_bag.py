@@ -44,9 +44,10 @@ class ResultBag(MessageWriter):
     OWN_TYPES = {"glass_nav/msg/LocalizationStatus": STATUS, "glass_nav/msg/BeamCases": BEAM_CASES}
 
     def __init__(self, path: Path, frames: "Tuple[str, str, str]") -> None:
-        """Args:
-        path: of the bag.
-        frames: names of map, odom and base.
+        """
+        Args:
+            path: of the bag.
+            frames: names of map, odom and base.
         """
         super().__init__(path)
         self._map, self._odom, self._base = frames

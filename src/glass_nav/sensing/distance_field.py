@@ -21,9 +21,10 @@ class DistanceField:
     """Distance to the centre of the nearest wall cell, cut at max_distance_m, bilinear between cells."""
 
     def __init__(self, grid_map: GridMap, max_distance_m: float = 2.0) -> None:
-        """Args:
-        grid_map: map without an occupied cell is allowed; all distances are max_distance_m then.
-        max_distance_m: distances beyond it are this one; the gradient is 0 there.
+        """
+        Args:
+            grid_map: map without an occupied cell is allowed; all distances are max_distance_m then.
+            max_distance_m: distances beyond it are this one; the gradient is 0 there.
         """
         occupied = grid_map.occupied
         if occupied.any():

@@ -64,7 +64,8 @@ class RayCaster:
     """Casts rays on one map. Safe to share between threads."""
 
     def __init__(self, grid_map: GridMap, backend: str = "exact", threads: int = 1, unknown: str = "pass") -> None:
-        """Args:
+        """
+        Args:
             grid_map: cells of at least OCCUPIED_PERCENT end a ray.
             backend: "exact" leaps by the chessboard distance; "mrpt" is MRPT's simulateScanRay with its known faults
                 corrected, slower, for comparison.

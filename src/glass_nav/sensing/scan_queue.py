@@ -37,11 +37,12 @@ class ScanQueue:
     def __init__(
         self, placement: ScanPlacement, max_wait_s: float, now_s: float, warn: Callable[[str, float], None]
     ) -> None:
-        """Args:
-        placement: where the scans get their transforms.
-        max_wait_s: a scan that lacks a transform for longer is dropped.
-        now_s: the time.
-        warn: called with a warning, and with the time [s] in which one of its kind is enough.
+        """
+        Args:
+            placement: where the scans get their transforms.
+            max_wait_s: a scan that lacks a transform for longer is dropped.
+            now_s: the time.
+            warn: called with a warning, and with the time [s] in which one of its kind is enough.
         """
         self._placement, self._max_wait_s, self._warn = placement, max_wait_s, warn
         self.last_arrival_s = now_s

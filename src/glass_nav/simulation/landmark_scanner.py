@@ -80,10 +80,11 @@ class LandmarkScanner:
     """The emitter on its robot: step() it as time advances."""
 
     def __init__(self, model: ScannerModel, building: Building, start_ns: int = 0) -> None:
-        """Args:
-        model: of the emitter.
-        building: with its tags.
-        start_ns: time of the first move.
+        """
+        Args:
+            model: of the emitter.
+            building: with its tags.
+            start_ns: time of the first move.
         """
         self._model, self._building = model, building
         self._move_ns = round(model.move_s * 1e9)

@@ -50,9 +50,10 @@ class Odometry:
     """Integrates what the wheels of one robot report; the frame odom is its start."""
 
     def __init__(self, p: OdometryParams, kind: str, rng: np.random.Generator) -> None:
-        """Args:
-        kind: of the base, "diff" or "omni".
-        rng: draws this robot's wheels and everything that happens to them.
+        """
+        Args:
+            kind: of the base, "diff" or "omni".
+            rng: draws this robot's wheels and everything that happens to them.
         """
         self._p, self._kind, self._rng = p, kind, rng
         radius, mismatch, base = rng.normal(size=3) * [p.wheel_radius_sigma, p.wheel_mismatch_sigma, p.wheel_base_sigma]
@@ -61,11 +62,11 @@ class Odometry:
         # skews forward motion to the left and back.
         half_m = 0.5 * p.wheel_base_m
         if kind == "diff":
-            self._told_by_made = np.array(
+            self._reported_by_made = np.array(
                 [[forward, 0.0, mismatch * half_m], [0.0, 0.0, 0.0], [mismatch / half_m, 0.0, turn]]
             )
         else:
-            self._told_by_made = np.array(
+            self._reported_by_made = np.array(
                 [[forward, mismatch, 0.0], [-mismatch, forward, 0.0], [mismatch / half_m, 0.0, turn]]
             )
         self.odom_from_base = np.zeros(3)
@@ -78,21 +79,21 @@ class Odometry:
         draws = self._rng.random(DRAWS)
         normals = _normal(draws[:2], draws[2:4])  # 4 of them
         way_m, turn_rad = math.hypot(twist[0], twist[1]), abs(float(twist[2]))
-        told = self._told_by_made @ twist
-        told[0] += p.slip_m_per_sqrt_m * math.sqrt(way_m) * normals[0]
+        reported = self._reported_by_made @ twist
+        reported[0] += p.slip_m_per_sqrt_m * math.sqrt(way_m) * normals[0]
         if self._kind == "omni":
-            told[1] += p.slip_m_per_sqrt_m * math.sqrt(way_m) * normals[1]
-        told[2] += (
+            reported[1] += p.slip_m_per_sqrt_m * math.sqrt(way_m) * normals[1]
+        reported[2] += (
             p.slip_rad_per_sqrt_m * math.sqrt(way_m) * normals[2]
             + p.slip_rad_per_sqrt_rad * math.sqrt(turn_rad) * normals[3]
         )
         if draws[4] < p.slip_event_per_m * way_m:
             self._spin, self._spin_left_s = self._spinning(draws[5], draws[6]) / SPIN_S, SPIN_S
         spun_s = min(dt_s, self._spin_left_s)
-        told += spun_s * self._spin
+        reported += spun_s * self._spin
         self._spin_left_s -= spun_s
-        self.odom_from_base = moved(self.odom_from_base, told)
-        self.velocity = told / dt_s
+        self.odom_from_base = moved(self.odom_from_base, reported)
+        self.velocity = reported / dt_s
 
     def _spinning(self, how_far: float, which: float) -> np.ndarray:
         """(3,) reported by one wheel that spins in place; both draws are in [0, 1)."""

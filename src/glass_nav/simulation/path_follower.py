@@ -51,7 +51,8 @@ class PathFollower:
     def __init__(
         self, waypoints_m: np.ndarray, robot: RobotParams, p: PathFollowerParams = PathFollowerParams()
     ) -> None:
-        """Args:
+        """
+        Args:
             waypoints_m: (W, 2) in the frame map; repeated points are dropped.
 
         Raises:

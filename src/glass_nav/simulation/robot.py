@@ -48,8 +48,9 @@ class Obstacles:
     """Obstacles on the floor as segments: how near is the nearest?"""
 
     def __init__(self, segments_m: np.ndarray) -> None:
-        """Args:
-        segments_m: (S, 2, 2) both ends of each segment, in the frame map; S may be 0.
+        """
+        Args:
+            segments_m: (S, 2, 2) both ends of each segment, in the frame map; S may be 0.
         """
         segments_m = np.asarray(segments_m, float).reshape(-1, 2, 2)
         self._start_m = segments_m[:, 0]

@@ -83,7 +83,8 @@ class Simulation:
         scanner: Optional[ScannerModel] = None,
         base_from_emitter: "Union[Tuple[float, float, float], np.ndarray]" = EMITTER,
     ) -> None:
-        """Args:
+        """
+        Args:
             base_from_laser: (3,) where the laser sits.
             seed: >= 0.
             changed_share: of the movable things that were moved since the map was drawn.

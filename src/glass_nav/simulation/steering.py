@@ -30,10 +30,11 @@ class Steering:
     """A fresh command takes precedence over the path; a path begins once somebody listens."""
 
     def __init__(self, follower: Optional[PathFollower], repeat: bool, wait_for_answer: bool) -> None:
-        """Args:
-        follower: of the path, None: commands only.
-        repeat: drive back and forth along the path forever.
-        wait_for_answer: a listener must have answered with its pose.
+        """
+        Args:
+            follower: of the path, None: commands only.
+            repeat: drive back and forth along the path forever.
+            wait_for_answer: a listener must have answered with its pose.
         """
         self._follower, self._repeat, self._wait_for_answer = follower, repeat, wait_for_answer
         self._command, self._command_until_ns = np.zeros(3), 0

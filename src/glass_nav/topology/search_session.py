@@ -129,10 +129,11 @@ class SearchSession:
     """One search at a time, for as long as the node runs; start() first."""
 
     def __init__(self, read_atlas: ReadAtlas, p: SessionParams, search: SearchParams) -> None:
-        """Args:
-        read_atlas: reads the atlas to use now, at the start and whenever it is to be read again.
-        p: of the session.
-        search: how each search is done.
+        """
+        Args:
+            read_atlas: reads the atlas to use now, at the start and whenever it is to be read again.
+            p: of the session.
+            search: how each search is done.
         """
         self._read_atlas = read_atlas
         self._p, self._search_params = p, search

@@ -31,8 +31,8 @@ class CaseScores:
     def metrics(self) -> Dict[str, Any]:
         """The figures under the names of metrics.json, lists by case 0..4."""
         right, total = np.diag(self.confusion), int(self.confusion.sum())
-        true, told = self.confusion.sum(axis=1), self.confusion.sum(axis=0)
-        f1 = [_share(2 * hit, here + there) for hit, here, there in zip(right, true, told)]
+        true, reported = self.confusion.sum(axis=1), self.confusion.sum(axis=0)
+        f1 = [_share(2 * hit, here + there) for hit, here, there in zip(right, true, reported)]
         present = [case for case in range(CASES) if true[case] and true[case] >= MIN_SHARE * total]
         return {
             "beams": total,
@@ -41,11 +41,11 @@ class CaseScores:
             "accuracy_answered": _share(np.diag(self.answered).sum(), self.answered.sum()),
             "macro_f1": float(np.mean([f1[case] or 0.0 for case in present])) if present else None,
             "macro_f1_cases": present,
-            "precision": [_share(hit, there) for hit, there in zip(right, told)],
+            "precision": [_share(hit, there) for hit, there in zip(right, reported)],
             "recall": [_share(hit, here) for hit, here in zip(right, true)],
             "f1": f1,
             "true_share": [_share(here, total) for here in true],
-            "told_share": [_share(there, total) for there in told],
+            "told_share": [_share(there, total) for there in reported],
             "used_share": _share(self.answered[:, 1:].sum(), self.answered.sum()),
             "confusion": self.confusion.tolist(),
         }
@@ -81,25 +81,25 @@ def none_yet() -> CaseScores:
     return CaseScores(np.zeros((CASES, CASES), np.int64), np.zeros((CASES, CASES), np.int64))
 
 
-def of_cases(true: np.ndarray, told: np.ndarray, answered: np.ndarray) -> CaseScores:
+def of_cases(true: np.ndarray, reported: np.ndarray, answered: np.ndarray) -> CaseScores:
     """Scores of beams of any shape.
 
     Args:
-        true, told: (...) uint8 cases 0..4.
+        true, reported: (...) uint8 cases 0..4.
         answered: (...) bool, the beam came back with a range.
 
     Raises:
         ValueError: shapes that differ, or a case that there is not.
     """
-    true, told = np.asarray(true), np.asarray(told)
-    if not true.shape == told.shape == np.shape(answered):
+    true, reported = np.asarray(true), np.asarray(reported)
+    if not true.shape == reported.shape == np.shape(answered):
         raise ValueError(
-            f"expected as many true as told cases and answers, got {true.shape}, {told.shape}, {np.shape(answered)}"
+            f"expected as many true as reported cases and answers, got {true.shape}, {reported.shape}, {np.shape(answered)}"
         )
-    for name, cases in (("true", true), ("told", told)):
+    for name, cases in (("true", true), ("reported", reported)):
         if cases.size and not (cases.min() >= 0 and cases.max() < CASES):
             raise ValueError(f"{name} cases must be 0 to {CASES - 1}, got {int(cases.min())} to {int(cases.max())}")
-    pair = CASES * true.astype(np.int64) + told
+    pair = CASES * true.astype(np.int64) + reported
     return CaseScores(_counts(pair), _counts(pair[np.asarray(answered, bool)]))
 
 

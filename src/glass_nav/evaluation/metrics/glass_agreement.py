@@ -17,15 +17,15 @@ NEAR_M = 0.15
 class GlassAgreement:
     """How far two lists of glass cells are the same."""
 
-    told: int  # cells called glass
+    reported: int  # cells called glass
     other: int  # cells that the other opinion calls glass
-    precision: float  # share of the told that have one of the other's near; NaN: none told
-    recall: float  # share of the other's that have a told one near; NaN: the other has none
+    precision: float  # share of those that have one of the other's near; NaN: none reported
+    recall: float  # share of the other's that have a reported one near; NaN: the other has none
     wall_share: float  # of the wall cells that are called glass; NaN: no walls
 
     def summary(self) -> Dict[str, Any]:
         return {
-            "glass_cells": self.told,
+            "glass_cells": self.reported,
             "other_cells": self.other,
             "precision": self.precision,
             "recall": self.recall,
@@ -34,7 +34,7 @@ class GlassAgreement:
 
 
 def of(told_m: np.ndarray, other_m: np.ndarray, wall_cells: int, near_m: float = NEAR_M) -> GlassAgreement:
-    """Compare cells told (N, 2) and the other's (M, 2) [m], on a map with so many wall cells."""
+    """Compare cells reported (N, 2) and the other's (M, 2) [m], on a map with so many wall cells."""
     return GlassAgreement(
         len(told_m),
         len(other_m),

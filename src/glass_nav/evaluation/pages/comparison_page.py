@@ -44,11 +44,11 @@ def headline(compared: Comparison) -> str:
     words = []
     for name in others:
         difference = compared.difference(name, figure)
-        told = comparison.judged(figure, difference)
-        if told in ("better", "worse"):
-            words.append(f"{name} is {told} than {first}")
-        elif told:
-            words.append(f"{name} and {first} are {told}")
+        verdict = comparison.judged(figure, difference)
+        if verdict in ("better", "worse"):
+            words.append(f"{name} is {verdict} than {first}")
+        elif verdict:
+            words.append(f"{name} and {first} are {verdict}")
         else:
             words.append(f"{name} against {first}")
         if difference is not None:

@@ -48,9 +48,9 @@ def _case_lines(scores: Optional[Dict[str, Any]]) -> List[str]:
         f"  {'':22s}{'true':>9s}{'reported':>9s}{'precision':>11s}{'recall':>8s}{'F1':>8s}",
     ]
     for case in CASES_IN_ORDER:
-        share, told = (100 * (scores[key][case] or 0.0) for key in ("true_share", "told_share"))
+        share, reported = (100 * (scores[key][case] or 0.0) for key in ("true_share", "told_share"))
         precision, recall, f1 = (_figure(scores[key][case]) for key in ("precision", "recall", "f1"))
-        lines.append(f"  {case.label:22s}{share:7.1f} %{told:7.1f} %{precision:>11s}{recall:>8s}{f1:>8s}")
+        lines.append(f"  {case.label:22s}{share:7.1f} %{reported:7.1f} %{precision:>11s}{recall:>8s}{f1:>8s}")
     return lines
 
 

@@ -16,15 +16,15 @@ def draw_confusion(axes: Any, confusion: np.ndarray) -> None:
     share = confusion / np.maximum(confusion.sum(axis=1, keepdims=True), 1)
     axes.imshow(share, cmap="Blues", vmin=0.0, vmax=1.0)
     for true, row in enumerate(confusion):
-        for told, count in enumerate(row):
+        for reported, count in enumerate(row):
             axes.text(
-                told,
+                reported,
                 true,
-                f"{100 * share[true, told]:.1f} %\n{count}" if row.any() else "-",
+                f"{100 * share[true, reported]:.1f} %\n{count}" if row.any() else "-",
                 ha="center",
                 va="center",
                 fontsize=8,
-                color="white" if share[true, told] > 0.6 else "black",
+                color="white" if share[true, reported] > 0.6 else "black",
             )
     axes.set_xticks(range(len(labels)))
     axes.set_xticklabels(labels, rotation=30, ha="right", fontsize=8)

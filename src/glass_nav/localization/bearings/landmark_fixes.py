@@ -58,8 +58,9 @@ class LandmarkFixes:
     """
 
     def __init__(self, landmarks: LandmarkMap, p: FixParams, limits: TriangulationLimits, drift: OdometryDrift) -> None:
-        """Raises:
-        ValueError: fewer than three landmarks.
+        """
+        Raises:
+            ValueError: fewer than three landmarks.
         """
         if len(landmarks) < 3:
             raise ValueError(f"three landmarks are needed for a position, it has {len(landmarks)}")

@@ -73,11 +73,12 @@ class KidnapDetector:
         params: SearchParams,
         usual_fit: Optional[float] = None,
     ) -> None:
-        """Args:
-        field: of the map.
-        matcher: makes the one that searches everywhere; called at its first use. None: the map has no free cell.
-        params: whether and when another place is accepted.
-        usual_fit: of scans at the pose; None: not known yet.
+        """
+        Args:
+            field: of the map.
+            matcher: makes the one that searches everywhere; called at its first use. None: the map has no free cell.
+            params: whether and when another place is accepted.
+            usual_fit: of scans at the pose; None: not known yet.
         """
         self._field, self._matcher, self._params = field, matcher, params
         self._usual, self._spread = _USUAL_FIT if usual_fit is None else usual_fit, _USUAL_SPREAD

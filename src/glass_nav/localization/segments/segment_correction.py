@@ -87,7 +87,8 @@ class SegmentCorrector:
     """The walls of one map, prepared for correcting many poses."""
 
     def __init__(self, segments_m: np.ndarray, params: SegmentCorrectionParams = SegmentCorrectionParams()) -> None:
-        """Args:
+        """
+        Args:
             segments_m: (S, 4) x1 y1 x2 y2 [m] in map, as world/wall_segments.py gives them; S = 0 is allowed.
             params: how to correct.
 

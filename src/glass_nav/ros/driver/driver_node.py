@@ -75,8 +75,9 @@ class DriverNode:
     """Wiring only: messages in, events of the driver; its decisions, messages out."""
 
     def __init__(self, p: DriverParams) -> None:
-        """Raises:
-        ValueError, OSError: the atlas cannot be used; one line.
+        """
+        Raises:
+            ValueError, OSError: the atlas cannot be used; one line.
         """
         self._p = p.node
         self._clock = LoopClock()

@@ -46,11 +46,12 @@ class MoveBaseTask:
     needs_pose, steers = True, False
 
     def __init__(self, move_base: MoveBase, map_from_goal: np.ndarray, frame: str, wait_s: float) -> None:
-        """Args:
-        move_base: that drives.
-        map_from_goal: (3,).
-        frame: of the map.
-        wait_s: for the action server, by the wall clock.
+        """
+        Args:
+            move_base: that drives.
+            map_from_goal: (3,).
+            frame: of the map.
+            wait_s: for the action server, by the wall clock.
         """
         self._move_base, self._goal, self._frame = move_base, map_from_goal, frame
         self._wait_s, self._began_s = wait_s, time.monotonic()

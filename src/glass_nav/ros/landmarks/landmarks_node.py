@@ -84,9 +84,10 @@ class LandmarksNode:
     """Wiring only: bearings in, one call of the core, a pose out."""
 
     def __init__(self, p: LandmarksNodeParams) -> None:
-        """Raises:
-        LandmarkError: the landmark file is unusable; one line.
-        ValueError: it has fewer than three landmarks.
+        """
+        Raises:
+            LandmarkError: the landmark file is unusable; one line.
+            ValueError: it has fewer than three landmarks.
         """
         self._p = p.node
         self._landmarks: LandmarkMap = landmark_file.load(self._p.landmark_file)

@@ -25,8 +25,9 @@ class BearingInput:
     """Stores bearings until a scan that is not older, and logs unusable ones; inactive without ~landmark_file."""
 
     def __init__(self, p: LocalizationNodeParams, tf: tf2_ros.Buffer, log: LogThrottle) -> None:
-        """Raises:
-        LandmarkError: the landmark file is unusable; one line.
+        """
+        Raises:
+            LandmarkError: the landmark file is unusable; one line.
         """
         self._p, self._tf, self._log = p, tf, log
         self._landmarks = landmark_file.load(p.landmark_file) if p.landmark_file else landmark_map.NONE

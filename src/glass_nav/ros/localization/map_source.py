@@ -23,10 +23,11 @@ class MapSource:
     """Requests the first map, and passes on every valid map."""
 
     def __init__(self, p: LocalizationNodeParams, log: LogThrottle, use: UseMap) -> None:
-        """Args:
-        p: whether the map comes by topic, and whether newer ones count.
-        log: limits the lines of repeated attempts.
-        use: called with each map.
+        """
+        Args:
+            p: whether the map comes by topic, and whether newer ones count.
+            log: limits the lines of repeated attempts.
+            use: called with each map.
         """
         self._p, self._log, self._use = p, log, use
         self._taken = False

@@ -37,10 +37,11 @@ class ReconfigureServer:
     """The parameters by name, and the service that changes them."""
 
     def __init__(self, values: Mapping[str, Any], descriptions: Mapping[str, str], apply: Apply) -> None:
-        """Args:
-        values: name -> value of those that can be changed: bool, int, float or str.
-        descriptions: their meanings, as far as known.
-        apply: called by other threads with all values; raises ValueError for invalid ones.
+        """
+        Args:
+            values: name -> value of those that can be changed: bool, int, float or str.
+            descriptions: their meanings, as far as known.
+            apply: called by other threads with all values; raises ValueError for invalid ones.
         """
         self._lock = threading.Lock()
         self._values = dict(values)

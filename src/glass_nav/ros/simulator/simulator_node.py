@@ -120,8 +120,9 @@ class SimulatorNode:
     """Wiring only: each step advances time and publishes messages."""
 
     def __init__(self, p: SimulatorNodeParams) -> None:
-        """Raises:
-        ValueError: an invalid building, path, lidar or robot; one line.
+        """
+        Raises:
+            ValueError: an invalid building, path, lidar or robot; one line.
         """
         self._p = p
         drive = _drive(p)

@@ -39,12 +39,13 @@ class AtlasLocalizer:
         explained: Optional[Explained] = None,
         scans: Optional[MapScans] = None,
     ) -> None:
-        """Args:
-        atlas: of the building.
-        params: of the search.
-        explained: judges candidates by the scan of a meetpoint, if it has one; not with vote_mode seed.
-        scans: of the map, by which poses are followed where meetpoints have scan and odometry; not with vote_mode
-            seed.
+        """
+        Args:
+            atlas: of the building.
+            params: of the search.
+            explained: judges candidates by the scan of a meetpoint, if it has one; not with vote_mode seed.
+            scans: of the map, by which poses are followed where meetpoints have scan and odometry; not with vote_mode
+                seed.
         """
         self._atlas = atlas
         self._params = params

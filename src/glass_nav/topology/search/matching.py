@@ -80,13 +80,14 @@ class Matcher:
         explained: Optional[Explained] = None,
         least_explained: float = 0.0,
     ) -> None:
-        """Args:
-        atlas: with the segments of its darts, if these are to be compared.
-        tolerances: of the tests on numbers.
-        use_angles: whether directions of edges are evidence.
-        segments: the test of walls seen along an edge; None: they are not evidence.
-        explained: judges scans at meetpoints; None: they are not evidence.
-        least_explained: share of a scan that the map must explain from a candidate's pose.
+        """
+        Args:
+            atlas: with the segments of its darts, if these are to be compared.
+            tolerances: of the tests on numbers.
+            use_angles: whether directions of edges are evidence.
+            segments: the test of walls seen along an edge; None: they are not evidence.
+            explained: judges scans at meetpoints; None: they are not evidence.
+            least_explained: share of a scan that the map must explain from a candidate's pose.
         """
         self._explained = explained
         self._least_explained = least_explained

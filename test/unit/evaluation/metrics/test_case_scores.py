@@ -7,16 +7,16 @@ from glass_nav.evaluation.metrics import case_scores
 from glass_nav.evaluation.metrics.case_scores import SurfaceScores
 
 
-def scores(true, told, answered=None):
+def scores(true, reported, answered=None):
     return case_scores.of_cases(
         np.array(true, np.uint8),
-        np.array(told, np.uint8),
+        np.array(reported, np.uint8),
         np.ones(len(true), bool) if answered is None else np.array(answered, bool),
     )
 
 
 def test_ten_beams_worked_by_hand():
-    # 4 diffuse: 3 told so, 1 uncertain; 3 penetrations: 2 told, 1 taken for diffuse; 1 mirrored, unexplained;
+    # 4 diffuse: 3 reported so, 1 uncertain; 3 penetrations: 2 reported, 1 taken for diffuse; 1 mirrored, unexplained;
     # 2 without an answer, uncertain as they should be.
     found = scores([1, 1, 1, 1, 3, 3, 3, 2, 0, 0], [1, 1, 1, 0, 3, 3, 1, 0, 0, 0], [1] * 8 + [0, 0])
     expected = np.zeros((5, 5), int)
@@ -45,21 +45,21 @@ def test_a_case_below_one_percent_of_the_beams_counts_in_no_macro_f1():
 
 def test_scores_of_parts_add_up_to_the_scores_of_the_whole():
     rng = np.random.default_rng(5)
-    true, told, answered = rng.integers(0, 5, 500), rng.integers(0, 5, 500), rng.random(500) < 0.7
+    true, reported, answered = rng.integers(0, 5, 500), rng.integers(0, 5, 500), rng.random(500) < 0.7
     parts = case_scores.none_yet()
     for part in (slice(0, 13), slice(13, 500)):
-        parts = parts + scores(true[part], told[part], answered[part])
-    assert parts.metrics() == scores(true, told, answered).metrics()
+        parts = parts + scores(true[part], reported[part], answered[part])
+    assert parts.metrics() == scores(true, reported, answered).metrics()
 
 
 def test_the_figures_agree_with_a_count_beam_by_beam():
     rng = np.random.default_rng(6)
-    true, told = rng.integers(0, 5, 300), rng.integers(0, 5, 300)
-    figures = scores(true, told).metrics()
-    assert figures["accuracy"] == pytest.approx(np.mean(true == told))
+    true, reported = rng.integers(0, 5, 300), rng.integers(0, 5, 300)
+    figures = scores(true, reported).metrics()
+    assert figures["accuracy"] == pytest.approx(np.mean(true == reported))
     for case in range(5):
-        assert figures["precision"][case] == pytest.approx(np.mean(true[told == case] == case))
-        assert figures["recall"][case] == pytest.approx(np.mean(told[true == case] == case))
+        assert figures["precision"][case] == pytest.approx(np.mean(true[reported == case] == case))
+        assert figures["recall"][case] == pytest.approx(np.mean(reported[true == case] == case))
 
 
 def test_without_a_beam_every_figure_is_none():
@@ -69,16 +69,16 @@ def test_without_a_beam_every_figure_is_none():
 
 
 @pytest.mark.parametrize(
-    "true, told, text",
+    "true, reported, text",
     [
-        ([1, 1], [1], r"expected as many true as told cases and answers, got \(2,\), \(1,\), \(2,\)"),
+        ([1, 1], [1], r"expected as many true as reported cases and answers, got \(2,\), \(1,\), \(2,\)"),
         ([5], [1], "true cases must be 0 to 4, got 5 to 5"),
-        ([1], [255], "told cases must be 0 to 4, got 255 to 255"),
+        ([1], [255], "reported cases must be 0 to 4, got 255 to 255"),
     ],
 )
-def test_what_are_no_cases_is_refused(true, told, text):
+def test_what_are_no_cases_is_refused(true, reported, text):
     with pytest.raises(ValueError, match=f"^{text}$"):
-        scores(true, told)
+        scores(true, reported)
 
 
 def test_five_beams_of_scan_surfaces_worked_by_hand():

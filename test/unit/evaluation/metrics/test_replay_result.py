@@ -164,10 +164,10 @@ def test_beams_have_the_colours_of_their_true_and_of_their_told_cases(tmp_path):
         wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
         return np.nonzero((np.abs(pixels - wanted).max(axis=2) < 3).any(axis=1))[0]
 
-    true, told = rows_of(BeamCase(4).colour), rows_of(BeamCase(2).colour)
+    true, reported = rows_of(BeamCase(4).colour), rows_of(BeamCase(2).colour)
     assert len(true)
-    assert len(told)
-    assert true.max() < told.min()  # the truth above
+    assert len(reported)
+    assert true.max() < reported.min()  # the truth above
 
 
 def test_cases_without_examples_have_a_picture_too(tmp_path):

@@ -1,4 +1,4 @@
-"""Runs made by hand, and what a person is told of them."""
+"""Runs made by hand, and what the report says of them."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ def a_run(**changes):
 
 def states(**spans):
     """states(LOST=(40, 50)): LOCALIZED but for scans 40 to 49."""
-    told = ["LOCALIZED"] * SCANS
+    reported = ["LOCALIZED"] * SCANS
     for state, (first, end) in spans.items():
-        told[first:end] = [state] * (end - first)
-    return told
+        reported[first:end] = [state] * (end - first)
+    return reported
 
 
 def off_by(metres, first, end):
@@ -151,14 +151,14 @@ def test_a_start_without_a_guess_is_told_and_its_errors_count_from_when_it_was_f
 
 
 def test_episodes_follow_each_other_without_a_gap():
-    told = run_story.episodes(a_run(states=states(GLOBAL_SEARCH=(0, 10), LOST=(50, 60))))
-    assert [(each.state, each.start_s, each.end_s) for each in told] == [
+    reported = run_story.episodes(a_run(states=states(GLOBAL_SEARCH=(0, 10), LOST=(50, 60))))
+    assert [(each.state, each.start_s, each.end_s) for each in reported] == [
         ("GLOBAL_SEARCH", 0.0, 10.0),
         ("LOCALIZED", 10.0, 50.0),
         ("LOST", 50.0, 60.0),
         ("LOCALIZED", 60.0, 99.0),
     ]
-    assert [(each.first, each.last) for each in told] == [(0, 9), (10, 49), (50, 59), (60, 99)]
+    assert [(each.first, each.last) for each in reported] == [(0, 9), (10, 49), (50, 59), (60, 99)]
 
 
 def test_an_infinite_error_and_a_scan_without_beams_have_words():

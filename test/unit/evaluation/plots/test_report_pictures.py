@@ -97,9 +97,9 @@ def test_a_long_run_has_pieces_that_hold_all_of_its_beams():
 
 
 def test_a_class_of_reliability_tells_how_often_it_was_right():
-    told = np.array([0.05, 0.95, 0.96, 0.99, 1.0, 0.55, 0.51])
+    reported = np.array([0.05, 0.95, 0.96, 0.99, 1.0, 0.55, 0.51])
     right = np.array([False, True, True, True, False, True, False])
-    middle, share, counts = reliability.calibration(told, right)
+    middle, share, counts = reliability.calibration(reported, right)
     np.testing.assert_allclose(middle, [0.05, 0.55, 0.95])
     np.testing.assert_allclose(share, [0.0, 0.5, 0.75])
     np.testing.assert_array_equal(counts, [1, 2, 4])

@@ -116,13 +116,13 @@ def test_in_the_paper_the_plainest_of_equal_explanations_wins(equal, winner):
         pytest.param(0.99, 0.01, 0, id="a thing that is gone"),
     ],
 )
-def test_of_equal_explanations_how_glassy_the_wall_proved_decides(through, there, case):
+def test_of_equal_explanations_the_glass_probability_of_the_wall_decides(through, there, case):
     offered = expect(first=3.0, second=3.0)
     assert classify(3.0, offered, through=through, there=there).case.tolist() == [case]
 
 
 @pytest.mark.parametrize("second, case", [(0.01, 3), (0.99, 4)])
-def test_how_glassy_the_second_wall_proved_decides_between_one_pane_and_two(second, case):
+def test_the_glass_probability_of_the_second_wall_decides_between_one_pane_and_two(second, case):
     offered = expect(first=1.0, second=3.0, third=3.0)
     assert classify(3.0, offered, through=(0.99, second)).case.tolist() == [case]
 

@@ -18,7 +18,7 @@ def received(glass) -> "dict[str, Marker]":
     return {marker.ns: marker for marker in MarkerArray().deserialize(raw.getvalue()).markers}
 
 
-def test_cells_are_sorted_by_how_glassy_they_proved():
+def test_cells_are_sorted_by_their_probability_of_glass():
     markers = received([[0, 24, 25, 74, 75, 100, -1]])
     assert {name: len(marker.points) for name, marker in markers.items()} == {"solid": 2, "undecided": 2, "glass": 2}
 

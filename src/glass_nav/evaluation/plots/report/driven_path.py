@@ -80,14 +80,14 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
 def _draw_states(axes: Any, result: ReplayResult) -> None:
     from matplotlib.collections import LineCollection
 
-    way, told = result.map_from_base[:, :2], np.array(result.states)
+    way, reported = result.map_from_base[:, :2], np.array(result.states)
     apart = np.hypot(*(way[1:] - way[:-1]).T) if len(way) > 1 else np.zeros(0)
     drove = np.hypot(*np.diff(result.odom_from_base[:, :2], axis=0).T) if len(way) > 1 else np.zeros(0)
     with np.errstate(invalid="ignore"):  # a pose that is NaN is joined to none
         joined = apart <= drove + _JUMP_M
     for state in states_in_order(result.states):
         colour = state_colour(state)
-        here = told == state
+        here = reported == state
         if state in SEARCHING:  # the best candidate jumps about: dots
             axes.scatter(*way[here].T, s=8, color=colour, alpha=0.5, linewidths=0, zorder=4)
             axes.plot([], [], "o", color=colour, markersize=5, label=state)

@@ -34,14 +34,14 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
             f"{np.median(result.reliability):.2f}.",
             "Without a ground truth it cannot be checked.",
         )
-    told, off = result.reliability[errors.matched], errors.position_m[errors.matched]
+    reported, off = result.reliability[errors.matched], errors.position_m[errors.matched]
     state_of, right = np.array(result.states)[errors.matched], run_story.right(errors)[errors.matched]
     figure = new_figure(10.0, 3.4)
     left, beside = figure.subplots(1, 2, gridspec_kw={"width_ratios": [1.6, 1.0]})
     for state in states_in_order(state_of.tolist()):
         here = state_of == state
         left.scatter(
-            told[here],
+            reported[here],
             np.clip(off[here], MIN_M, 1e3),
             s=7,
             alpha=0.5,
@@ -55,7 +55,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
     left.set_xlabel("reported reliability")
     left.set_ylabel("true position error [m]")
     left.legend(loc="lower left", fontsize=8, frameon=True, markerscale=2.0)
-    centres, share, counts = calibration(told, right)
+    centres, share, counts = calibration(reported, right)
     beside.plot([0.0, 1.0], [0.0, 1.0], color="#888888", linewidth=0.8, linestyle="--")
     beside.bar(centres, share, width=0.085, color="#1f77b4")
     for centre, height, count in zip(centres, share, counts):
@@ -80,9 +80,9 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
     )
 
 
-def calibration(told: np.ndarray, right: np.ndarray) -> "Tuple[np.ndarray, np.ndarray, np.ndarray]":
+def calibration(reported: np.ndarray, right: np.ndarray) -> "Tuple[np.ndarray, np.ndarray, np.ndarray]":
     """Of ten classes of reported probability, the N that are not empty: centre, share that was right, count."""
-    number = np.minimum((np.asarray(told) * 10.0).astype(int), 9)
+    number = np.minimum((np.asarray(reported) * 10.0).astype(int), 9)
     counts = np.bincount(number, minlength=10)
     hits = np.bincount(number, np.asarray(right, float), minlength=10)
     held = counts > 0

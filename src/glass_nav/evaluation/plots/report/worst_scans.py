@@ -21,8 +21,8 @@ from glass_nav.world.grid_map import GridMap
 
 def draw(folder: Path, result: ReplayResult, ground: Ground, number: int, kept: KeptScan) -> Picture:
     errors, row = result.errors, kept.row
-    told = result.map_from_base[row]
-    poses = [("estimated pose", told)]
+    reported = result.map_from_base[row]
+    poses = [("estimated pose", reported)]
     if errors.matched[row]:
         assert result.reference is not None
         poses.append(("true pose", result.reference.at(result.stamps_ns[row])))
