@@ -8,7 +8,7 @@
 
 Every building x lidar x seed is driven once, and every localizer gets the same scans, odometry and start. A seed
 seeds the drive, the lidar, the odometry, the start and the localizer. Baselines: test/benchmark/baselines.py;
-ours_oracle is given the true cases: it is not a baseline but shows what the weights could reach. Ratios are those of the
+ours_oracle is given the true cases: it is no baseline but shows what the weights could reach. Ratios are those of the
 means over lidars and seeds, against the best baseline of that figure in that building. Seeds from 100 on were used in
 development; those from 200 on were not. Exit code 1 when a bar is missed.
 """
