@@ -196,6 +196,7 @@ def test_at_the_start_it_halts_until_it_sees_and_then_drives_to_a_meetpoint_and_
     assert lines(robot.decided)[-1].startswith("~seek_at_start: SUCCEEDED, at a meetpoint of degree 3")
 
 
+@pytest.mark.long_run
 def test_after_a_task_it_commands_zeros_for_a_moment_and_then_nothing():
     robot = standing()
     quiet = robot.run_for(2.0)
@@ -224,6 +225,7 @@ def test_a_search_that_waits_hears_of_the_meetpoint_again_and_again():
     assert not only(robot.run_for(3.0), MeetpointReport)
 
 
+@pytest.mark.long_run
 def test_a_search_that_it_does_not_drive_for_hears_of_it_once():
     robot = standing(DriverRules(follow_turn_choice=False))
     robot.driver.search_reports(SearchState.WAITING)
@@ -357,6 +359,7 @@ def test_a_goal_along_an_edge_is_refused_where_there_is_none():
         assert lines(told) == [f"traverse_edge {words} refused: {end.ending.reason}"]
 
 
+@pytest.mark.long_run
 def test_a_goal_is_told_of_its_progress_and_of_where_it_led():
     robot = standing(WAITS)
     (end,) = robot.all(GoalEnd)

@@ -168,6 +168,7 @@ def test_a_node_is_driven_to_along_the_edges(planner):
     assert not drive.touched
 
 
+@pytest.mark.long_run
 def test_a_pose_is_driven_to_and_turned_to(planner):
     drive = Drive(corridor(), (1.5, 0.8, 2.0))
     assert drive.run(going(drive, planner, np.array([5.2, 4.5]), -1.0)).outcome == Outcome.SUCCEEDED
@@ -229,6 +230,7 @@ def test_an_edge_that_cannot_be_driven_is_left_for_another_one_where_any_will_do
     assert not drive.touched
 
 
+@pytest.mark.long_run
 def test_an_edge_that_was_asked_for_and_cannot_be_driven_is_told_back_at_its_meetpoint():
     drive = arrived(corridor(), ledge_x=8.0)
     before = drive.simulation.map_from_base
@@ -239,6 +241,7 @@ def test_an_edge_that_was_asked_for_and_cannot_be_driven_is_told_back_at_its_mee
     assert drive.driver.progress.phase == DriverPhase.ARRIVED
 
 
+@pytest.mark.long_run
 def test_a_search_that_is_held_everywhere_is_given_up():
     drive = Drive(corridor(), (5.0, 4.0, 0.0))
     drive.simulation.move = lambda dt_s, command, move=drive.simulation.move: move(dt_s, command * [0.0, 0.0, 1.0])
@@ -246,6 +249,7 @@ def test_a_search_that_is_held_everywhere_is_given_up():
     assert ending.outcome == Outcome.BLOCKED and ending.reason.startswith("gives up: the robot makes no progress")
 
 
+@pytest.mark.long_run
 def test_a_goal_behind_a_ledge_is_given_up(planner):
     drive = Drive(corridor(), (6.0, 1.0, 0.0), ledge_x=8.0)
     ending = drive.run(going(drive, planner, np.array([11.0, 1.0])))

@@ -166,6 +166,7 @@ def test_a_t_is_as_the_closed_form_says_and_the_walls_of_its_foot_are_reported_a
     assert (off[lengths > 0.5] < 0.15).all() and lengths[lengths > 0.5].sum() > 15.0
 
 
+@pytest.mark.long_run
 def test_stop_brings_it_to_a_stand_within_its_limits_and_resume_goes_on():
     drive, arrival = at_the_junction()
     drive.driver.leave(rank_towards(arrival, drive, 0.0))
@@ -203,6 +204,7 @@ def test_it_goes_back_to_the_meetpoint_that_it_left():
     assert drive.driver.progress.phase == DriverPhase.FOLLOWING and drive.driver.progress.travelled_m == 0.0
 
 
+@pytest.mark.long_run
 def test_a_search_that_was_stopped_goes_on():
     drive = Drive(t_corridor(), IN_T)
     drive.driver.seek()
@@ -289,6 +291,7 @@ def test_what_bars_the_edge_ends_it_as_blocked_in_front_of_it_and_there_is_a_way
     assert np.hypot(*(drive.simulation.map_from_base[:2] - began)) < 0.15
 
 
+@pytest.mark.long_run
 def test_where_there_is_no_way_it_looks_around_again_and_gives_up():
     drive = Drive(walled(np.array([[0.0, 0.0], [1.2, 0.0], [1.2, 1.2], [0.0, 1.2]])), (0.6, 0.6, 0.0))
     drive.driver.seek()
@@ -334,6 +337,7 @@ def test_a_meetpoint_that_cannot_quite_be_reached_is_reported_from_as_near_as_it
     assert 0.1 < away_m < 0.5 and drive.blocked == 0
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", [3, 8])
 def test_out_of_a_dead_end_that_narrows_it_comes_as_it_went_in(seed):
     """Beside a table, where the base hardly fits at last and the end is the nearer the better it is seen."""
