@@ -26,6 +26,24 @@ T_FACES = np.array([[0.0, 0.0], [5.0, 0.0], [5.0, -5.0], [7.0, -5.0], [7.0, 0.0]
 T_MEETPOINT = np.array([6.0, 0.375 * W])
 T_R_M = 0.625 * W
 
+SIDE_CORRIDOR_WALLS = (
+    Wall(
+        np.array(
+            [
+                [-0.1, -0.1],
+                [12.1, -0.1],
+                [12.1, 2.1],
+                [6.1, 2.1],
+                [6.1, 6.1],
+                [3.9, 6.1],
+                [3.9, 2.1],
+                [-0.1, 2.1],
+                [-0.1, -0.1],
+            ]
+        )
+    ),
+)
+
 
 def walled(faces_m: np.ndarray, thickness_m: float = 0.1) -> Building:
     """Walls around a room, with their faces on a closed line (N, 2) that runs counterclockwise."""

@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_buildings import SIDE_CORRIDOR_WALLS
 
 from glass_nav.driving.base_limits import BaseLimits
 from glass_nav.driving.edge_tracking.edge_driver import EdgeDriver
@@ -24,7 +25,7 @@ from glass_nav.driving.route_follower import RouteFollowerParams
 from glass_nav.driving.tasks import EdgeTask, GoTask, Moment
 from glass_nav.geometry import se2
 from glass_nav.simulation import building_map
-from glass_nav.simulation.building import Building, Thing, Wall, box
+from glass_nav.simulation.building import Building, Thing, box
 from glass_nav.simulation.lidar import PRESETS
 from glass_nav.simulation.odometry import EXACT
 from glass_nav.simulation.robot import RobotParams
@@ -36,29 +37,12 @@ from glass_nav.vocabulary import DriverPhase, Outcome
 LIMITS = BaseLimits()
 CONTROL_S = 0.05
 QUICK = RecoveryParams(recovery_wait_s=0.5, recovery_turn_rad=1.0)
-WALLS = (
-    Wall(
-        np.array(
-            [
-                [-0.1, -0.1],
-                [12.1, -0.1],
-                [12.1, 2.1],
-                [6.1, 2.1],
-                [6.1, 6.1],
-                [3.9, 6.1],
-                [3.9, 2.1],
-                [-0.1, 2.1],
-                [-0.1, -0.1],
-            ]
-        )
-    ),
-)
 PATHS = {"all": np.array([[1.0, 1.0], [5.0, 1.0], [5.0, 5.0], [5.0, 1.0], [11.0, 1.0]])}
 CART = Thing(box(8.5, 1.0, 0.4, 1.8), mapped=False)  # across the corridor
 
 
 def corridor(*things):
-    return Building(WALLS, things=things, paths=PATHS, start=np.array([2.0, 1.0, 0.0]), name="corridor")
+    return Building(SIDE_CORRIDOR_WALLS, things=things, paths=PATHS, start=np.array([2.0, 1.0, 0.0]), name="corridor")
 
 
 class Drive:

@@ -17,6 +17,18 @@ from glass_nav.geometry.trajectory import Trajectory
 LOST_M = 0.5  # "lost" in the figures of a run
 LOST_FAR_M = 1.0  # and by the stricter reading of the published ones
 SLACK_NS = 1_000_000  # files of poses round their stamps; a scan that close to the ends is covered
+METRICS = (  # of summary(), in its order
+    "position_mean_m",
+    "position_median_m",
+    "position_rmse_m",
+    "position_p95_m",
+    "position_max_m",
+    "yaw_mean_deg",
+    "yaw_median_deg",
+    "yaw_p95_deg",
+    "lost_share",
+    "lost_1m_share",
+)
 
 
 @dataclass(frozen=True)
@@ -56,20 +68,7 @@ def summary(errors: PoseErrors) -> Dict[str, Optional[float]]:
     """The figures of a run, under the names of metrics.json; None without any reference."""
     position, yaw = errors.position_m[errors.matched], np.degrees(errors.yaw_rad[errors.matched])
     if not len(position):
-        return dict.fromkeys(
-            (
-                "position_mean_m",
-                "position_median_m",
-                "position_rmse_m",
-                "position_p95_m",
-                "position_max_m",
-                "yaw_mean_deg",
-                "yaw_median_deg",
-                "yaw_p95_deg",
-                "lost_share",
-                "lost_1m_share",
-            )
-        )
+        return dict.fromkeys(METRICS)
     figures = {
         "position_mean_m": np.mean(position),
         "position_median_m": np.median(position),

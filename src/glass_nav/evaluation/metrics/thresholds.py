@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, Callable, Dict, Mapping, Optional, Sequence
 
+from glass_nav.evaluation.metrics import pose_errors
 from glass_nav.vocabulary import BeamCase, LocalizationState
 
 COMPARISONS: "Dict[str, Callable[[float, float], bool]]" = {
@@ -17,20 +18,8 @@ COMPARISONS: "Dict[str, Callable[[float, float], bool]]" = {
     ">": operator.gt,
     "<": operator.lt,
 }
-ERRORS = (
-    "position_mean_m",
-    "position_median_m",
-    "position_rmse_m",
-    "position_p95_m",
-    "position_max_m",
-    "yaw_mean_deg",
-    "yaw_median_deg",
-    "yaw_p95_deg",
-    "lost_share",
-    "lost_1m_share",
-)
 KNOWN = (
-    *ERRORS,
+    *pose_errors.METRICS,
     "scans",
     "scans_refused",
     "updates",
@@ -127,7 +116,11 @@ def _value(metrics: Mapping[str, Any], name: str) -> Optional[float]:
     value = metrics.get(group)
     if inner and value is not None:
         value = value.get(inner, 0.0 if group in ("state_share", "case_share") else None)
-    if value is None and name in ERRORS and metrics.get("scans_without_ground_truth", metrics["scans"]) is not None:
+    if (
+        value is None
+        and name in pose_errors.METRICS
+        and metrics.get("scans_without_ground_truth", metrics["scans"]) is not None
+    ):
         matched = metrics["scans"] - metrics["scans_without_ground_truth"]
         return math.inf if matched else None  # JSON has no number for an infinite error
     return None if value is None else float(value)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from made_buildings import SIDE_CORRIDOR_WALLS
 from visualization_msgs.msg import Marker
 
 from glass_nav.driving.base_limits import BaseLimits
@@ -13,27 +14,9 @@ from glass_nav.driving.recovery import RecoveryParams
 from glass_nav.driving.tasks import EdgeTask, Moment
 from glass_nav.geometry import se2
 from glass_nav.ros.driver import driver_displays
-from glass_nav.simulation.building import Building, Wall
+from glass_nav.simulation.building import Building
 from glass_nav.simulation.lidar import PRESETS
 from glass_nav.simulation.simulation import Simulation
-
-WALLS = (
-    Wall(
-        np.array(
-            [
-                [-0.1, -0.1],
-                [12.1, -0.1],
-                [12.1, 2.1],
-                [6.1, 2.1],
-                [6.1, 6.1],
-                [3.9, 6.1],
-                [3.9, 2.1],
-                [-0.1, 2.1],
-                [-0.1, -0.1],
-            ]
-        )
-    ),
-)
 
 
 def shown(driver, route_m=None, odom_from_base=np.zeros(3)):
@@ -48,7 +31,9 @@ def test_each_thing_has_one_marker_and_only_what_there_is_is_shown():
 
 
 def test_graph_and_meetpoint_are_shown_where_they_are_and_the_route_in_the_map():
-    simulation = Simulation(Building(WALLS, start=np.array([4.5, 1.0, 0.0])), replace(PRESETS["sensitive"], beams=361))
+    simulation = Simulation(
+        Building(SIDE_CORRIDOR_WALLS, start=np.array([4.5, 1.0, 0.0])), replace(PRESETS["sensitive"], beams=361)
+    )
     driver, last = EdgeDriver(), np.zeros(3)
     task = EdgeTask(driver, RecoveryParams(), BaseLimits())
     for step in range(2000):
