@@ -213,10 +213,7 @@ def sum_of(runs: List[Dict[str, Any]], key: str) -> float:
 
 def row(task: str, name: str, runs: List[Dict[str, Any]]) -> str:
     """A line of the table of a task."""
-    times = (
-        f"{median(runs, 'median_ms')} | {max(each['max_ms'] for each in runs):.0f} | "
-        f"{sum_of(runs, 'stalls'):.0f} |"
-    )
+    times = f"{median(runs, 'median_ms')} | {max(each['max_ms'] for each in runs):.0f} | {sum_of(runs, 'stalls'):.0f} |"
     wrong = count(runs, "wrong")
     if task == "global":
         return (
@@ -251,7 +248,10 @@ def bars(task: str, runs: List[Dict[str, Any]]) -> bool:
     def share(key: str) -> float:
         return count(runs, key) / total
 
-    checks = [("wrong LOCALIZED", share("wrong"), "<=", 0.0), ("stalls a run", sum_of(runs, "stalls") / total, "<=", 0.0)]
+    checks = [
+        ("wrong LOCALIZED", share("wrong"), "<=", 0.0),
+        ("stalls a run", sum_of(runs, "stalls") / total, "<=", 0.0),
+    ]
     if task == "global":
         checks.append(("right place found", share("right"), ">=", 0.95))
     if task in ("kidnap", "false_start"):

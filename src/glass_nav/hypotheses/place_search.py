@@ -18,8 +18,8 @@ from glass_nav.sensing.distance_field import DistanceField
 
 _STARTS = 4000  # poses that the matcher proposes
 _SLIDE_M = 0.6  # that an alignment may move one; farther away it is another place
-_SLICE = 12_000_000  # look-ups of the matcher: 20 to 30 ms
-_LOOK_UPS_PER_BEAM = 80  # that the alignment of one beam costs as much as
+_SLICE = 20_000_000  # look-ups of the matcher: about 40 ms
+_LOOK_UPS_PER_BEAM = 75  # that the alignment of one beam costs as much as
 
 
 class PlaceSearch:

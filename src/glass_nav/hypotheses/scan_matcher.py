@@ -23,6 +23,7 @@ _CELL_M = 0.1  # of the positions that are tried
 _SCALE_M = 0.15  # a point that ends this far from a wall scores by one half
 _HEADINGS_RAD = np.arange(180) * (2.0 * np.pi / 180)  # 2 degrees apart
 _HIGHEST = 255
+_STRIP_ROWS = 64
 _ALL = 2**62  # look-ups: more than any search needs
 
 
@@ -54,11 +55,21 @@ class ScanMatcher:
         self._cell_m = self._per_cell * grid_map.resolution_m
         self._map_from_grid = grid_map.map_from_grid
         allowed = _any_in_blocks(free, self._per_cell)
-        centres = np.stack(np.meshgrid(np.arange(allowed.shape[1]) + 0.5, np.arange(allowed.shape[0]) + 0.5), axis=-1)
-        points = se2.transform_points(self._map_from_grid, centres * self._cell_m)
-        distance = field.distance(points[..., 0], points[..., 1])
-        scores = np.rint(_HIGHEST * _SCALE_M**2 / (_SCALE_M**2 + distance**2)).astype(np.uint8)
+        strips = range(0, allowed.shape[0], _STRIP_ROWS)  # those of a large map would not fit in the cache at once
+        scores = np.concatenate(
+            [
+                self._scores(field, first, min(first + _STRIP_ROWS, allowed.shape[0]), allowed.shape[1])
+                for first in strips
+            ]
+        )
         self._grid = _mrpt_grid.MatchGrid(scores, allowed)
+
+    def _scores(self, field: DistanceField, first: int, last: int, columns: int) -> np.ndarray:
+        """(last - first, W) uint8: how near to a wall the centres of the cells of some rows lie."""
+        centres = np.stack(np.meshgrid(np.arange(columns) + 0.5, np.arange(first, last) + 0.5), axis=-1) * self._cell_m
+        points = se2.transform_points(self._map_from_grid, centres)
+        distance = field.distance(points[..., 0], points[..., 1])
+        return np.rint(_HIGHEST * _SCALE_M**2 / (_SCALE_M**2 + distance**2)).astype(np.uint8)
 
     def search(self, points_m: np.ndarray, keep: int) -> Places:
         """At most so many places, one for each square of 0.8 m and each of the headings.
