@@ -13,7 +13,7 @@ Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseAr
     used; none for a scan that is rejected or has no transforms, because it is unknown where to cut it;
     ~glass_map (OccupancyGrid, latched): probability of glass by wall cell [percent], -1 where unknown;
     for rviz, while somebody listens: ~beam_cloud (PointCloud2), ~beam_markers (MarkerArray, a namespace per case
-    and one for the status), ~wall_markers (MarkerArray, latched: the known cells of the glass map), ~legend
+    and one for the status), ~wall_markers (MarkerArray, latched: the known cells of the glass map), legend and ~legend
     (Image, latched).
 Services: global_localization, request_nomotion_update (Empty), set_map (SetMap), ~set_parameters (Reconfigure, with
     its topics ~parameter_descriptions and ~parameter_updates). Calls static_map (GetMap).
