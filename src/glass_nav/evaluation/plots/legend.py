@@ -129,7 +129,7 @@ def _swatch(row: Row) -> Any:
     elif kind == "line":
         pen.line((0, middle, width, middle), fill=row.rgb, width=2 * _FINE)
     elif kind == "edge":
-        pen.line((0, middle, width, middle), fill=row.rgb, width=_FINE)
+        pen.line((0, middle, width, middle), fill=row.rgb, width=2 * _FINE)
         pen.rectangle(_box(np.array([width // 2, middle]), 3 * _FINE), fill=NODE_RGB)
     elif kind == "arrow":
         pen.line((0, middle, width, middle), fill=row.rgb, width=2 * _FINE)
