@@ -253,6 +253,8 @@ class LocalizationInterface(RoomTest):
             (None, {"ranges": [-math.inf] * n}),
             (None, {"ranges": [0.0] * n}),
             (None, {"ranges": [1.0]}),
+            (None, {"range_max": math.inf}),  # the default of pointcloud_to_laserscan
+            (None, {"range_max": 1e30}),
         ):
             with part(f"{words}: " + ", ".join(f"{name} {str(value)[:20]}" for name, value in fields.items())):
                 self.lines.clear()

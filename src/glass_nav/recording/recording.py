@@ -83,6 +83,7 @@ class LogOptions:
     ground_truth: Optional[str] = None  # a topic, a file or "tf:FRAME"; "none": none is looked for
     true_beams: Optional[str] = None  # a topic; "none": none is looked for
     deskew: bool = True  # where the log has the time between beams
+    laser_max_range: float = -1.0  # [m] where a lidar sets no range_max; < 0: the longest range that it shows
 
 
 def trajectory_from_samples(stamps_ns: "List[int]", poses: "List[Tuple[float, float, float]]") -> Trajectory:

@@ -89,6 +89,7 @@ def _source(given: LogOptions, settings: ReplayParams) -> LogOptions:
         base_frame=given.base_frame or base_frame,
         odom_frame=given.odom_frame or odom_frame,
         deskew=settings.deskew.deskew,
+        laser_max_range=settings.localizer.limits.laser_max_range,
     )
 
 

@@ -82,7 +82,7 @@ class LocalizationNode:
         self._next_report_s = 0.0  # by the monotonic clock
 
         self._tf = tf2_ros.Buffer(rospy.Duration(LONGEST_TURN_S) if p.node.landmark_file else None)
-        self._scans = ScanInput(p.node, p.deskew, self._tf, self._log)
+        self._scans = ScanInput(p.node, p.deskew, self._tf, self._log, p.localizer.limits.laser_max_range)
         self._bearings = BearingInput(p.node, self._tf, self._log)
         self._maps = MapSource(p.node, self._log, self._use_map)
         self._memory = PoseMemory(p.pose_file, _keep_on_server, lambda line: self._log.warn(line, period_s=60.0))
@@ -219,7 +219,7 @@ class LocalizationNode:
         p = params.changed(self._p, values, rospy.get_name())
         self._session.reconfigure(p.session)
         self._p = p
-        self._scans.reconfigure(p.node, p.deskew)
+        self._scans.reconfigure(p.node, p.deskew, p.localizer.limits.laser_max_range)
         self._outputs.reconfigure(p.node)
         self._health.warn_deviations = p.node.warn_deviations
 
