@@ -82,6 +82,7 @@ class Publishers:
                 estimate.reason,
                 estimate.inlier_ratio,
                 estimate.confidence,
+                estimate.levels,
             )
         )
         if estimate.updated or pose_is_news:

@@ -7,7 +7,7 @@ from typing import Optional, Tuple
 
 import numpy as np
 
-from glass_nav.evaluation.metrics import run_story
+from glass_nav.evaluation.metrics import pose_errors, run_story
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.evaluation.plots.canvas import Picture, new_figure, save
 from glass_nav.evaluation.plots.report.errors import MIN_M
@@ -50,7 +50,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
             label=state,
         )
     left.set_yscale("log")
-    left.axhline(run_story.RIGHT_M, color="#555555", linewidth=0.8, linestyle="--")
+    left.axhline(pose_errors.RIGHT_M, color="#555555", linewidth=0.8, linestyle="--")
     left.set_xlim(-0.02, 1.02)
     left.set_xlabel("reported reliability")
     left.set_ylabel("true position error [m]")
@@ -73,10 +73,10 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
         "reliability: "
         + ", ".join(f"{centre:.2f}: {height:.2f} of {count}" for centre, height, count in zip(centres, share, counts))
         + ".",
-        f"Left: each dot is a scan; above the dashed line ({run_story.RIGHT_M:g} m) the pose was wrong. "
+        f"Left: each dot is a scan; above the dashed line ({pose_errors.RIGHT_M:g} m) the pose was wrong. "
         "Right: bars on the dashed line would be a reliability that is exactly true; numbers are scans. "
         "Right is "
-        f"within {run_story.RIGHT_M:g} m and {np.degrees(run_story.RIGHT_RAD):.0f}°.",
+        f"within {pose_errors.RIGHT_M:g} m and {np.degrees(pose_errors.RIGHT_RAD):.0f}°.",
     )
 
 
