@@ -27,12 +27,12 @@ from std_srvs.srv import Empty
 from visualization_msgs.msg import MarkerArray
 
 from glass_nav.geometry import angles, se2
+from glass_nav.localization.status_text import STATUS_NAMESPACE
 from glass_nav.msg import LocalizationStatus, SegmentQuality
 from glass_nav.ros import conversions
-from glass_nav.ros.localization import beam_displays, wall_display
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.srv import Locate
-from glass_nav.vocabulary import BeamCase
+from glass_nav.vocabulary import BeamCase, WallKind
 from glass_nav.world.grid_map import GridMap
 
 PANE_COLUMN = 160
@@ -243,8 +243,8 @@ class LocalizationOutputs(unittest.TestCase):
             "no scan has the stamp of the markers",
         )
         names = {marker.ns for marker in markers.last.markers}
-        self.assertEqual(names, {*(case.label for case in BeamCase), beam_displays.STATUS_NAMESPACE})
-        (status,) = [marker for marker in markers.last.markers if marker.ns == beam_displays.STATUS_NAMESPACE]
+        self.assertEqual(names, {*(case.label for case in BeamCase), STATUS_NAMESPACE})
+        (status,) = [marker for marker in markers.last.markers if marker.ns == STATUS_NAMESPACE]
         self.assertTrue(status.text.startswith("LOCALIZED"), status.text)
         self.assertEqual(status.header.frame_id, "map")
         through = [marker for marker in markers.last.markers if marker.ns == "3 behind one pane"]
@@ -253,7 +253,7 @@ class LocalizationOutputs(unittest.TestCase):
     def test_the_walls_are_shown_by_what_they_are(self) -> None:
         markers = Heard(f"{NODE}/wall_markers", MarkerArray)
         self.assertTrue(wait_until(lambda: len(markers), 30.0), "no ~wall_markers within 30 s")
-        self.assertEqual([marker.ns for marker in markers.last.markers], list(wall_display.WALL_NAMES))
+        self.assertEqual([marker.ns for marker in markers.last.markers], list(map(str, WallKind)))
 
     def test_silence_is_told_beside_the_robot(self) -> None:
         markers = Heard(f"{NODE}/beam_markers", MarkerArray)

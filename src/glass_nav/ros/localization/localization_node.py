@@ -14,7 +14,7 @@ Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseAr
     ~glass_map (OccupancyGrid, latched): probability of glass by wall cell [percent], -1 where unknown;
     ~segment_quality (SegmentQuality), while somebody listens: how well the scan lies on the wall segments of the map;
     for rviz, while somebody listens: ~beam_cloud (PointCloud2), ~beam_markers (MarkerArray, a namespace per case
-    and one for the status), ~wall_markers (MarkerArray, latched: the known cells of the glass map), ~legend
+    and one for the status), ~wall_markers (MarkerArray, latched: the known cells of the glass map), legend and ~legend
     (Image, latched).
 Services: global_localization, request_nomotion_update (Empty), set_map (SetMap), ~locate (Locate: a rough pose
     corrected by wall segments), ~set_parameters (Reconfigure, with
