@@ -97,7 +97,7 @@ def status_marker(
         map_from_base: (3,) where the robot is.
         map_frame: frame of the map.
         state, reason: as in ~status; the reason is shown if it matters.
-        used_share: of beams that a case explains; NaN without a scan.
+        used_share: of the beams that the map covers, those that a case explains; NaN without any.
     """
     x, y, _ = np.zeros(3) if map_from_base is None else map_from_base
     text = state if np.isnan(used_share) else f"{state}, {100.0 * used_share:.0f} % of the beams explained"
