@@ -21,8 +21,9 @@ from glass_nav.localization.beam_classification.case_votes import BeamCases
 from glass_nav.localization.beam_classification.expected_ranges import ExpectedRanges
 from glass_nav.localization.beam_classification.glass_map import GlassMap
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
-from glass_nav.localization.integrity import pose_state
+from glass_nav.localization.integrity import pose_state, protection_level
 from glass_nav.localization.integrity.kidnap_detector import KidnapDetector
+from glass_nav.localization.integrity.protection_level import ProtectionLevels
 from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.particle_filter.particle_filter import ONE_PLACE, ParticleFilter, ParticleFilterParams
 from glass_nav.localization.update_schedule import UpdateSchedule
@@ -55,6 +56,7 @@ class Estimate:
     updated: bool  # whether this scan moved the particles
     confidence: float  # chance that the pose is right, 0..1
     places: int = 1  # that are possible, see pose_state.Judgement
+    levels: ProtectionLevels = protection_level.UNKNOWN  # how far off the pose may be
 
 
 class _LazyMatcher:
@@ -282,7 +284,8 @@ class Localizer:
         cases = self._classifier.seen_from(cases, scan, expected)
         evidence = self._classifier.evidence(scan, cases, expected, map_from_base, self._known_area)
         if updated:
-            self._quality.observe(evidence)
+            judged = evidence.without_crowd()
+            self._quality.observe(judged.inlier_ratio, judged.judged_share)
         judgement = self._quality.judge(self._filter.best)
         trusted = judgement.state == LocalizationState.LOCALIZED
         return Estimate(
@@ -299,6 +302,7 @@ class Localizer:
             updated,
             judgement.confidence,
             judgement.places,
+            protection_level.of(map_from_base, self._filter.best.covariance),
         )
 
     def _bearings_from(self, odom_from_base: np.ndarray) -> List[Tuple[LandmarkBearings, LandmarkMap]]:

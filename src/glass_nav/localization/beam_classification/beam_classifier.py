@@ -46,6 +46,7 @@ class BeamClassifierParams:
     min_sigma_m: float  # limits of the learnt spread of beams around walls
     max_sigma_m: float
     raycast_threads: int = 1
+    raycast_backend: str = "exact"
 
 
 class BeamClassifier:
@@ -53,15 +54,18 @@ class BeamClassifier:
 
     def __init__(self, params: BeamClassifierParams, grid_map: GridMap) -> None:
         self._params = params
-        self.caster = RayCaster(grid_map, threads=params.raycast_threads)
+        self.caster = RayCaster(grid_map, params.raycast_backend, params.raycast_threads)
         self.thickness_m = wall_thickness(grid_map)  # (H * W,)
         self.residuals = RangeResiduals(_DEPTH_SHARE, params.min_sigma_m)
         self.glass_map = GlassMap(grid_map, params.glass)
 
     def reconfigure(self, params: BeamClassifierParams) -> None:
         """Other parameters from the next scan on; what was learnt stays."""
-        if params.raycast_threads != self._params.raycast_threads:
-            self.caster = RayCaster(self.caster.grid_map, threads=params.raycast_threads)
+        if (params.raycast_backend, params.raycast_threads) != (
+            self._params.raycast_backend,
+            self._params.raycast_threads,
+        ):
+            self.caster = RayCaster(self.caster.grid_map, params.raycast_backend, params.raycast_threads)
         self.glass_map.weigh_by(params.glass)
         self._params = params
 

@@ -13,7 +13,6 @@ from typing import Optional
 import numpy as np
 
 from glass_nav.hypotheses.global_search import Candidates
-from glass_nav.localization.beam_classification.beam_evidence import BeamEvidence
 from glass_nav.localization.integrity.kidnap_detector import Verdict
 from glass_nav.localization.particle_filter.pose_estimate import PoseEstimate
 from glass_nav.vocabulary import LocalizationState
@@ -72,13 +71,16 @@ class PoseQuality:
         """Other limits from now on; what was seen stays."""
         self._limits = limits
 
-    def observe(self, evidence: BeamEvidence) -> None:
-        """Take in one update; the fewer of its beams say something, the less it counts."""
-        evidence = evidence.without_crowd()
-        if np.isfinite(evidence.inlier_ratio):
-            past = evidence.inlier_ratio if np.isnan(self._inlier_ratio) else self._inlier_ratio
-            gain = (1.0 - self._MEMORY) * evidence.judged_share
-            self._inlier_ratio = past + gain * (evidence.inlier_ratio - past)
+    def observe(self, inlier_ratio: float, judged_share: float = 1.0) -> None:
+        """Take in one update.
+
+        Args:
+            inlier_ratio: of the beams that say something about the pose, the share that the map explains; NaN: none does.
+            judged_share: of the beams that returned, the share that says something; the fewer, the less it counts.
+        """
+        if np.isfinite(inlier_ratio):
+            past = inlier_ratio if np.isnan(self._inlier_ratio) else self._inlier_ratio
+            self._inlier_ratio = past + (1.0 - self._MEMORY) * judged_share * (inlier_ratio - past)
 
     def follow_search(self, candidates: Candidates) -> None:
         """A global search runs; these places are possible."""

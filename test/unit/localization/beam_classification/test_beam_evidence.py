@@ -42,5 +42,7 @@ def test_the_inlier_ratio_is_of_the_beams_that_say_something():
 
 def test_a_crowd_counts_at_most_as_much_as_what_is_seen_of_the_map():
     assert BeamEvidence(100.0, 10.0, 80.0, 10.0).without_crowd() == BeamEvidence(100.0, 10.0, 20.0, 10.0)
+    assert BeamEvidence(100.0, 10.0, 90.0, 0.0).without_crowd().inlier_ratio == 0.5  # people around a right pose
+    assert BeamEvidence(100.0, 1.0, 90.0, 9.0).without_crowd().inlier_ratio == 0.05  # and around a wrong one
     few = BeamEvidence(100.0, 60.0, 30.0, 10.0)
     assert few.without_crowd() == few

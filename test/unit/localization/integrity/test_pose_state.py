@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from glass_nav.hypotheses.global_search import Candidates
-from glass_nav.localization.beam_classification.beam_evidence import BeamEvidence
 from glass_nav.localization.integrity.kidnap_detector import Verdict
 from glass_nav.localization.integrity.pose_state import PoseQuality, QualityLimits
 from glass_nav.localization.particle_filter.pose_estimate import PoseEstimate
@@ -35,15 +34,10 @@ def candidates(count=3, fit=0.9):
     return Candidates(poses, weights / weights.sum(), fit, 3.0, False)
 
 
-def explained(share, beams=100):
-    """Evidence of beams of which the map explains so many and others went through walls; NaN: none says anything."""
-    return BeamEvidence(beams, *(np.nan_to_num(beams * np.array([share, 0.0, 1.0 - share]))))
-
-
 def judgement(inlier_ratios, estimate=None, **verdict):
     quality = PoseQuality(LIMITS)
     for inlier_ratio in inlier_ratios:
-        quality.observe(explained(inlier_ratio))
+        quality.observe(inlier_ratio)
     if verdict:
         quality.doubt(Verdict(**{**SURE, **verdict}))
     return quality.judge(best() if estimate is None else estimate)
@@ -117,27 +111,13 @@ def test_a_scan_without_answers_says_nothing():
 
 def test_the_fewer_beams_say_something_the_less_a_scan_counts():
     quality = PoseQuality(LIMITS)
-    quality.observe(explained(0.9))
+    quality.observe(0.9)
     for _ in range(5):
-        quality.observe(BeamEvidence(100.0, explained=0.0, short=0.0, passed=2.0))
+        quality.observe(0.0, judged_share=0.02)
     assert quality.judge(best()).state == "LOCALIZED"
     for _ in range(5):
-        quality.observe(BeamEvidence(100.0, explained=0.0, short=0.0, passed=100.0))
+        quality.observe(0.0)
     assert quality.judge(best()).state == "UNCERTAIN"
-
-
-@pytest.mark.parametrize(
-    "seen_past, state",
-    [
-        pytest.param(dict(explained=10.0, passed=0.0), "LOCALIZED", id="the map, where it is seen"),
-        pytest.param(dict(explained=1.0, passed=9.0), "LOST", id="nothing of the map"),
-    ],
-)
-def test_a_crowd_around_the_robot_does_not_contradict_what_is_seen_between_the_people(seen_past, state):
-    quality = PoseQuality(LIMITS)
-    for _ in range(50):
-        quality.observe(BeamEvidence(100.0, short=90.0, **seen_past))
-    assert quality.judge(best()).state == state
 
 
 def test_scans_that_fit_better_elsewhere_make_a_pose_uncertain_and_lost_if_they_do_by_far():
@@ -168,7 +148,7 @@ def test_scans_that_fit_far_worse_than_they_used_to_make_a_pose_uncertain():
 
 def test_a_search_says_how_many_places_are_possible():
     quality = PoseQuality(LIMITS)
-    quality.observe(explained(0.9))
+    quality.observe(0.9)
     quality.follow_search(candidates(2))
     told = quality.judge(best(share=0.6))
     assert told.state == "GLOBAL_SEARCH"
