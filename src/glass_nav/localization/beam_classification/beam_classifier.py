@@ -12,18 +12,21 @@ from typing import Tuple
 import numpy as np
 
 from glass_nav.localization.beam_classification import (
+    beam_evidence,
     case_votes,
     expected_ranges,
     glass_map,
     preliminary_samples,
     surface_scan,
 )
+from glass_nav.localization.beam_classification.beam_evidence import BeamEvidence
 from glass_nav.localization.beam_classification.case_votes import BeamCases, CaseVote
 from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, ExpectedRanges
 from glass_nav.localization.beam_classification.glass_map import GlassEvidence, GlassMap
 from glass_nav.localization.beam_classification.preliminary_samples import PreliminarySamples
 from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
+from glass_nav.sensing.known_area import KnownArea
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
 from glass_nav.sensing.wall_thickness import wall_thickness
@@ -115,6 +118,15 @@ class BeamClassifier:
             scan.range_max_m,
             trusted,
         )
+
+    def evidence(
+        self, scan: Scan, cases: BeamCases, expected: ExpectedRanges, map_from_base: np.ndarray, known_area: KnownArea
+    ) -> BeamEvidence:
+        """How much of the scan speaks for the pose (3,), of which `expected` is, and how much against it."""
+        known_end = np.zeros(len(scan), bool)
+        known_end[scan.answered] = known_area.ends(scan.points_in_base()[scan.answered], map_from_base[None])[0]
+        seen_through = self.glass_map.chances(expected.cell[0, 0])[0]
+        return beam_evidence.of(scan.ranges_m, cases.case, expected, seen_through, known_end)
 
     @property
     def max_glass_thickness_m(self) -> float:
