@@ -20,6 +20,7 @@ COMMANDS = [
     *(["atlas", name] for name in ("build", "show", "check", "explain", "wake-up")),
     ["compare"],
     ["doctor"],
+    ["landmarks", "limits"],
     ["landmarks", "plan"],
     ["locate"],
     ["params"],
@@ -104,7 +105,7 @@ def test_without_argcomplete_there_is_no_completion_and_no_error(monkeypatch):
 )
 def test_out_is_a_folder_in_every_subcommand_that_writes(command, run):
     _, out, _ = run(*command, "--help")
-    if command in (["atlas", "check"], ["atlas", "explain"]):
+    if command in (["atlas", "check"], ["atlas", "explain"], ["landmarks", "limits"]):
         assert "--out" not in out
     else:
         assert "--out DIR" in out

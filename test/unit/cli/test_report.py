@@ -12,7 +12,15 @@ import browser
 import pytest
 from PIL import Image
 
-PICTURES = {"way.png", "cases_over_time.png", "glass.png", "errors.png", "reliability.png", "update_time.png"}
+PICTURES = {
+    "way.png",
+    "cases_over_time.png",
+    "glass.png",
+    "errors.png",
+    "integrity.png",
+    "reliability.png",
+    "update_time.png",
+}
 WORST = {f"worst_{number:02d}.png" for number in range(1, 11)}
 
 
