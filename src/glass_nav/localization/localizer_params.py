@@ -19,7 +19,8 @@ from glass_nav.localization.particle_filter.motion import OdometryNoise
 from glass_nav.localization.particle_filter.particle_filter import ParticleFilterParams
 from glass_nav.localization.particle_filter.proposal import Proposal
 from glass_nav.localization.particle_filter.resampling import ParticleCount
-from glass_nav.params import number
+from glass_nav.params import choice, number
+from glass_nav.sensing.raycast import BACKENDS
 
 BYTES_PER_PARTICLE_BEAM = 50  # measured: 36 kB a particle with 720 beams, weight_mode field
 _MAX_BEAMS = 2000  # of a scan
@@ -36,6 +37,7 @@ class Schedule:
     resample_interval: int = number(1, 1, 1000)  # updates between resamplings
     selective_resampling: bool = False  # only when the effective count is below half
     raycast_threads: int = number(1, 1, 256)
+    raycast_backend: str = choice("exact", BACKENDS)  # or "mrpt": simulateScanRay, for comparison
 
     def __post_init__(self) -> None:
         for name in ("update_min_d", "update_min_a"):
@@ -44,6 +46,8 @@ class Schedule:
         for name in ("resample_interval", "raycast_threads"):
             if not getattr(self, name) >= 1:
                 raise ValueError(f"~{name} must be >= 1, got {getattr(self, name)}")
+        if self.raycast_backend not in BACKENDS:
+            raise ValueError(f"~raycast_backend must be one of {', '.join(BACKENDS)}, got {self.raycast_backend!r}")
 
 
 @dataclass(frozen=True)
@@ -101,6 +105,7 @@ class LocalizerParams:
             self.mixture.laser_sigma_hit,
             self.mixture.laser_sigma_hit_max,
             self.schedule.raycast_threads,
+            self.schedule.raycast_backend,
         )
 
     @property
