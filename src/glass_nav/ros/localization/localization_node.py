@@ -339,9 +339,11 @@ def main(name: str = "glass_localization") -> None:
     ending = shutdown.event_on_signals()
     shutdown.core_logs_to_rosout()
     given: Dict[str, Any] = rospy.get_param("~", {})
-    unknown: List[str] = []
+    ignored: List[str] = []
     if name == "amcl":
         given, unknown = params.without_unknown(given, rospy.get_name())
+        given, wrong = params.as_amcl_reads(given, rospy.get_name())
+        ignored = unknown + wrong
     try:
         p, unused = params.localization_params(given, rospy.get_name())
     except params.ParamError as err:
@@ -350,7 +352,7 @@ def main(name: str = "glass_localization") -> None:
         node = LocalizationNode(p)
     except landmark_file.LandmarkError as err:
         shutdown.refuse_to_start(err)
-    for line in unknown:
+    for line in ignored:
         rospy.logwarn(line)
     if unused:
         rospy.loginfo(f"parameters of amcl that this filter does not use: ~{', ~'.join(unused)}")
