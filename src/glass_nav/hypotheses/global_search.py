@@ -26,15 +26,18 @@ from glass_nav.hypotheses.bearing_weights import BearingMixture
 from glass_nav.hypotheses.place_search import PlaceSearch
 from glass_nav.hypotheses.pose_tracker import PoseTracker
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
+from glass_nav.params import number
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.known_area import KnownArea
 from glass_nav.sensing.scan import Scan, spread_evenly
 from glass_nav.world.landmark_map import LandmarkMap
 
 _BEAMS = 60
-_MIN_BEAMS = 10  # with fewer a scan is no evidence
+MIN_BEAMS = 10  # with fewer a scan is no evidence
 _MAX_CANDIDATES = 1500  # that are followed
 _EVIDENCE_SCALE_M = 0.2  # a beam that ends this far from a wall fits by one half
+_UNKNOWN_FIT = 0.4  # of a beam that ends where the map knows nothing: likelier than in free space, less than at a wall
 _FULL_FIT = 20.0  # log likelihood ratio of a place where all beams end on walls to one where none does, in one view
 _VIEW_M = 2.0  # after this distance the surroundings are seen anew
 _MAX_BEHIND = 40.0  # log likelihood ratio of the best candidate to one that is dropped
@@ -57,8 +60,8 @@ _BEARINGS = BearingMixture(bearing_wrong_share=0.1, bearing_sigma_floor=0.1)
 class SearchParams:
     """When a place is accepted as found."""
 
-    search_margin: float = 8.0  # log likelihood ratio of the place to all others
-    search_least_fit: float = 0.5  # scan fit at the place, mean since it is followed, 0..1
+    search_margin: float = number(8.0, 0.0, 1000.0)  # log likelihood ratio of the place to all others
+    search_least_fit: float = number(0.5, 0.0, 1.0)  # scan fit at the place, mean since it is followed, 0..1
     recover_when_lost: bool = True  # search everywhere when the scans contradict the pose
 
     def __post_init__(self) -> None:
@@ -89,14 +92,17 @@ class Candidates:
 class GlobalSearch:
     """Follows all candidates until one is far ahead."""
 
-    def __init__(self, matcher: ScanMatcher, field: DistanceField, params: SearchParams) -> None:
+    def __init__(
+        self, matcher: ScanMatcher, field: DistanceField, params: SearchParams, area: Optional[KnownArea] = None
+    ) -> None:
         """
         Args:
             matcher: of the whole map or a part.
             field: of the map.
             params: when a place is accepted.
+            area: where the map knows something; None: everywhere.
         """
-        self._matcher, self._field, self._params = matcher, field, params
+        self._matcher, self._field, self._params, self._area = matcher, field, params, area
         self._tracker = PoseTracker(_MAX_BEHIND, _MAX_CANDIDATES)
         self._evidence = np.zeros(0)  # (K,) log likelihoods
         self._fit_sum = np.zeros(0)  # (K,) of fit times the share of a view
@@ -171,7 +177,7 @@ class GlobalSearch:
         off[:, 2] = angles.wrap(moved[:, 2] - poses[:, 2]) / noise[2]
         penalty = np.minimum(0.125 * np.sum(off**2, axis=1), _MAX_PENALTY)
         self._tracker.poses = moved
-        fits = fit(self._field, points, moved)
+        fits = fit(self._field, points, moved, self._area)
         self._evidence = self._evidence + view * _FULL_FIT * fits - penalty
         self._fit_sum = self._fit_sum + view * fits
         self._views = self._views + view
@@ -188,7 +194,7 @@ class GlobalSearch:
             return
         # Only one scan proposed them: they start behind the candidates so far, by how well each fits.
         places = _aligned(self._field, points, places, _noise_of(self._since_places))
-        fits = fit(self._field, points, places)
+        fits = fit(self._field, points, places, self._area)
         start = self._evidence.max() - self._params.search_margin
         self._append(places, start + _FULL_FIT * (fits - fits.max(initial=0.0)))
         self._keep_distinct()
@@ -210,7 +216,7 @@ class GlobalSearch:
         if not len(self._tracker) or self._since_places[0] >= _SEARCH_AGAIN_M:
             return True
         best = int(np.argmax(self._evidence))
-        fit_now = fit(self._field, points, self._tracker.poses[best : best + 1])[0]
+        fit_now = fit(self._field, points, self._tracker.poses[best : best + 1], self._area)[0]
         return bool(fit_now < _POOR_FIT * self._fit_sum[best] / max(self._views[best], 1e-9))
 
     def _append(self, poses: np.ndarray, evidence: np.ndarray) -> None:
@@ -254,9 +260,16 @@ def _aligned(field: DistanceField, points: np.ndarray, poses: np.ndarray, noise:
 def evidence_points(scan: Scan) -> Optional[np.ndarray]:
     """(B, 2) end points [m], in the robot's frame, of the beams that are evidence; None: too few returned."""
     beams = spread_evenly(scan.answered, _BEAMS)
-    return scan.points_in_base()[beams] if len(beams) >= _MIN_BEAMS else None
+    return scan.points_in_base()[beams] if len(beams) >= MIN_BEAMS else None
 
 
-def fit(field: DistanceField, points_m: np.ndarray, poses: np.ndarray) -> np.ndarray:
-    """(K,) how well such points fit at poses (K, 3), 0..1."""
-    return scan_alignment.fit(field, points_m, poses, _EVIDENCE_SCALE_M)
+def fit(
+    field: DistanceField, points_m: np.ndarray, poses: np.ndarray, area: Optional[KnownArea] = None
+) -> np.ndarray:
+    """(K,) how well such points fit at poses (K, 3), 0..1; those that end outside of the known area hardly count."""
+    if area is None:
+        return scan_alignment.fit(field, points_m, poses, _EVIDENCE_SCALE_M)
+    ends_m = se2.transform_points(poses[:, None], points_m)
+    distance_m = field.distance(ends_m[..., 0], ends_m[..., 1])
+    fits = _EVIDENCE_SCALE_M**2 / (_EVIDENCE_SCALE_M**2 + distance_m**2)
+    return np.mean(np.where(area.contains(ends_m), fits, _UNKNOWN_FIT), axis=1)

@@ -26,6 +26,7 @@ from glass_nav.hypotheses.global_search import Candidates, GlobalSearch, SearchP
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.localization.integrity.dead_reckoning import DeadReckoning
 from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.known_area import KnownArea
 from glass_nav.sensing.scan import Scan
 
 _USUAL_FIT = 0.9  # of a right pose, until it is learnt
@@ -80,6 +81,7 @@ class KidnapDetector:
         matcher: Optional[ScanMatcher],
         params: SearchParams,
         usual_fit: Optional[float] = None,
+        area: Optional[KnownArea] = None,
     ) -> None:
         """
         Args:
@@ -87,8 +89,9 @@ class KidnapDetector:
             matcher: searches everywhere. None: the map has no free cell.
             params: whether and when another place is accepted.
             usual_fit: of scans at the pose; None: not known yet.
+            area: where the map knows something; None: everywhere.
         """
-        self._field, self._matcher, self._params = field, matcher, params
+        self._field, self._matcher, self._params, self._area = field, matcher, params, area
         self._usual, self._spread = _USUAL_FIT if usual_fit is None else usual_fit, _USUAL_SPREAD
         self._learnt_m = _PRIOR_M
         self._fit = float("nan")
@@ -125,6 +128,10 @@ class KidnapDetector:
         points = global_search.evidence_points(scan)
         if points is None:
             return self._verdict
+        if self._area is not None:  # what ends elsewhere agrees with every pose
+            points = points[self._area.ends(points, map_from_base[None])[0]]
+        if len(points) < global_search.MIN_BEAMS:
+            return self._verdict
         fit = float(global_search.fit(self._field, points, map_from_base[None])[0])
         self._fit = fit if np.isnan(self._fit) else self._fit + (fit - self._fit) * -np.expm1(-step_m / _FORGET_M)
         doubted = self._usual - self._fit > max(_DOUBT[0], _DOUBT[1] * self._spread)
@@ -146,7 +153,7 @@ class KidnapDetector:
     def _begin_search(
         self, matcher: ScanMatcher, map_from_base: np.ndarray, dead_reckoning: Optional[DeadReckoning]
     ) -> None:
-        self._search = GlobalSearch(matcher, self._field, self._params)
+        self._search = GlobalSearch(matcher, self._field, self._params, self._area)
         self._search_m = self._calm_m = self._search_fit_m = 0.0
         if dead_reckoning is None:
             self._search.add(map_from_base, _HEAD_START)
