@@ -263,9 +263,7 @@ def evidence_points(scan: Scan) -> Optional[np.ndarray]:
     return scan.points_in_base()[beams] if len(beams) >= MIN_BEAMS else None
 
 
-def fit(
-    field: DistanceField, points_m: np.ndarray, poses: np.ndarray, area: Optional[KnownArea] = None
-) -> np.ndarray:
+def fit(field: DistanceField, points_m: np.ndarray, poses: np.ndarray, area: Optional[KnownArea] = None) -> np.ndarray:
     """(K,) how well such points fit at poses (K, 3), 0..1; those that end outside of the known area hardly count."""
     if area is None:
         return scan_alignment.fit(field, points_m, poses, _EVIDENCE_SCALE_M)

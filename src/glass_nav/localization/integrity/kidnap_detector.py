@@ -128,11 +128,10 @@ class KidnapDetector:
         points = global_search.evidence_points(scan)
         if points is None:
             return self._verdict
-        if self._area is not None:  # what ends elsewhere agrees with every pose
-            points = points[self._area.ends(points, map_from_base[None])[0]]
-        if len(points) < global_search.MIN_BEAMS:
+        known = points if self._area is None else points[self._area.ends(points, map_from_base[None])[0]]
+        if len(known) < global_search.MIN_BEAMS:  # what ends where the map knows nothing agrees with every pose
             return self._verdict
-        fit = float(global_search.fit(self._field, points, map_from_base[None])[0])
+        fit = float(global_search.fit(self._field, known, map_from_base[None])[0])
         self._fit = fit if np.isnan(self._fit) else self._fit + (fit - self._fit) * -np.expm1(-step_m / _FORGET_M)
         doubted = self._usual - self._fit > max(_DOUBT[0], _DOUBT[1] * self._spread)
         if self._search is None and doubted and self._params.recover_when_lost and self._matcher is not None:
