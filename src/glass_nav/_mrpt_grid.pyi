@@ -58,6 +58,9 @@ class Grid:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...  # (4, P, B) float64 ranges, float64 cosines, int32 cells
     def simulate_scan_ray_raw(self, poses: np.ndarray, angles: np.ndarray, max_range_m: float) -> np.ndarray: ...
     def normals(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...  # (H * W,) float32 each
+    def redraw(
+        self, occupancy: np.ndarray, first_row: int, first_column: int, rows: int, columns: int
+    ) -> None: ...  # occupancy: (H, W) int8, as before but for a box
 
 class ScanMatcher:
     def __init__(

@@ -16,6 +16,7 @@ from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.recording import frames
 from glass_nav.recording.frames import FrameError, FrameTree
 from glass_nav.recording.observed import HeardScan, Observed
+from glass_nav.sensing.range_limits import RangeLimits
 from glass_nav.sensing.scan import Scan, ScanError, scan_from_fields
 from glass_nav.world.grid_map import GridMap
 
@@ -186,7 +187,7 @@ def _check_lidar(
 def _check_motion_and_map(
     lidar: str, scans: Sequence[HeardScan], robot: _Robot, grid_map: Optional[GridMap]
 ) -> Iterator[Finding]:
-    mounted = False
+    mounted, limits = False, RangeLimits()
     placed: List[Tuple[Scan, np.ndarray]] = []
     for heard in scans[:: max(1, -(-len(scans) // _MAX_SCANS))]:
         try:
@@ -200,7 +201,7 @@ def _check_motion_and_map(
                 heard.angle_min_rad,
                 heard.angle_increment_rad,
                 heard.range_min_m,
-                heard.range_max_m,
+                limits.range_max_m(lidar, heard.range_max_m, heard.range_min_m, heard.ranges_m),
                 np.array(frames.planar(transform)),
                 frames.upwardness(transform) < 0.0,
             )

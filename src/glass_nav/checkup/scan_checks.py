@@ -9,12 +9,12 @@ import numpy as np
 
 from glass_nav.checkup.finding import Finding
 from glass_nav.recording.observed import HeardScan
-from glass_nav.sensing import deskew
+from glass_nav.sensing import deskew, range_limits
 
 MAX_SCANS = 400  # whose ranges are looked at, spread over the log
 _MIN_SCANS = 20
 _FEW = 0.05  # share of beams or scans that may be odd
-_LONGEST_M = 500.0  # no 2D lidar sees farther
+_OTHER_UNIT_M = 1e6  # a larger range_max is no limit in any unit
 _PILED = 30.0  # a range this many times as frequent as its neighbours is a code
 _NARROW = 0.03  # share of the beams: some at the edge of the view do no harm
 _ROBOT_M, _STILL_M, _ALIVE_M = 0.6, 0.03, 0.2  # beams that end on the robot: how near, how still, while others change
@@ -136,11 +136,8 @@ def _angles(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
 
 
 def _limits(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
-    bad = [
-        scan
-        for scan in scans
-        if not (np.isfinite([scan.range_min_m, scan.range_max_m]).all() and 0.0 <= scan.range_min_m < scan.range_max_m)
-    ]
+    bad = [scan for scan in scans if not (np.isfinite(scan.range_min_m) and 0.0 <= scan.range_min_m < scan.range_max_m)]
+    highest_m = max(scan.range_max_m for scan in scans)
     if bad:
         yield Finding(
             "scan-limits",
@@ -148,7 +145,14 @@ def _limits(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
             f"{bad[0].range_max_m:g} m",
             "set both from the lidar's data sheet, 0 <= range_min < range_max; such scans are rejected",
         )
-    elif max(scan.range_max_m for scan in scans) > _LONGEST_M:
+    elif highest_m > _OTHER_UNIT_M:
+        yield Finding(
+            "scan-range-max",
+            f"{topic}: range_max is {highest_m:g} m, which is no limit",
+            "set range_max in the driver (a parameter of pointcloud_to_laserscan), or laser_max_range of the "
+            "localization, to how far the lidar sees; until then the longest range seen is used",
+        )
+    elif range_limits.is_open(highest_m):
         yield Finding(
             "scan-units",
             f"{topic}: range_max is {scans[-1].range_max_m:g} m",

@@ -9,15 +9,12 @@ from typing import Optional
 
 import numpy as np
 
+from glass_nav.cli import out_file
 from glass_nav.evaluation.plots import location_picture
 from glass_nav.evaluation.plots.location_picture import LocatedScan
 from glass_nav.geometry import angles
-from glass_nav.localization.segments.segment_correction import (
-    METHODS,
-    SegmentCorrection,
-    SegmentCorrectionParams,
-    SegmentQuality,
-)
+from glass_nav.localization.segments import segment_locator
+from glass_nav.localization.segments.segment_correction import METHODS, SegmentCorrectionParams, SegmentQuality
 from glass_nav.localization.segments.segment_locator import Located, SegmentLocator
 from glass_nav.recording import scan_file
 from glass_nav.recording.log_file import open_log
@@ -29,9 +26,12 @@ HELP = "correct a rough pose by one scan"
 DESCRIPTION = """Moves a rough pose so that the scan's beams end at the wall segments of the map, and says how well they
 do there, and which directions the walls do not constrain. Draws the scan before and after. Good from
 about 0.5 m and 10 degrees away. Ends with 3 if the scan fits nowhere near the pose."""
+EXAMPLES = (
+    "glass_nav locate --map floor.yaml --scan scan.yaml --pose 4.3 4.0 0.0",
+    "glass_nav locate --map floor.yaml --scan run.bag --index 120 --pose 4.3 4.0 0.0 --out pictures",
+)
 
-MIN_SHARE = 0.4  # of the answering beams, that must end at walls
-MAX_M, MAX_RAD = 1.0, np.radians(20.0)  # that a pose may move: from farther away a fit is chance
+PICTURE = "located.png"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"steps of a correction (default {SegmentCorrectionParams().iterations}; document 40)",
     )
     parser.add_argument(
-        "--out", type=Path, default=Path("located.png"), metavar="PNG", help="the picture (default located.png)"
+        "--out", type=Path, default=Path("."), metavar="DIR", help=f"folder for {PICTURE}, or the file (default .)"
     )
     parser.add_argument("--scan-topic", metavar="TOPIC", help="of a log; default: the only one, or /scan")
     parser.add_argument("--base-frame", metavar="FRAME", help="of a bag; default: base_link, else base_footprint")
@@ -116,33 +116,19 @@ def main(arguments: argparse.Namespace) -> None:
     for line in _lines(scan, located, rough, len(locator.segments_m)):
         print(line)
     drawn = LocatedScan(scan.points_in_base(), located.case, locator.segments_m, rough, found.map_from_base)
+    out = out_file.in_folder(arguments.out, PICTURE)
     location_picture.draw(
-        arguments.out,
+        out,
         grid_map,
         drawn,
         f"{arguments.scan.name} on {arguments.map.name}",
         f"before: {_measures(found.before)}",
         f"after: {_measures(found.after)}",
     )
-    print(f"drawn to {arguments.out}")
-    _refuse_chance(scan, located, found.map_from_base - rough)
-
-
-def _refuse_chance(scan: Scan, located: Located, moved: np.ndarray) -> None:
-    """Raises ValueError if the scan does not fit, or only so far away that no rough pose led there."""
-    share = _share_at_walls(scan, located)
-    way_m, turn_rad = float(np.hypot(moved[0], moved[1])), float(abs(angles.wrap(moved[2])))
-    if share < MIN_SHARE:
-        raise ValueError(
-            f"the scan fits nowhere near the pose: {share:.0%} of its answering beams end at walls, "
-            f"at least {MIN_SHARE:.0%} must"
-        )
-    if way_m > MAX_M or turn_rad > MAX_RAD:
-        raise ValueError(
-            f"the scan fits nowhere near the pose: the correction led {way_m:.2f} m and "
-            f"{np.degrees(turn_rad):.0f} deg away, at most {MAX_M:g} m and {np.degrees(MAX_RAD):.0f} "
-            f"deg are no chance"
-        )
+    print(f"drawn to {out}")
+    refusal = segment_locator.refusal(scan, located, rough)
+    if refusal is not None:
+        raise ValueError(refusal)
 
 
 def _params(arguments: argparse.Namespace) -> SegmentCorrectionParams:
@@ -173,11 +159,6 @@ def _scan(arguments: argparse.Namespace) -> Scan:
     return entry.scan
 
 
-def _share_at_walls(scan: Scan, located: Located) -> float:
-    at_walls = located.correction.after.inlier_share * np.count_nonzero(located.used)
-    return float(at_walls / np.count_nonzero(scan.answered))
-
-
 def _lines(scan: Scan, located: Located, rough: np.ndarray, segments: int) -> "list[str]":
     found = located.correction
     x, y, yaw = found.map_from_base
@@ -187,24 +168,11 @@ def _lines(scan: Scan, located: Located, rough: np.ndarray, segments: int) -> "l
         f"{np.count_nonzero(located.used)} pull; {segments} wall segments",
         f"pose      x {x:.3f} m  y {y:.3f} m  yaw {yaw:.4f} rad ({np.degrees(yaw):.2f} deg)",
         f"moved     {np.hypot(moved[0], moved[1]):.3f} m, {np.degrees(angles.wrap(moved[2])):+.2f} deg",
-        f"free      {free_in_words(found)}",
+        f"free      {segment_locator.free_in_words(found)}",
         f"quality   {_measures(found.after)}; {found.after.inlier_share:.0%} of those that pull within "
         f"{SegmentCorrectionParams().outlier_m:g} m of walls",
         f"before    {_measures(found.before)}",
     ]
-
-
-def free_in_words(found: SegmentCorrection) -> str:
-    """Which directions the walls do not constrain."""
-    if not len(found.free):
-        return "nothing: the walls constrain x, y and yaw"
-    if len(found.free) == 3:
-        return "x, y and yaw: the walls constrain nothing"
-    heading = found.free_heading_rad
-    if heading is not None:
-        return f"the direction {np.degrees(heading):.0f} deg of the map: not corrected"
-    names = [name for name, weight in zip(("x", "y", "yaw"), np.linalg.norm(found.free, axis=0)) if weight > 0.3]
-    return f"{len(found.free)} of 3 directions, of {', '.join(names)}: not corrected"
 
 
 def _measures(quality: SegmentQuality) -> str:

@@ -8,24 +8,43 @@ import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from typing import Optional
+from typing import Dict, Optional
 
 import numpy as np
 
+from glass_nav.cli import out_file
 from glass_nav.cli.progress import Progress
 from glass_nav.recording.bag_writer import BagWriter
-from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings
+from glass_nav.simulation import (
+    building_file,
+    building_map,
+    erased_glass,
+    lidar,
+    occupancy_mapper,
+    path_follower,
+    shipped_buildings,
+)
+from glass_nav.simulation.building import Building
 from glass_nav.simulation.lidar import ECHOES, LidarModel
 from glass_nav.simulation.path_follower import FIRST, PathFollowerParams
 from glass_nav.simulation.robot import KINDS, RobotParams
 from glass_nav.simulation.simulation import Frame, Simulation
 from glass_nav.vocabulary import CASES_IN_ORDER
 from glass_nav.world import map_file
+from glass_nav.world.grid_map import GridMap
+
+COMPLETE, ERASING = MAPPERS = ("complete", "erasing")
+_MAPPER_STREAM = 0x3A99E4  # of the seed, for the noise of the mapping drive
 
 HELP = "drive a robot through a building of glass and record a bag"
 DESCRIPTION = """Drives a robot along a path through a building, and writes a bag of what it records (/scan, /odom, /tf,
 /clock) with the truth beside (/ground_truth, /true_beams: the case of every beam), and the map of the building.
-Needs no roscore. The same seed gives the same bag."""
+Needs no roscore. The same seed gives the same bag. Real mappers erase glass; --glass-erased and --mapper do so to the
+map, and leave the bag as it is: its truth is in terms of the whole building."""
+EXAMPLES = (
+    "glass_nav simulate glass_office --seed 1 --out simulated",
+    "glass_nav simulate glass_bridge --lidar coated --speed 0.4 --out bridge.bag",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,8 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         required=True,
         type=Path,
-        metavar="BAG",
-        help="the bag, such as run.bag; the map goes beside it as run.map.yaml",
+        metavar="DIR",
+        help="folder for BUILDING.bag, or the bag, such as run.bag; the map goes beside it as run.map.yaml; where it lacks glass, the whole one as "
+        "run.complete.map.yaml",
     )
     parser.add_argument(
         "--path",
@@ -61,6 +81,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=0.0,
         metavar="SHARE",
         help="0 to 1 of the movable furniture stands elsewhere than on the map (default 0)",
+    )
+    parser.add_argument(
+        "--mapper",
+        choices=MAPPERS,
+        default=COMPLETE,
+        help="complete: the map shows every surface (default); erasing: it is made of scans along the path, and cells "
+        "that most beams pass are free: of panes, specks remain",
+    )
+    parser.add_argument(
+        "--glass-erased",
+        type=float,
+        default=0.0,
+        metavar="SHARE",
+        help="0 to 1 of the panes are missing from the map, whole ones, by the seed (default 0)",
     )
     parser.add_argument("--rate", type=float, default=10.0, metavar="HZ", help="scans a second (default 10)")
     parser.add_argument(
@@ -82,6 +116,10 @@ def usage_error(arguments: argparse.Namespace) -> Optional[str]:
         return f"--seed must be >= 0, got {arguments.seed}"
     if not 0.0 <= arguments.changed <= 1.0:
         return f"--changed must be 0 to 1, got {arguments.changed}"
+    if not 0.0 <= arguments.glass_erased <= 1.0:
+        return f"--glass-erased must be 0 to 1, got {arguments.glass_erased}"
+    if arguments.mapper == ERASING and arguments.glass_erased > 0.0:
+        return f"--mapper {ERASING} erases what beams pass; it takes no --glass-erased, got {arguments.glass_erased}"
     if not 0.1 <= arguments.rate <= 1000.0:
         return f"--rate must be 0.1 to 1000 Hz, got {arguments.rate}"
     if not 0.0 <= arguments.turn_time * arguments.rate <= 1.0:
@@ -115,12 +153,12 @@ def main(arguments: argparse.Namespace) -> None:
     )
     pace = PathFollowerParams(speed_m_s=arguments.speed)
     way_m = simulation.follower(arguments.path, pace).length_m
-    grid_map = building_map.draw(building, arguments.resolution)
-    arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    maps = _maps(arguments, building)
+    out = out_file.in_folder(arguments.out, f"{Path(arguments.building).stem}.bag")
     tally, shown_m = _Tally(), 0
     progress = Progress("simulate", math.ceil(way_m), unit="m")
     try:
-        with BagWriter(arguments.out) as bag:
+        with BagWriter(out) as bag:
             bag.mounting(simulation.stamp_ns, simulation.base_from_laser)
             for frame in simulation.drive(arguments.path, pace):
                 write_frame(bag, frame, simulation.scan_period_s)
@@ -130,9 +168,25 @@ def main(arguments: argparse.Namespace) -> None:
                     progress.step()
     finally:
         progress.finish()
-    path_map = arguments.out.with_suffix(".map.yaml")
-    map_file.save(grid_map, path_map, ".png")
-    print(f"{tally.line()}; written to {arguments.out} and {path_map}")
+    for suffix, grid_map in maps.items():
+        map_file.save(grid_map, out.with_suffix(suffix), ".png")
+    files = [out, *(out.with_suffix(suffix) for suffix in maps)]
+    print(f"{tally.line()}; written to {', '.join(map(str, files[:-1]))} and {files[-1]}")
+
+
+def _maps(arguments: argparse.Namespace, building: Building) -> Dict[str, GridMap]:
+    """The maps to write, by the end of the bag's name: the robot's, and the complete one if that differs."""
+    complete = building_map.draw(building, arguments.resolution)
+    if arguments.mapper == ERASING:
+        rng = np.random.default_rng([arguments.seed, _MAPPER_STREAM])
+        path_m = path_follower.find(arguments.path, building)
+        drawn = occupancy_mapper.draw(building, _lidar_model(arguments), path_m, arguments.resolution, rng)
+    elif arguments.glass_erased > 0.0:
+        erased = erased_glass.choose(building, arguments.glass_erased, arguments.seed)
+        drawn = building_map.draw(building, arguments.resolution, erased)
+    else:
+        return {".map.yaml": complete}
+    return {".map.yaml": drawn, ".complete.map.yaml": complete}
 
 
 def write_frame(bag: BagWriter, frame: Frame, period_s: float) -> None:

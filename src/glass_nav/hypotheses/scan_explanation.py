@@ -12,15 +12,15 @@ from __future__ import annotations
 from typing import Optional, Tuple
 
 import numpy as np
-from scipy import ndimage
 
 from glass_nav.geometry import angles, se2
 from glass_nav.hypotheses import scan_alignment
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.known_area import KnownArea
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
-from glass_nav.world.grid_map import UNKNOWN, GridMap
+from glass_nav.world.grid_map import GridMap
 
 _BEAMS = 120  # of a scan that are used
 _NEAR_CELLS = 3.0  # a beam that ends this close to an expected range is explained
@@ -40,8 +40,7 @@ class ScanExplanation:
         self._field = DistanceField(grid_map)
         self._matcher: Optional[ScanMatcher] = None  # made at its first use: on a large map that takes time
         self._near_m = _NEAR_CELLS * grid_map.resolution_m
-        around = np.ones((2 * int(_NEAR_CELLS) + 1,) * 2, bool)
-        self._near_unknown = ndimage.binary_dilation(grid_map.occupancy == UNKNOWN, around)  # (H, W)
+        self._known_area = KnownArea(grid_map)
 
     def shares(self, scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
         """Of the beams that returned from mapped space, the share that the map explains.
@@ -106,17 +105,10 @@ class ScanExplanation:
         measured = scan.ranges_m[beams]
         offered = np.stack([hits.first_m, hits.second_m, hits.third_m, hits.mirrored_m])  # (4, P, B)
         explained = (np.abs(offered - measured) <= self._near_m).any(axis=0)
-        ends_m = np.stack([se2.transform_points(pose, points_m) for pose in poses])
-        known = explained | (hits.first_m < measured) | ~self._is_unknown(ends_m)
+        known = explained | (hits.first_m < measured) | self._known_area.ends(points_m, poses)
         count = known.sum(axis=1)
         few = count < max(_MIN_BEAMS, _MIN_KNOWN * len(beams))
         return np.where(few, np.nan, explained.sum(axis=1) / np.maximum(count, 1))
-
-    def _is_unknown(self, points_m: np.ndarray) -> np.ndarray:
-        """(...) bool: the map knows nothing of points (..., 2), or of what is next to them."""
-        rows, columns = self._grid_map.cells(points_m)
-        inside = self._grid_map.contains(rows, columns)
-        return ~inside | self._near_unknown[np.where(inside, rows, 0), np.where(inside, columns, 0)]
 
 
 def _used_beams(scan: Scan) -> Optional[np.ndarray]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import List, Optional
+from typing import List, Optional, Sequence
 
 import numpy as np
 
@@ -16,8 +16,10 @@ from glass_nav.recording import bag_messages, frames
 from glass_nav.recording.bag_messages import ODOMETRY, SCAN, TF, Bag
 from glass_nav.recording.frames import FrameError, FrameTree
 from glass_nav.recording.recording import LogOptions, RecordingError, trajectory_from_samples
+from glass_nav.sensing import range_limits
 from glass_nav.sensing.mounting import Mounting, level_mounting
-from glass_nav.sensing.scan_placement import NoTransform, Transforms
+from glass_nav.sensing.range_limits import RangeLimits
+from glass_nav.sensing.scan_placement import NoTransform, RawScan, Transforms
 
 BASE_FRAMES = ("base_link", "base_footprint")  # tried in this order when no base frame is given
 
@@ -88,7 +90,7 @@ def choose(bag: Bag, options: LogOptions, notes: List[str]) -> BagChoices:
     odometry = _odometry(bag, tree, options, notes)
     base_frame = _base_frame(tree, odometry, options)
     _check_laser(bag, scan_topic, tree, base_frame, options)
-    notes += _sweep_notes(bag, scan_topic, options.deskew)
+    notes += _scan_notes(bag, scan_topic, options)
     return BagChoices(scan_topic, tree, odometry, base_frame)
 
 
@@ -195,10 +197,16 @@ def _check_laser(bag: Bag, scan_topic: str, tree: FrameTree, base_frame: str, op
         return
 
 
-def _sweep_notes(bag: Bag, scan_topic: str, deskews: bool) -> List[str]:
-    """What the first scans say of the time that a sweep of the lidar takes."""
-    for _, message in itertools.islice(bag.messages(scan_topic), 3):
-        raw = bag_messages.raw_scan(message)
+def _scan_notes(bag: Bag, scan_topic: str, options: LogOptions) -> List[str]:
+    """What the first scans say of the lidar's range, and of the time that a sweep takes."""
+    first = [bag_messages.raw_scan(message) for _, message in itertools.islice(bag.messages(scan_topic), 3)]
+    limits = RangeLimits(options.laser_max_range)
+    notes = [range_limits.warning(raw.lidar, raw.range_max_m) for raw in first if limits.is_assumed(raw.range_max_m)]
+    return notes[:1] + _sweep_notes(first, options.deskew)
+
+
+def _sweep_notes(scans: Sequence[RawScan], deskews: bool) -> List[str]:
+    for raw in scans:
         if raw.timing_fault is not None:
             return [f"scans are taken as of one moment: {raw.timing_fault}"]
         if raw.sweep_ns and deskews:

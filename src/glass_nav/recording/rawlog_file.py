@@ -20,6 +20,7 @@ from glass_nav.recording.recording import (
     trajectory_from_samples,
 )
 from glass_nav.sensing.mounting import Mounting, level_mounting
+from glass_nav.sensing.range_limits import RangeLimits
 from glass_nav.sensing.scan import ScanError
 from glass_nav.sensing.scan_placement import NoTransform, RawScan, ScanPlacement, Transforms
 
@@ -55,7 +56,10 @@ def open_log(path: Path, options: LogOptions) -> Recording:
         log["stamps_ns"][scans] = FRAME_PERIOD_NS * np.arange(len(scans))
     odometry = None if log["paired"] else _odometry(path, log)
     truth = _ground_truth(path, options, log["stamps_ns"][scans], notes)
-    return Recording(path.name, len(scans), _Entries(log, scans, odometry, options.laser_pose), truth, notes)
+    stamps_ns = log["stamps_ns"][scans]
+    duration_s = float(stamps_ns.max() - stamps_ns.min()) * 1e-9
+    entries = _Entries(log, scans, odometry, options)
+    return Recording(path.name, len(scans), entries, truth, notes, duration_s=duration_s)
 
 
 def _scans(path: Path, log: Rawlog, options: LogOptions, holds: str, notes: List[str]) -> np.ndarray:
@@ -135,27 +139,27 @@ class _Entries:
         log: Rawlog,
         scans: np.ndarray,
         odometry: Optional[Trajectory],
-        laser_pose: Optional[Tuple[float, float, float]],
+        options: LogOptions,
     ) -> None:
-        self._log, self._scans, self._odometry, self._laser_pose = log, scans, odometry, laser_pose
+        self._log, self._scans, self._odometry, self._options = log, scans, odometry, options
         self._ends = np.cumsum(log["beams"])
 
     def __iter__(self) -> Iterator[Entry]:
-        latest_ns = -1
+        latest_ns, limits = -1, RangeLimits(self._options.laser_max_range)
         for index in self._scans.tolist():
             raw = self._raw_scan(index)
-            entry = self._entry(index, raw, latest_ns)
+            entry = self._entry(index, raw, latest_ns, limits)
             latest_ns = max(latest_ns, raw.stamp_ns)
             yield entry
 
-    def _entry(self, index: int, raw: RawScan, latest_ns: int) -> Entry:
+    def _entry(self, index: int, raw: RawScan, latest_ns: int, limits: RangeLimits) -> Entry:
         if raw.stamp_ns < 0:
             return Refusal(0, "the scan has no time")
         if raw.stamp_ns < latest_ns:
             return Refusal(raw.stamp_ns, "time runs backwards")
         sensor_pose = self._log["sensor_pose"][index].tolist()
         odometry = self._odometry_before(index) if self._odometry is None else self._odometry
-        placement = ScanPlacement(_RecordTransforms(sensor_pose, odometry, self._laser_pose))
+        placement = ScanPlacement(_RecordTransforms(sensor_pose, odometry, self._options.laser_pose), limits=limits)
         try:
             placed = placement.place(raw)
         except ScanError as err:

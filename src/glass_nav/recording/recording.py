@@ -57,6 +57,7 @@ class Recording:
     beam_truth: Optional[Iterable[BeamTruth]] = None  # by ascending stamps; read as it is iterated, like the entries
     odom_frame: str = "odom"
     base_frame: str = "base_link"
+    duration_s: Optional[float] = None  # of all of it, about; None: not known
 
     def __len__(self) -> int:
         return self.scan_count
@@ -83,6 +84,7 @@ class LogOptions:
     ground_truth: Optional[str] = None  # a topic, a file or "tf:FRAME"; "none": none is looked for
     true_beams: Optional[str] = None  # a topic; "none": none is looked for
     deskew: bool = True  # where the log has the time between beams
+    laser_max_range: float = -1.0  # [m] where a lidar sets no range_max; < 0: the longest range that it shows
 
 
 def trajectory_from_samples(stamps_ns: "List[int]", poses: "List[Tuple[float, float, float]]") -> Trajectory:

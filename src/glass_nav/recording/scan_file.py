@@ -8,6 +8,7 @@ from typing import Any, Dict, List, Sequence
 import numpy as np
 
 from glass_nav.recording.recording import RecordingError
+from glass_nav.sensing.range_limits import RangeLimits
 from glass_nav.sensing.scan import Scan, ScanError, scan_from_fields
 
 SUFFIXES = (".yaml", ".yml", ".csv")
@@ -57,7 +58,7 @@ def _from_message(path: Path, text: str, laser: np.ndarray) -> Scan:
         fields["angle_min"],
         fields["angle_increment"],
         fields["range_min"],
-        fields["range_max"],
+        RangeLimits().range_max_m("", fields["range_max"], fields["range_min"], np.array(ranges_m, float)),
         laser,
     )
 

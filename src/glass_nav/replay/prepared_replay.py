@@ -38,7 +38,7 @@ class PreparedReplay:
     @property
     def expected_scans(self) -> int:
         """About how many will be used: for a progress bar."""
-        return self.options.use.window.expected(len(self.recording))
+        return self.options.use.window.expected(len(self.recording), self.recording.duration_s)
 
     def run(
         self, step_done: Callable[[], None] = lambda: None, listen: Listener = lambda step, estimate: None
@@ -89,6 +89,7 @@ def _source(given: LogOptions, settings: ReplayParams) -> LogOptions:
         base_frame=given.base_frame or base_frame,
         odom_frame=given.odom_frame or odom_frame,
         deskew=settings.deskew.deskew,
+        laser_max_range=settings.localizer.limits.laser_max_range,
     )
 
 

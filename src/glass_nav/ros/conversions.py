@@ -26,6 +26,8 @@ from std_msgs.msg import Header
 
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
 from glass_nav.localization.initial_pose import PoseGuess
+from glass_nav.localization.integrity import protection_level
+from glass_nav.localization.integrity.protection_level import ProtectionLevels
 from glass_nav.localization.localizer import BeamCases, Estimate
 from glass_nav.msg import BeamCases as BeamCasesMsg
 from glass_nav.msg import LocalizationStatus
@@ -226,7 +228,10 @@ def surface_scan_msg(placed: PlacedScan, surface: SurfaceScan) -> LaserScan:
 
 
 def map_from_msg(msg: OccupancyGrid) -> GridMap:
-    """OccupancyGrid -> GridMap, with the yaw of its origin. ValueError if it is no valid map."""
+    """OccupancyGrid -> GridMap, with the yaw of its origin; a quaternion 0 0 0 0 is no rotation.
+
+    ValueError if it is no valid map.
+    """
     info = msg.info
     if info.width == 0 or info.height == 0:
         raise ValueError(f"a map needs at least one cell, got {info.width} x {info.height}")
@@ -238,8 +243,12 @@ def map_from_msg(msg: OccupancyGrid) -> GridMap:
     if occupancy.min() < -1 or occupancy.max() > 100:
         wrong = occupancy[(occupancy < -1) | (occupancy > 100)]
         raise ValueError(f"cells of a map must be 0 to 100 or -1 for unknown, got {wrong[0]} in {len(wrong)} cell(s)")
+    origin, turn = info.origin, info.origin.orientation
+    if (turn.x, turn.y, turn.z, turn.w) == (0.0, 0.0, 0.0, 0.0):  # of a node that does not set it
+        rospy.logwarn("the quaternion of the map's origin is 0 0 0 0: taken as no rotation")
+        origin = Pose(origin.position, Quaternion(w=1.0))
     try:
-        map_from_grid = planar_from_pose(info.origin)
+        map_from_grid = planar_from_pose(origin)
     except ValueError as err:
         raise ValueError(f"the origin of the map: {err}") from err
     return GridMap(occupancy, float(np.round(info.resolution, 7)), map_from_grid)  # float32 in the message
@@ -293,11 +302,20 @@ def grid_info(grid_map: GridMap) -> MapMetaData:
 
 
 def status_msg(
-    stamp_ns: int, map_frame: str, state: str, reason: str, used_share: float, reliability: float
+    stamp_ns: int,
+    map_frame: str,
+    state: str,
+    reason: str,
+    used_share: float,
+    reliability: float,
+    levels: ProtectionLevels = protection_level.UNKNOWN,
 ) -> LocalizationStatus:
-    return LocalizationStatus(
-        header(stamp_ns, map_frame), LocalizationState(state).code, state, reason, used_share, reliability
-    )
+    msg = LocalizationStatus(header=header(stamp_ns, map_frame), state=LocalizationState(state).code, state_name=state)
+    msg.reason, msg.used_share, msg.reliability = reason, used_share, reliability
+    msg.level_95_along_m, msg.level_95_across_m = levels.p95[:2].tolist()
+    msg.level_999_along_m, msg.level_999_across_m = levels.p999[:2].tolist()
+    msg.level_95_heading_deg, msg.level_999_heading_deg = np.degrees([levels.p95[2], levels.p999[2]]).tolist()
+    return msg
 
 
 def area_from_msg(msg: PolygonStamped, map_frame: str) -> np.ndarray:

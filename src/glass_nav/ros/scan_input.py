@@ -13,6 +13,7 @@ from glass_nav.ros.localization.params import LocalizationNodeParams
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.tf_transforms import TfTransforms
 from glass_nav.sensing.deskew import Deskew
+from glass_nav.sensing.range_limits import RangeLimits
 from glass_nav.sensing.scan_placement import ScanPlacement
 from glass_nav.sensing.scan_queue import ScanQueue
 
@@ -20,14 +21,23 @@ from glass_nav.sensing.scan_queue import ScanQueue
 class ScanInput(ScanQueue):
     """A queue of scans that is fed by topics and gets its transforms from tf."""
 
-    def __init__(self, p: LocalizationNodeParams, deskew: Deskew, tf: tf2_ros.Buffer, log: LogThrottle) -> None:
+    def __init__(
+        self,
+        p: LocalizationNodeParams,
+        deskew: Deskew,
+        tf: tf2_ros.Buffer,
+        log: LogThrottle,
+        laser_max_range_m: float = -1.0,
+    ) -> None:
         self._tf = tf
+        self._limits = RangeLimits(laser_max_range_m)
         super().__init__(self._placement_by_tf(p, deskew), p.transform_wait_s, rospy.get_time(), log.warn)
         self._topics = p.scan_topics or ("scan",)
         self._subscribers: List[rospy.Subscriber] = []
 
-    def reconfigure(self, p: LocalizationNodeParams, deskew: Deskew) -> None:
+    def reconfigure(self, p: LocalizationNodeParams, deskew: Deskew, laser_max_range_m: float) -> None:
         """Change the parameters."""
+        self._limits.use(laser_max_range_m)
         self.use(self._placement_by_tf(p, deskew), p.transform_wait_s)
 
     def subscribe(self, put: Callable[[LaserScan], None]) -> None:
@@ -50,4 +60,5 @@ class ScanInput(ScanQueue):
         )
 
     def _placement_by_tf(self, p: LocalizationNodeParams, deskew: Deskew) -> ScanPlacement:
-        return ScanPlacement(TfTransforms(self._tf, p.odom_frame_id, p.base_frame_id), deskew.deskew)
+        transforms = TfTransforms(self._tf, p.odom_frame_id, p.base_frame_id)
+        return ScanPlacement(transforms, deskew.deskew, self._limits)

@@ -93,6 +93,23 @@ class RayCaster:
     def grid_map(self) -> GridMap:
         return self._grid_map
 
+    def redraw(self, grid_map: GridMap) -> None:
+        """Go on with the same map after some of its cells changed. Not while another thread casts.
+
+        Takes as long as the box around the changed cells is large, not the map.
+
+        Raises:
+            ValueError: the map has other cells: shape, resolution or place.
+        """
+        rows, columns = changed_box(self._grid_map, grid_map)
+        self._grid_map = grid_map
+        if rows.start == rows.stop:
+            return
+        self._grid.redraw(
+            grid_map.occupancy, rows.start, columns.start, rows.stop - rows.start, columns.stop - columns.start
+        )
+        self._normals = None
+
     def cast(self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float) -> np.ndarray:
         """Ranges to the first surface.
 
@@ -231,6 +248,21 @@ class RayCaster:
         if not (np.isfinite(max_range_m) and max_range_m > 0.0):
             raise ValueError(f"ray caster: max_range must be finite and > 0 m, got {max_range_m}")
         return se2.compose(self._grid_from_map, poses), angles_rad
+
+
+def changed_box(before: GridMap, after: GridMap) -> Tuple[slice, slice]:
+    """Rows and columns of the box around all cells that differ between two maps of the same cells; empty: none does.
+
+    Raises:
+        ValueError: they have other cells: shape, resolution or place.
+    """
+    if after.place != before.place:
+        raise ValueError(f"ray caster: a redrawn map must have the cells {before.place}, got {after.place}")
+    differs = before.occupancy != after.occupancy
+    rows, columns = (np.flatnonzero(differs.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return slice(0, 0), slice(0, 0)
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
 
 
 def _check_limits(max_thickness_m: float, min_linearity: float, min_gap_m: float) -> None:

@@ -127,9 +127,11 @@ def scan_from_fields(
         raise ScanError(f"angle_increment must be finite and not 0 rad, got {angle_increment_rad}", stamp_ns)
     if not np.isfinite(angle_min_rad):
         raise ScanError(f"angle_min must be finite, got {angle_min_rad}", stamp_ns)
+    if not (np.isfinite(range_min_m) and range_min_m >= 0.0):
+        raise ScanError(f"range_min must be in [0, range_max = {range_max_m}) m, got {range_min_m}", stamp_ns)
     if not (np.isfinite(range_max_m) and range_max_m > 0.0):
         raise ScanError(f"range_max must be finite and > 0 m, got {range_max_m}", stamp_ns)
-    if not (np.isfinite(range_min_m) and 0.0 <= range_min_m < range_max_m):
+    if not range_min_m < range_max_m:
         raise ScanError(f"range_min must be in [0, range_max = {range_max_m}) m, got {range_min_m}", stamp_ns)
     if np.shape(base_from_laser) != (3,) or not np.all(np.isfinite(base_from_laser)):
         raise ScanError(f"the laser's pose on the robot must be finite x, y, yaw, got {base_from_laser}", stamp_ns)

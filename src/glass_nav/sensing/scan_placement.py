@@ -11,8 +11,9 @@ from typing import Optional, Protocol
 import numpy as np
 
 from glass_nav.geometry.trajectory import Trajectory
-from glass_nav.sensing import deskew
+from glass_nav.sensing import deskew, range_limits
 from glass_nav.sensing.mounting import Mounting
+from glass_nav.sensing.range_limits import RangeLimits
 from glass_nav.sensing.scan import Scan, ScanError, scan_from_fields
 
 
@@ -68,15 +69,16 @@ class PlacedScan:
     odom_from_base: np.ndarray  # (3,) at its stamp
 
 
-def mounted(raw: RawScan, mounting: Mounting) -> Scan:
+def mounted(raw: RawScan, mounting: Mounting, limits: Optional[RangeLimits] = None) -> Scan:
     """The scan of a lidar that sits there, as measured. ScanError if its fields describe no lidar."""
+    limits = limits or RangeLimits()
     return scan_from_fields(
         raw.stamp_ns,
         raw.ranges_m,
         raw.angle_min_rad,
         raw.angle_increment_rad,
         raw.range_min_m,
-        raw.range_max_m,
+        limits.range_max_m(raw.lidar, raw.range_max_m, raw.range_min_m, raw.ranges_m),
         mounting.base_from_laser,
         mounting.upside_down,
         raw.lidar,
@@ -87,12 +89,24 @@ def mounted(raw: RawScan, mounting: Mounting) -> Scan:
 class ScanPlacement:
     """Places scans by the transforms of one robot."""
 
-    def __init__(self, transforms: Transforms, deskews: bool = True) -> None:
+    def __init__(self, transforms: Transforms, deskews: bool = True, limits: Optional[RangeLimits] = None) -> None:
+        """
+        Args:
+            transforms: of the robot.
+            deskews: whether scans are deskewed.
+            limits: what is known of the lidars so far; None: nothing.
+        """
         self._transforms, self._deskews = transforms, deskews
+        self._limits = limits or RangeLimits()
 
     def timing_fault(self, raw: RawScan) -> Optional[str]:
         """Why the scan cannot be deskewed although it should be; None if it can."""
         return raw.timing_fault if self._deskews else None
+
+    def range_fault(self, raw: RawScan) -> Optional[str]:
+        """A warning if the scan sets no range_max and the longest range seen stands in for it; else None."""
+        assumed = self._limits.is_assumed(raw.range_max_m)
+        return range_limits.warning(raw.lidar, raw.range_max_m) if assumed else None
 
     def missing(self, raw: RawScan) -> Optional[str]:
         """The first transform that the scan lacks, in words; None if place() finds all that it needs."""
@@ -116,11 +130,12 @@ class ScanPlacement:
         """
         odom_from_base = self._transforms.odom_from_base(raw.stamp_ns)
         mounting = self._transforms.mounting(raw.lidar, raw.stamp_ns)
-        return PlacedScan(raw, self._deskewed(raw, mounted(raw, mounting)), mounting, odom_from_base)
+        return PlacedScan(raw, self._deskewed(raw, mounted(raw, mounting, self._limits)), mounting, odom_from_base)
 
     def scan(self, raw: RawScan) -> Scan:
         """The scan alone; odometry is needed only to deskew it. Raises as place() does."""
-        return self._deskewed(raw, mounted(raw, self._transforms.mounting(raw.lidar, raw.stamp_ns)))
+        mounting = self._transforms.mounting(raw.lidar, raw.stamp_ns)
+        return self._deskewed(raw, mounted(raw, mounting, self._limits))
 
     def _sweep_ns(self, raw: RawScan) -> int:
         return raw.sweep_ns if self._deskews else 0

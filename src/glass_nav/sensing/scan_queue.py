@@ -16,7 +16,7 @@ STALE_SCANS = 20  # that many older scans of one lidar in a row: its clock was s
 MAX_LIDARS = 16  # a driver that makes up a frame for every scan must not fill the memory
 MAX_PERIOD_S = 5.0  # scans farther apart are a pause
 MAX_WAITING = 100  # scans of one lidar
-_WARNING_PERIOD_S, _FAULT_PERIOD_S = 5.0, 60.0  # between two warnings of a kind
+_WARNING_PERIOD_S, _FAULT_PERIOD_S, _ONCE_S = 5.0, 60.0, float("inf")  # between two warnings of a kind
 
 
 @dataclass
@@ -119,6 +119,9 @@ class ScanQueue:
         fault = self._placement.timing_fault(raw)
         if fault is not None:
             self._warn(f"scans are taken as of one moment: {fault}", _FAULT_PERIOD_S)
+        no_limit = self._placement.range_fault(raw)
+        if no_limit is not None:
+            self._warn(no_limit, _ONCE_S)
         return self._placement.place(raw)
 
     def restart(self, now_s: float) -> None:

@@ -11,16 +11,31 @@ from scipy import ndimage
 
 from glass_nav.world.grid_map import GridMap
 
+SOLID_M = 0.8
 
-def wall_thickness(grid_map: GridMap, solid_m: float = 0.8) -> np.ndarray:
+
+def wall_thickness(grid_map: GridMap, solid_m: float = SOLID_M) -> np.ndarray:
     """(H * W,) float32 [m] for occupied cells, one cell's edge where the map is thicker than solid_m.
 
     Twice the largest distance to the outside near the cell; 0 for cells that are not occupied.
     """
-    occupied = grid_map.occupied
+    return _of(grid_map.occupied, grid_map.resolution_m, solid_m).ravel()
+
+
+def redraw(thickness_m: np.ndarray, grid_map: GridMap, rows: slice, columns: slice) -> None:
+    """Bring the thickness (H * W,) of all walls, with SOLID_M, up to date after cells in a box of the map changed."""
+    reach = 2 * (int(round(0.5 * SOLID_M / grid_map.resolution_m)) + 1)  # a climb, and the distance it ends at
+    near = tuple(slice(max(0, box.start - reach), box.stop + reach) for box in (rows, columns))
+    around = tuple(slice(max(0, box.start - reach), box.stop + reach) for box in near)
+    middle = tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(near, around))
+    fresh = _of(grid_map.occupied[around], grid_map.resolution_m, SOLID_M)
+    thickness_m.reshape(grid_map.occupancy.shape)[near] = fresh[middle]
+
+
+def _of(occupied: np.ndarray, resolution: float, solid_m: float) -> np.ndarray:
+    """(H, W) thickness of the occupied cells (H, W)."""
     if not occupied.any():
-        return np.zeros(occupied.size, np.float32)
-    resolution = grid_map.resolution_m
+        return np.zeros(occupied.shape, np.float32)
     inside = ndimage.distance_transform_edt(np.pad(occupied, 1))[1:-1, 1:-1].astype(np.float32)
     reach = max(1, int(round(0.5 * solid_m / resolution)))
     rows, columns = np.nonzero(occupied)
@@ -28,7 +43,7 @@ def wall_thickness(grid_map: GridMap, solid_m: float = 0.8) -> np.ndarray:
     half = ridge[rows, columns]
     thickness = np.zeros(occupied.shape, np.float32)
     thickness[rows, columns] = np.where((2.0 * half - 1.0) * resolution > solid_m, 1.0, 2.0 * half - 1.0)
-    return (thickness * resolution).ravel()
+    return thickness * np.float32(resolution)
 
 
 def _largest_uphill(inside: np.ndarray, reach: int) -> np.ndarray:

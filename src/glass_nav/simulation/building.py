@@ -223,6 +223,13 @@ class Building:
         lines = [pane.line_m for pane in self.panes] + [mirror.line_m for mirror in self.mirrors]
         return replace(self, panes=tuple(Pane(line_m, film=True) for line_m in lines), mirrors=())
 
+    def as_mapped(self) -> "Building":
+        """The building as it was when the map was drawn, without people."""
+        things = tuple(replace(thing, present=True) for thing in self.things if thing.mapped)
+        return replace(
+            self, things=things, doors=tuple(replace(door, now=door.mapped) for door in self.doors), people=()
+        )
+
     def changed(self, share: float, rng: np.random.Generator) -> "Building":
         """The same building after furniture was moved; the map does not show it.
 

@@ -8,9 +8,10 @@ unknown: the inside of walls and furniture, the far side of walls, unseen rooms,
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import List, Tuple, Union
+from typing import Collection, List, Tuple, Union
 
 import numpy as np
 from scipy import ndimage
@@ -27,12 +28,13 @@ STEPS_PER_CELL = 10
 MIN_SHARE = 0.35  # of a cell's width that a surface must cross: where it only cuts a corner, more beams pass than end
 
 
-def draw(building: Building, resolution_m: float = RESOLUTION_M) -> GridMap:
+def draw(building: Building, resolution_m: float = RESOLUTION_M, erased: Collection[int] = ()) -> GridMap:
     """The map of a building: mapped things only, removed ones included.
 
     Args:
         building: if it is open to the outside, the outside within MARGIN_M counts as seen.
         resolution_m: edge length of a cell, > 0.
+        erased: indices of panes that the mapper took for free space; the rest of the map is the same.
     """
     if not (np.isfinite(resolution_m) and resolution_m > 0.0):
         raise ValueError(f"a map needs resolution > 0 m, got {resolution_m}")
@@ -48,14 +50,15 @@ def draw(building: Building, resolution_m: float = RESOLUTION_M) -> GridMap:
     low = np.floor((ends.min(axis=0) - MARGIN_M) / resolution_m).astype(int)
     columns, rows = np.ceil((ends.max(axis=0) + MARGIN_M) / resolution_m).astype(int) - low
     grid = GridMap(np.full((rows, columns), UNKNOWN, np.int8), resolution_m, np.append(low * resolution_m, 0.0))
-    row, column = grid.cells(_points(from_m, to_m, resolution_m / STEPS_PER_CELL))
-    points = np.bincount(row * columns + column, minlength=rows * columns).reshape(rows, columns)
-    surface = points >= MIN_SHARE * STEPS_PER_CELL
+    surface = _surface(grid, from_m, to_m)
     regions, _ = ndimage.label(~surface)  # connected by edges
     reached = np.unique(regions[grid.cells(seeds)])
     free = np.isin(regions, reached[reached > 0])
     grid.occupancy[free] = 0
     grid.occupancy[surface & ndimage.binary_dilation(free, np.ones((3, 3), bool))] = 100
+    if erased:
+        kept = tuple(pane for index, pane in enumerate(building.panes) if index not in erased)
+        grid.occupancy[grid.occupied & ~_surface(grid, *_mapped_lines(replace(building, panes=kept)))] = 0
     return grid
 
 
@@ -93,6 +96,14 @@ def _mapped_lines(building: Building) -> Tuple[np.ndarray, np.ndarray]:
         np.concatenate([surfaces.from_m[opaque], glass[:, 0]]),
         np.concatenate([surfaces.to_m[opaque], glass[:, 1]]),
     )
+
+
+def _surface(grid: GridMap, from_m: np.ndarray, to_m: np.ndarray) -> np.ndarray:
+    """(H, W) bool: cells that a line crosses, not only at a corner."""
+    rows, columns = grid.occupancy.shape
+    row, column = grid.cells(_points(from_m, to_m, grid.resolution_m / STEPS_PER_CELL))
+    points = np.bincount(row * columns + column, minlength=rows * columns).reshape(rows, columns)
+    return points >= MIN_SHARE * STEPS_PER_CELL
 
 
 def _points(from_m: np.ndarray, to_m: np.ndarray, step_m: float) -> np.ndarray:

@@ -179,6 +179,7 @@ ON_EACH_MESSAGE: "List[Tuple[str, faults.Change, Set[str]]]" = [
         set(),
     ),
     ("scan-limits", scans(lambda i, m: with_fields(m, range_max=0.0)), {"scan-blind"}),
+    ("scan-range-max", scans(lambda i, m: with_fields(m, range_max=np.inf)), set()),
     ("scan-blind", scans(lambda i, m: with_ranges(m, lambda r: np.where(np.arange(len(r)) % 40, np.inf, r))), set()),
     ("no-return-as-range", scans(no_return_as(4.5)), set()),
     ("scan-repeats", scans(repeat(3)), set()),

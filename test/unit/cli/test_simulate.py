@@ -149,6 +149,23 @@ def test_the_map_does_not_know_what_moved(run, tmp_path):
     assert maps[0] == maps[1]
 
 
+@pytest.mark.parametrize("options", [("--glass-erased", 1.0), ("--mapper", "erasing")])
+def test_a_map_without_its_glass_comes_with_the_complete_one_and_the_same_bag(run, tmp_path, options):
+    assert run()[0] == 0
+    bag, complete = (tmp_path / "run.bag").read_bytes(), (tmp_path / "run.map.png").read_bytes()
+    code, out, err = run(*options)
+    assert code == 0, err
+    assert out.endswith("written to run.bag, run.map.yaml and run.complete.map.yaml\n")
+    assert (tmp_path / "run.bag").read_bytes() == bag
+    assert (tmp_path / "run.complete.map.png").read_bytes() == complete
+    pane = np.column_stack([np.full(40, 3.0), np.linspace(1.5, 3.9, 40)])
+    shares = [
+        np.mean(grid.occupied[grid.cells(pane)])
+        for grid in (map_file.load(tmp_path / f"run.{name}.yaml") for name in ("map", "complete.map"))
+    ]
+    assert shares[0] < 0.8 and shares[1] == 1.0
+
+
 def test_a_building_of_the_package_is_named(run):
     assert run("--path", "no", building="glass_office")[2].startswith("glass_nav simulate: glass_office: no path 'no'")
 
@@ -179,6 +196,11 @@ def test_bad_input_is_one_line_and_exit_code_3(run, hall, tmp_path):
     [
         (["--seed", "-1"], "--seed must be >= 0, got -1"),
         (["--changed", "1.5"], "--changed must be 0 to 1, got 1.5"),
+        (["--glass-erased", "-1"], "--glass-erased must be 0 to 1, got -1.0"),
+        (
+            ["--glass-erased", "0.5", "--mapper", "erasing"],
+            "--mapper erasing erases what beams pass; it takes no --glass-erased, got 0.5",
+        ),
         (["--rate", "0"], "--rate must be 0.1 to 1000 Hz, got 0.0"),
         (["--speed", "0"], "--speed must be > 0 m/s, got 0.0"),
         (["--resolution", "0"], "--resolution must be 0.01 to 1 m, got 0.0"),

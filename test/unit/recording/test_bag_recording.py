@@ -84,6 +84,18 @@ def test_a_time_that_no_lidar_takes_is_said_and_not_used(room_bag):
     assert all(step.scan.origins_m is None for step in steps(recording))
 
 
+def test_a_lidar_without_range_max_is_used_up_to_the_longest_range_so_far(room_bag):
+    bag = room_bag(scan_fields=lambda index, fields: {**fields, "range_max": np.inf})
+    recording = open_log(bag.write())
+    assert recording.notes[-2].startswith("range_max of lidar 'laser' is inf m, which is no limit: the longest range")
+    limits_m = [step.scan.range_max_m for step in steps(recording)]
+    assert limits_m == sorted(limits_m) and limits_m[-1] < 7.0  # the room's diagonal is 6.6 m
+    assert [step.scan.range_max_m for step in steps(recording)] == limits_m  # the second time as the first
+    given = open_log(bag.path, LogOptions(laser_max_range=25.0))
+    assert {step.scan.range_max_m for step in steps(given)} == {25.0}
+    assert not [note for note in given.notes if "range_max" in note]
+
+
 def test_two_lidars_on_one_topic_are_told_apart_by_frame(room_bag):
     def rear_is_late(index, fields):
         if index % 2 == 0:

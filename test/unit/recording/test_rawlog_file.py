@@ -193,7 +193,7 @@ def test_scans_that_cannot_be_used_are_refused_one_by_one():
         "odometry": np.zeros((0, 3)),
     }
     good["sensor_pose"][3, 5] = np.pi / 2
-    entries = list(_Entries(good, np.arange(6), None, None))
+    entries = list(_Entries(good, np.arange(6), None, LogOptions()))
     assert isinstance(entries[0], Step) and isinstance(entries[5], Step)
     assert [entry.reason for entry in entries if isinstance(entry, Refusal)] == [
         "time runs backwards",

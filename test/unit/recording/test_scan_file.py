@@ -35,6 +35,14 @@ def test_what_rostopic_writes_is_a_scan(tmp_path):
     assert scan.base_from_laser.tolist() == [0.1, 0.2, 0.3]
 
 
+def test_a_range_max_that_is_no_limit_is_the_longest_range(tmp_path):
+    path = tmp_path / "scan.yaml"
+    path.write_text(MESSAGE.replace("range_max: 10.0", "range_max: inf"))
+    scan = scan_file.load(path)
+    np.testing.assert_array_equal(scan.ranges_m, [1.0, np.nan, np.inf, 2.5, -np.inf])
+    assert scan.range_max_m == pytest.approx(2.51)
+
+
 @pytest.mark.parametrize("head", ["", "angle_rad,range_m\n", "# of a robot\n"])
 def test_a_table_of_angles_and_ranges_is_a_scan(tmp_path, head):
     path = tmp_path / "scan.csv"

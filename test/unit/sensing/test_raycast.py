@@ -289,3 +289,33 @@ def test_pymrpt_sees_the_same_walls(backend):
     ours_m = RayCaster(world, backend).cast([[2.0, 2.0, 0.3]], np.linspace(-np.pi, np.pi, 181), 16.0)[0]
     assert np.median(np.abs(theirs_m - ours_m)) < 0.05
     assert np.mean(np.abs(theirs_m - ours_m) < 0.1) > 0.95
+
+
+@pytest.mark.parametrize("make", GRIDS)
+@pytest.mark.parametrize("unknown", ["pass", "stop"])
+def test_a_redrawn_map_is_as_a_new_one(make, unknown):
+    rng = np.random.default_rng(7)
+    before = np.asarray(make(rng), np.int8)
+    caster = RayCaster(grid_map(before, map_from_grid=(1.0, -2.0, 0.3)), unknown=unknown)
+    caster.normals()
+    cells = before
+    for _ in range(3):
+        cells = cells.copy()
+        row, column = (int(rng.integers(0, size)) for size in cells.shape)
+        cells[row : row + int(rng.integers(1, 9)), column : column + int(rng.integers(1, 9))] = rng.choice([0, 100, -1])
+        world = grid_map(cells, map_from_grid=(1.0, -2.0, 0.3))
+        caster.redraw(world)
+        fresh = RayCaster(world, unknown=unknown)
+        assert caster.grid_map is world
+        poses, angles_rad = poses_around(rng, world, 40), np.linspace(-np.pi, np.pi, 31)
+        np.testing.assert_array_equal(caster.cast(poses, angles_rad, 90.0), fresh.cast(poses, angles_rad, 90.0))
+        for ours, theirs in zip(
+            (*caster.normals(), caster.wall_offsets_m()), (*fresh.normals(), fresh.wall_offsets_m())
+        ):
+            np.testing.assert_array_equal(ours, theirs)
+
+
+def test_a_map_of_other_cells_is_no_redrawn_one():
+    caster = RayCaster(grid_map(np.zeros((3, 4))))
+    with pytest.raises(ValueError, match="ray caster: a redrawn map must have the cells 3 4 0.250000 .* got 3 5 0.25"):
+        caster.redraw(grid_map(np.zeros((3, 5))))

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from glass_nav.sensing import wall_thickness as walls
+from glass_nav.sensing.raycast import changed_box
 from glass_nav.sensing.wall_thickness import wall_thickness
 from glass_nav.world.grid_map import GridMap
 
@@ -76,3 +78,19 @@ def test_coarse_cells_are_walls_of_one_cell():
     thickness_m = thickness_of(occupied, resolution_m=0.5)
     np.testing.assert_allclose(thickness_m[:, 4], 0.5, rtol=1e-5)
     assert np.all(thickness_m[:, :4] == 0.0)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_redrawn_box_is_as_if_all_was_worked_out(seed):
+    rng = np.random.default_rng(seed)
+    before = np.where(rng.random((90, 110)) < 0.02, 100, 0).astype(np.int8)
+    for _ in range(12):
+        row, column = rng.integers(0, 90), rng.integers(0, 110)
+        before[row : row + rng.integers(1, 40), column : column + rng.integers(1, 40)] = 100
+    after = before.copy()
+    row, column = rng.integers(0, 90), rng.integers(0, 110)
+    after[row : row + rng.integers(1, 12), column : column + rng.integers(1, 12)] = rng.choice([0, 100])
+    maps = [GridMap(cells, CELL_M, np.zeros(3)) for cells in (before, after)]
+    thickness_m = wall_thickness(maps[0])
+    walls.redraw(thickness_m, maps[1], *changed_box(*maps))
+    np.testing.assert_array_equal(thickness_m, wall_thickness(maps[1]))

@@ -57,6 +57,25 @@ def test_glass_is_drawn_like_a_wall_and_the_room_behind_only_if_seen():
     assert along(building_map.draw(seen), (1.0, 2.0), (5.0, 2.0)) == [FREE, WALL, FREE]
 
 
+def test_erased_panes_are_free_and_the_rest_of_the_map_is_the_same():
+    lines = [[[3.01, 0.0], [3.01, 4.03]], [[4.5, 0.0], [4.5, 4.03]]]
+    post = Thing(box(3.01, 2.0, 0.1, 0.1))
+    building = Building(
+        (ROOM,),
+        tuple(Pane(np.array(line)) for line in lines),
+        things=(post,),
+        paths=PATH,
+        start=START,
+        seen_m=np.array([[4.0, 1.0], [5.0, 1.0]]),
+    )
+    whole, lacking = building_map.draw(building), building_map.draw(building, erased=[0])
+    rows, columns = np.nonzero(whole.occupancy != lacking.occupancy)
+    assert (lacking.occupancy[rows, columns] == FREE).all() and (whole.occupancy[rows, columns] == WALL).all()
+    assert np.abs(whole.centres(rows, columns)[:, 0] - 3.01).max() < 0.05
+    assert along(lacking, (1.0, 1.0), (5.0, 1.0)) == [FREE, WALL, FREE]
+    assert along(lacking, (1.0, 2.01), (4.0, 2.01)) == [FREE, WALL, UNKNOWN, WALL, FREE]  # a post of its frame
+
+
 @pytest.mark.parametrize("gap_m", [0.01, 0.05, 0.09])
 def test_double_glazing_is_drawn_as_one_surface(gap_m):
     line = np.array([[3.01, 0.0], [3.01, 4.03]])

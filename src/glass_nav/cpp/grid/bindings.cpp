@@ -49,6 +49,20 @@ std::unique_ptr<GridRaycaster> make_grid(const Array<std::int8_t>& occupancy, do
   return std::make_unique<GridRaycaster>(cells, height, width, resolution_m, occupied_percent, chosen, unknown_stops);
 }
 
+void redraw(GridRaycaster& grid, const Array<std::int8_t>& occupancy, int first_row, int first_column, int rows,
+            int columns) {
+  if (occupancy.ndim() != 2 || occupancy.shape(0) != grid.height() || occupancy.shape(1) != grid.width()) {
+    throw std::invalid_argument("occupancy must be (H, W) as before");
+  }
+  if (first_row < 0 || first_column < 0 || rows < 1 || columns < 1 || rows > grid.height() - first_row ||
+      columns > grid.width() - first_column) {
+    throw std::invalid_argument("the box must be in the grid");
+  }
+  const std::int8_t* cells = occupancy.data();
+  py::gil_scoped_release unlocked;
+  grid.redraw(cells, {first_column, first_row, first_column + columns, first_row + rows});
+}
+
 py::array_t<double> cast(const GridRaycaster& grid, const Array<double>& poses, const Array<double>& angles,
                          double max_range_m, int threads) {
   const RayBatch rays = batch_of(poses, angles, max_range_m, threads);
@@ -209,7 +223,9 @@ PYBIND11_MODULE(_mrpt_grid, module) {
       .def("cast_paths", &cast_paths, py::arg("poses"), py::arg("angles"), py::arg("reach_m"),
            py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"), py::arg("threads"))
       .def("simulate_scan_ray_raw", &simulate_scan_ray_raw, py::arg("poses"), py::arg("angles"), py::arg("max_range_m"))
-      .def("normals", &normals);
+      .def("normals", &normals)
+      .def("redraw", &redraw, py::arg("occupancy"), py::arg("first_row"), py::arg("first_column"), py::arg("rows"),
+           py::arg("columns"));
   py::class_<ScanMatcher>(module, "ScanMatcher")
       .def(py::init(&make_matcher), py::arg("scores"), py::arg("allowed"))
       .def("search", &search, py::arg("points"), py::arg("headings_rad"), py::arg("keep"));

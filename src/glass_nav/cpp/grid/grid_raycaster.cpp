@@ -46,7 +46,12 @@ Backend backend_from_name(const std::string& name) {
 
 GridRaycaster::GridRaycaster(const std::int8_t* occupancy, int height, int width, double resolution_m,
                              int occupied_percent, Backend backend, bool unknown_stops)
-    : width_(width), height_(height), resolution_m_(resolution_m), backend_(backend) {
+    : width_(width),
+      height_(height),
+      resolution_m_(resolution_m),
+      occupied_percent_(occupied_percent),
+      unknown_stops_(unknown_stops),
+      backend_(backend) {
   if (width < 1 || height < 1) throw std::invalid_argument("a grid needs at least one cell");
   if (!(resolution_m > 0.0 && std::isfinite(resolution_m))) throw std::invalid_argument("resolution must be > 0 m");
   const std::int64_t count = static_cast<std::int64_t>(width) * height;
@@ -60,24 +65,38 @@ GridRaycaster::GridRaycaster(const std::int8_t* occupancy, int height, int width
                                 std::to_string(map_.getSizeY()) + " cells of a grid of " + std::to_string(width) +
                                 " x " + std::to_string(height));
   }
-  std::vector<std::uint8_t> blocked(count);
-  for (std::int64_t cell = 0; cell < count; ++cell) {
-    const bool unknown = occupancy[cell] < 0;
-    const bool occupied = !unknown && occupancy[cell] >= occupied_percent;
-    blocked[cell] = occupied || (unknown && unknown_stops) ? 1 : 0;
-    map_.setCell(static_cast<int>(cell % width), static_cast<int>(cell / width),
-                 occupied ? kOccupied : (unknown ? kUnknown : kFree));
+  chessboard_distance_ = std::make_unique<ChessboardDistance>(drawn(occupancy, {0, 0, width, height}), width, height);
+}
+
+void GridRaycaster::redraw(const std::int8_t* occupancy, const CellBox& box) {
+  chessboard_distance_->redraw(box, drawn(occupancy, box));
+  if (normals_ != nullptr) normals_ = std::make_unique<const WallNormals>(occupied(), width_, height_, *normals_, box);
+}
+
+std::vector<std::uint8_t> GridRaycaster::drawn(const std::int8_t* occupancy, const CellBox& box) {
+  std::vector<std::uint8_t> blocked;
+  blocked.reserve(static_cast<std::size_t>(box.x1 - box.x0) * (box.y1 - box.y0));
+  for (int y = box.y0; y < box.y1; ++y) {
+    for (int x = box.x0; x < box.x1; ++x) {
+      const std::int8_t percent = occupancy[static_cast<std::ptrdiff_t>(y) * width_ + x];
+      const bool unknown = percent < 0, occupied = !unknown && percent >= occupied_percent_;
+      blocked.push_back(occupied || (unknown && unknown_stops_) ? 1 : 0);
+      map_.setCell(x, y, occupied ? kOccupied : (unknown ? kUnknown : kFree));
+    }
   }
-  chessboard_distance_ = std::make_unique<const ChessboardDistance>(blocked, width, height);
+  return blocked;
+}
+
+std::vector<std::uint8_t> GridRaycaster::occupied() const {
+  const GridCells grid = cells();
+  std::vector<std::uint8_t> occupied(map_.getRawMap().size());
+  for (std::size_t i = 0; i < occupied.size(); ++i) occupied[i] = grid.occupied(static_cast<std::int32_t>(i)) ? 1 : 0;
+  return occupied;
 }
 
 const WallNormals& GridRaycaster::normals() const {
-  std::call_once(normals_once_, [this] {
-    const GridCells grid = cells();
-    std::vector<std::uint8_t> occupied(map_.getRawMap().size());
-    for (std::size_t i = 0; i < occupied.size(); ++i) occupied[i] = grid.occupied(static_cast<std::int32_t>(i)) ? 1 : 0;
-    normals_ = std::make_unique<const WallNormals>(occupied, width_, height_);
-  });
+  std::call_once(normals_once_,
+                 [this] { normals_ = std::make_unique<const WallNormals>(occupied(), width_, height_); });
   return *normals_;
 }
 

@@ -69,6 +69,10 @@ class GridRaycaster {
   GridRaycaster(const std::int8_t* occupancy, int height, int width, double resolution_m, int occupied_percent,
                 Backend backend, bool unknown_stops);
 
+  /// Cells in a box have changed. Not while another thread casts rays.
+  /// @param occupancy  of the whole grid, as for the constructor
+  void redraw(const std::int8_t* occupancy, const CellBox& box);
+
   int width() const { return width_; }
   int height() const { return height_; }
   double resolution_m() const { return resolution_m_; }
@@ -96,11 +100,17 @@ class GridRaycaster {
   template <class Reach, class Store>
   void find_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const Reach& t_max, const Store& store) const;
 
+  /// Puts the cells of a box into the map; which of them end a ray, row by row.
+  std::vector<std::uint8_t> drawn(const std::int8_t* occupancy, const CellBox& box);
+  std::vector<std::uint8_t> occupied() const;
+
   int width_, height_;
   double resolution_m_;
+  int occupied_percent_;
+  bool unknown_stops_;
   Backend backend_;
   mrpt::maps::COccupancyGridMap2D map_;
-  std::unique_ptr<const ChessboardDistance> chessboard_distance_;  // between the cells where a ray may end
+  std::unique_ptr<ChessboardDistance> chessboard_distance_;  // between the cells where a ray may end
   mutable std::once_flag normals_once_;
   mutable std::unique_ptr<const WallNormals> normals_;
 };

@@ -149,20 +149,36 @@ WallNormals::Normal normal_at(int x, int y, Patch& patch) {
 
 }  // namespace
 
-WallNormals::WallNormals(const std::vector<std::uint8_t>& occupied, int width, int height) : width_(width) {
-  const std::vector<std::uint8_t> boundary = boundary_of(occupied, width, height);
-  Patch patch(boundary, width, height);
+template <class NormalAt>
+void WallNormals::collect(const std::vector<std::uint8_t>& boundary, int height, const NormalAt& normal_at) {
   row_begin_.reserve(height + 1);
   for (int y = 0; y < height; ++y) {
     row_begin_.push_back(static_cast<std::int32_t>(cells_.size()));
-    for (int x = 0; x < width; ++x) {
-      const std::int32_t cell = y * width + x;
+    for (int x = 0; x < width_; ++x) {
+      const std::int32_t cell = y * width_ + x;
       if (boundary[cell] == 0) continue;
       cells_.push_back(cell);
-      normals_.push_back(normal_at(x, y, patch));
+      normals_.push_back(normal_at(x, y));
     }
   }
   row_begin_.push_back(static_cast<std::int32_t>(cells_.size()));
+}
+
+WallNormals::WallNormals(const std::vector<std::uint8_t>& occupied, int width, int height) : width_(width) {
+  const std::vector<std::uint8_t> boundary = boundary_of(occupied, width, height);
+  Patch patch(boundary, width, height);
+  collect(boundary, height, [&](int x, int y) { return normal_at(x, y, patch); });
+}
+
+WallNormals::WallNormals(const std::vector<std::uint8_t>& occupied, int width, int height, const WallNormals& before,
+                         const CellBox& changed)
+    : width_(width) {
+  constexpr int kReach = kStretchCells + 1;  // a changed cell makes the cells beside it boundary cells
+  const std::vector<std::uint8_t> boundary = boundary_of(occupied, width, height);
+  const CellBox near = changed.grown(kReach, kReach, kReach, kReach, width, height);
+  Patch patch(boundary, width, height);
+  collect(boundary, height,
+          [&](int x, int y) { return near.contains(x, y) ? normal_at(x, y, patch) : before.at(y * width_ + x); });
 }
 
 WallNormals::Normal WallNormals::at(std::int32_t cell) const {

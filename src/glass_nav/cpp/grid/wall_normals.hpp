@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "cell_box.hpp"
+
 namespace glass_nav {
 
 /// Normals of all occupied cells that a ray may meet first: those with a side towards a cell that is not occupied.
@@ -24,6 +26,10 @@ class WallNormals {
 
   WallNormals(const std::vector<std::uint8_t>& occupied, int width, int height);
 
+  /// The same grid after cells in a box changed: only the normals near it are worked out.
+  WallNormals(const std::vector<std::uint8_t>& occupied, int width, int height, const WallNormals& before,
+              const CellBox& changed);
+
   /// Normal of one cell; {NaN, NaN, 0, NaN} for a cell inside a wall or without neighbours.
   Normal at(std::int32_t cell) const;
 
@@ -31,6 +37,9 @@ class WallNormals {
   const std::vector<std::int32_t>& cells() const { return cells_; }
 
  private:
+  template <class NormalAt>
+  void collect(const std::vector<std::uint8_t>& boundary, int height, const NormalAt& normal_at);
+
   // Sparse, since one cell in twenty is on a boundary: the cells of row y are cells_[row_begin_[y] .. row_begin_[y+1]].
   int width_;
   std::vector<std::int32_t> row_begin_;

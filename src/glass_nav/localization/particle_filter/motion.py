@@ -9,10 +9,12 @@ P particles.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Tuple
 
 import numpy as np
 
 from glass_nav.geometry import angles, se2
+from glass_nav.params import choice, number
 
 MODELS = ("diff", "omni", "diff-corrected", "omni-corrected")
 _ON_THE_SPOT_M = 0.01  # below this distance the direction of travel is noise
@@ -22,12 +24,12 @@ _ON_THE_SPOT_M = 0.01  # below this distance the direction of travel is noise
 class OdometryNoise:
     """How wrong odometry is; the names and meanings are AMCL's."""
 
-    odom_model_type: str = "diff-corrected"
-    odom_alpha1: float = 0.02  # turn from turn (variance [rad2/rad2] in the corrected models)
-    odom_alpha2: float = 0.01  # turn from distance [rad2/m2]
-    odom_alpha3: float = 0.02  # distance from distance [m2/m2]
-    odom_alpha4: float = 0.01  # distance from turn [m2/rad2]
-    odom_alpha5: float = 0.02  # sideways from distance, omni only [m2/m2]
+    odom_model_type: str = choice("diff-corrected", MODELS)
+    odom_alpha1: float = number(0.02, 0.0, 100.0)  # turn from turn (variance [rad2/rad2] in the corrected models)
+    odom_alpha2: float = number(0.01, 0.0, 100.0)  # turn from distance [rad2/m2]
+    odom_alpha3: float = number(0.02, 0.0, 100.0)  # distance from distance [m2/m2]
+    odom_alpha4: float = number(0.01, 0.0, 100.0)  # distance from turn [m2/rad2]
+    odom_alpha5: float = number(0.02, 0.0, 100.0)  # sideways from distance, omni only [m2/m2]
 
     def __post_init__(self) -> None:
         if self.odom_model_type not in MODELS:
@@ -52,24 +54,54 @@ def sample(
     Returns:
         (P, 3) particles after the step.
     """
-    step = _omni if noise.odom_model_type.startswith("omni") else _diff
-    return se2.compose(map_from_base, step(before_from_after, noise, rng, len(map_from_base)))
+    count = len(map_from_base)
+    if noise.odom_model_type.startswith("omni"):
+        bearing, mean, deviations = _omni(before_from_after, noise)
+        distances, turns, sideways = (rng.normal(m, s, count) for m, s in zip(mean, deviations))
+        cos, sin = np.cos(bearing), np.sin(bearing)
+        steps = np.stack([distances * cos - sideways * sin, distances * sin + sideways * cos, turns], axis=-1)
+    else:
+        mean, deviations = _diff(before_from_after, noise)
+        turns_1, distances, turns_2 = (rng.normal(m, s, count) for m, s in zip(mean, deviations))
+        steps = np.stack([distances * np.cos(turns_1), distances * np.sin(turns_1), turns_1 + turns_2], axis=-1)
+    return se2.compose(map_from_base, steps)
+
+
+def covariance(before_from_after: np.ndarray, noise: OdometryNoise) -> np.ndarray:
+    """(3, 3) over x [m], y [m], yaw [rad] of one step of odometry, linearized, in the robot's frame before it.
+
+    Args:
+        before_from_after, noise: as for sample().
+    """
+    if noise.odom_model_type.startswith("omni"):
+        bearing, _, deviations = _omni(before_from_after, noise)
+        cos, sin = np.cos(bearing), np.sin(bearing)
+        by_error = np.array([[cos, 0.0, -sin], [sin, 0.0, cos], [0.0, 1.0, 0.0]])  # of distance, turn, sideways
+    else:
+        (turn_1, distance, _), deviations = _diff(before_from_after, noise)
+        cos, sin = np.cos(turn_1), np.sin(turn_1)
+        by_error = np.array([[-distance * sin, cos, 0.0], [distance * cos, sin, 0.0], [1.0, 0.0, 1.0]])
+    scaled = by_error * deviations
+    return scaled @ scaled.T
 
 
 def _deviation(variance: float, noise: OdometryNoise) -> float:
     return float(np.sqrt(variance)) if noise.odom_model_type.endswith("corrected") else variance
 
 
-def _diff(step: np.ndarray, noise: OdometryNoise, rng: np.random.Generator, count: int) -> np.ndarray:
+def _diff(step: np.ndarray, noise: OdometryNoise) -> Tuple[np.ndarray, np.ndarray]:
+    """Mean (3,) and deviations (3,) of first turn [rad], distance [m], second turn [rad]."""
     distance, _ = se2.travelled(step)
     turn_1 = float(np.arctan2(step[1], step[0])) if distance >= _ON_THE_SPOT_M else 0.0
     turn_2 = float(angles.wrap(step[2] - turn_1))
     square_1, square_2 = _turn_either_way(turn_1) ** 2, _turn_either_way(turn_2) ** 2
     a1, a2, a3, a4 = noise.odom_alpha1, noise.odom_alpha2, noise.odom_alpha3, noise.odom_alpha4
-    turns_1 = turn_1 + rng.normal(0.0, _deviation(a1 * square_1 + a2 * distance**2, noise), count)
-    distances = distance + rng.normal(0.0, _deviation(a3 * distance**2 + a4 * (square_1 + square_2), noise), count)
-    turns_2 = turn_2 + rng.normal(0.0, _deviation(a1 * square_2 + a2 * distance**2, noise), count)
-    return np.stack([distances * np.cos(turns_1), distances * np.sin(turns_1), turns_1 + turns_2], axis=-1)
+    variances = (
+        a1 * square_1 + a2 * distance**2,
+        a3 * distance**2 + a4 * (square_1 + square_2),
+        a1 * square_2 + a2 * distance**2,
+    )
+    return np.array([turn_1, distance, turn_2]), np.array([_deviation(variance, noise) for variance in variances])
 
 
 def _turn_either_way(turn: float) -> float:
@@ -77,12 +109,15 @@ def _turn_either_way(turn: float) -> float:
     return min(abs(float(angles.wrap(turn))), abs(float(angles.wrap(turn - np.pi))))
 
 
-def _omni(step: np.ndarray, noise: OdometryNoise, rng: np.random.Generator, count: int) -> np.ndarray:
+def _omni(step: np.ndarray, noise: OdometryNoise) -> Tuple[float, np.ndarray, np.ndarray]:
+    """Direction of travel [rad]; mean (3,) and deviations (3,) of distance [m], turn [rad], and sideways of it [m]."""
     distance, _ = se2.travelled(step)
     bearing, turn = float(np.arctan2(step[1], step[0])), float(angles.wrap(step[2]))
     a1, a2, a3, a4, a5 = (noise.odom_alpha1, noise.odom_alpha2, noise.odom_alpha3, noise.odom_alpha4, noise.odom_alpha5)
-    distances = distance + rng.normal(0.0, _deviation(a3 * distance**2 + a1 * turn**2, noise), count)
-    turns = turn + rng.normal(0.0, _deviation(a4 * turn**2 + a2 * distance**2, noise), count)
-    sideways = rng.normal(0.0, _deviation(a1 * turn**2 + a5 * distance**2, noise), count)
-    cos, sin = np.cos(bearing), np.sin(bearing)
-    return np.stack([distances * cos - sideways * sin, distances * sin + sideways * cos, turns], axis=-1)
+    variances = (
+        a3 * distance**2 + a1 * turn**2,
+        a4 * turn**2 + a2 * distance**2,
+        a1 * turn**2 + a5 * distance**2,
+    )
+    deviations = np.array([_deviation(variance, noise) for variance in variances])
+    return bearing, np.array([distance, turn, 0.0]), deviations

@@ -10,7 +10,9 @@ document leaves open how to correct the orientation; ours (`correct_orientation`
 weighted least squares of the residuals. `method: least_squares` solves for x, y and yaw at once and does not move along
 directions that no segment constrains: the document's hallway effect, for walls of any direction.
 
-Combined quality, ours too: Ecf s^2 / (s^2 + Emse), Emse of the points within the outlier limit. N points, S segments.
+The quality measures use neighbourhoods of their own: Ecf has classification_neighbourhood_m, whatever the iterations
+were. Combined quality, ours too: Ecf s^2 / (s^2 + Emse) over all points, so that it falls with the distance from the
+true pose. N points, S segments.
 """
 
 from __future__ import annotations
@@ -33,17 +35,18 @@ class SegmentCorrectionParams:
     """How a pose is corrected and judged."""
 
     method: str = "least_squares"
-    neighbourhood_m: float = 1.0  # c(0); c of the classification factor is the last c(t)
+    neighbourhood_m: float = 1.0  # c(0)
     iterations: int = 15  # T
     correct_orientation: bool = True
     least_constraint: float = 0.01  # share of the points' pull below which a direction is not corrected
+    classification_neighbourhood_m: float = 0.07  # c of the classification factor, and of the directions left free
     outlier_m: float = 0.15  # a point further from its segment is an outlier
     fit_scale_m: float = 0.05  # s: root of Emse at which the combined quality halves
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
             raise ValueError(f"method must be one of {', '.join(METHODS)}, got {self.method!r}")
-        for name in ("neighbourhood_m", "outlier_m", "fit_scale_m"):
+        for name in ("neighbourhood_m", "classification_neighbourhood_m", "outlier_m", "fit_scale_m"):
             if not 0.0 < getattr(self, name) < np.inf:
                 raise ValueError(f"{name} must be finite and > 0 m, got {getattr(self, name)}")
         if not self.iterations >= 1:
@@ -61,7 +64,7 @@ class SegmentQuality:
     mse_inliers_m2: float  # Emse of points within the outlier limit; NaN: none
     inlier_share: float  # 0..1
     classification_factor: float  # Ecf: mean of c^m / (d^m + c^m), 0..1; 0 without points or segments
-    combined: float  # Ecf s^2 / (s^2 + Emse of the inliers), 0..1
+    combined: float  # Ecf s^2 / (s^2 + Emse), 0..1
 
 
 @dataclass(frozen=True)
@@ -123,7 +126,7 @@ class SegmentCorrector:
             pose = step(points, pose, pull, neighbourhood_m, lever_m)
             pull = self._pull(points, pose)
         pose[2] = angles.wrap(pose[2])
-        weight = votes(pull.distance_m, self._last_neighbourhood_m)
+        weight = votes(pull.distance_m, self._params.classification_neighbourhood_m)
         information, _ = _normal_equations(pull, weight, lever_m)
         _, free = _constrained(information, float(weight.sum()), self._params.least_constraint)
         return SegmentCorrection(pose, before, self._judged(pull.distance_m), free, lever_m)
@@ -136,17 +139,14 @@ class SegmentCorrector:
         """(T,) c(t) = c(0) (1 - t / T)."""
         return self._params.neighbourhood_m * (1.0 - np.arange(self._params.iterations) / self._params.iterations)
 
-    @property
-    def _last_neighbourhood_m(self) -> float:
-        return float(self._neighbourhoods_m()[-1])
-
     def _judge(self, points: np.ndarray, pose: np.ndarray) -> SegmentQuality:
         if not len(points):
             return SegmentQuality(0, float("nan"), float("nan"), 0.0, 0.0, 0.0)
         return self._judged(self._index.nearest(_placed(points, pose)[0]).distance)
 
     def _judged(self, distance_m: np.ndarray) -> SegmentQuality:
-        return judged(distance_m, self._last_neighbourhood_m, self._params.outlier_m, self._params.fit_scale_m)
+        p = self._params
+        return judged(distance_m, p.classification_neighbourhood_m, p.outlier_m, p.fit_scale_m)
 
     def _pull(self, points: np.ndarray, pose: np.ndarray) -> _Pull:
         placed, turned = _placed(points, pose)
@@ -197,10 +197,9 @@ def judged(distance_m: np.ndarray, neighbourhood_m: float, outlier_m: float, fit
     inlier = distance_m <= outlier_m
     mse_inliers_m2 = float(np.mean(distance_m[inlier] ** 2)) if inlier.any() else float("nan")
     factor = float(np.mean(votes(distance_m, neighbourhood_m)))
-    combined = factor * fit_scale_m**2 / (fit_scale_m**2 + mse_inliers_m2) if inlier.any() else 0.0
-    return SegmentQuality(
-        len(distance_m), float(np.mean(distance_m**2)), mse_inliers_m2, float(np.mean(inlier)), factor, combined
-    )
+    mse_m2 = float(np.mean(distance_m**2))
+    combined = factor * fit_scale_m**2 / (fit_scale_m**2 + mse_m2)
+    return SegmentQuality(len(distance_m), mse_m2, mse_inliers_m2, float(np.mean(inlier)), factor, combined)
 
 
 @dataclass(frozen=True)

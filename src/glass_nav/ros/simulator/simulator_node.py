@@ -33,14 +33,14 @@ from tf2_msgs.msg import TFMessage
 
 from glass_nav import params
 from glass_nav.msg import LandmarkBearings, TrueBeams
-from glass_nav.ros import conversions, shutdown
+from glass_nav.ros import command_line, conversions, shutdown
 from glass_nav.ros.landmarks import bearing_messages
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Mailbox
 from glass_nav.ros.simulator import frame_messages
 from glass_nav.ros.simulator.frame_messages import FrameNames
 from glass_nav.ros.tools.served_map import ServedMap
-from glass_nav.simulation import building_file, building_map, lidar, shipped_buildings, start_place
+from glass_nav.simulation import building_file, building_map, erased_glass, lidar, shipped_buildings, start_place
 from glass_nav.simulation.landmark_scanner import ScannerModel
 from glass_nav.simulation.path_follower import PathFollower, PathFollowerParams
 from glass_nav.simulation.robot import RobotParams
@@ -67,6 +67,7 @@ class SimulatorNodeParams:
     braking_factor: float = 1.0  # deceleration over acceleration
     seed: int = 0
     changed: float = 0.0  # share of the movable furniture that moved since the map was drawn
+    glass_erased: float = 0.0  # share of the panes that the served map lacks
     scan_rate_hz: float = 10.0
     turn_time_s: float = 0.0  # from the first beam of a scan to the last one
     speed_factor: float = 1.0  # simulated seconds per second; 0: as fast as the localization follows
@@ -90,6 +91,8 @@ class SimulatorNodeParams:
     def __post_init__(self) -> None:
         if not 0.0 <= self.speed_factor < math.inf:
             raise ValueError(f"~speed_factor must be >= 0, got {self.speed_factor}")
+        if not 0.0 <= self.glass_erased <= 1.0:
+            raise ValueError(f"~glass_erased must be 0 to 1, got {self.glass_erased}")
         if self.beams < 0:
             raise ValueError(f"~beams must be >= 0, got {self.beams}")
         if not 0.01 <= self.map_resolution_m <= 1.0:
@@ -252,7 +255,9 @@ class SimulatorNode:
     def _serve_map(self) -> None:
         """The map that the package draws of the building."""
         stamp = conversions.stamp_from_ns(self._simulation.stamp_ns)
-        grid_map = building_map.draw(self._simulation.building, self._p.map_resolution_m)
+        building = self._simulation.building
+        erased = erased_glass.choose(building, self._p.glass_erased, self._p.seed)
+        grid_map = building_map.draw(building, self._p.map_resolution_m, erased)
         self._map = ServedMap()
         self._map.give(conversions.msg_from_map(grid_map, stamp, self._names.map))
 
@@ -307,6 +312,8 @@ def _drive(p: SimulatorNodeParams) -> _Drive:
 
 def main() -> None:
     """Start the node; exit code 2 if a parameter cannot be used."""
+    if command_line.answers_help(__doc__):
+        return
     shutdown.run_node(
         "simulator", lambda given: SimulatorNode(params.load(SimulatorNodeParams, given, rospy.get_name()))
     )

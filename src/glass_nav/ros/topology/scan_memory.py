@@ -13,6 +13,7 @@ from sensor_msgs.msg import LaserScan
 
 from glass_nav.ros import conversions
 from glass_nav.ros.tf_transforms import TfTransforms
+from glass_nav.sensing.range_limits import RangeLimits
 from glass_nav.sensing.scan import Scan, ScanError
 from glass_nav.sensing.scan_placement import NoTransform, RawScan, ScanPlacement
 
@@ -26,6 +27,7 @@ class ScanMemory:
     def __init__(self, odom_frame: str) -> None:
         self._odom_frame = odom_frame
         self._scans: Deque[RawScan] = deque(maxlen=_KEPT)
+        self._limits = RangeLimits()
         self._came = threading.Condition()
         self._tf = tf2_ros.Buffer()
         self._listener = tf2_ros.TransformListener(self._tf)
@@ -41,7 +43,7 @@ class ScanMemory:
     def at(self, stamp: rospy.Time, base_frame: str) -> "tuple[Optional[Scan], str]":
         """The scan of that stamp, deskewed; or None and why there is none."""
         transforms = TfTransforms(self._tf, self._odom_frame, conversions.frame_id(base_frame))
-        placement = ScanPlacement(transforms)
+        placement = ScanPlacement(transforms, limits=self._limits)
         deadline_s = time.monotonic() + _MAX_WAIT_S
         while True:
             try:

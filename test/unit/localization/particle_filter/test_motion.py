@@ -84,3 +84,12 @@ def test_a_wrong_noise_is_refused_in_one_line(values, text):
     with pytest.raises(ValueError) as err:
         OdometryNoise(**values)
     assert str(err.value) == text
+
+
+@pytest.mark.parametrize("model", motion.MODELS)
+@pytest.mark.parametrize("step", [(0.5, 0.0, 0.0), (-0.3, 0.05, 0.2), (0.0, 0.0, 0.6)])
+def test_the_covariance_of_a_step_is_that_of_the_particles(model, step):
+    noise = OdometryNoise(odom_model_type=model, odom_alpha1=0.01, odom_alpha3=0.01)
+    moved = motion.sample(np.zeros((40000, 3)), np.array(step), noise, np.random.default_rng(3))
+    expected = np.cov(moved.T)
+    np.testing.assert_allclose(motion.covariance(np.array(step), noise), expected, atol=0.05 * np.abs(expected).max())

@@ -41,6 +41,7 @@ def test_the_file_of_parameters_names_them_all_with_their_defaults():
             "~emitter_frame_id must differ and name a frame, got 'map', 'odom', 'base_link', '', "
             "'emitter'",
         ),
+        ({"glass_erased": 1.5}, "~glass_erased must be 0 to 1, got 1.5"),
         ({"speed": 1.0}, "unknown parameter ~speed"),
     ],
 )

@@ -1,0 +1,57 @@
+"""Last sure pose, odometry -> where the robot can be without asking the scans.
+
+A prior over places: where two halls look alike, scans cannot say in which of them the robot is, but the distance driven
+since the pose was last sure can. The covariance grows by the noise of odometry, linearized as in Thrun, Burgard, Fox,
+Probabilistic Robotics (2005), sec. 7.4.2. K poses.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glass_nav.geometry import angles, se2
+from glass_nav.localization.particle_filter import motion
+from glass_nav.localization.particle_filter.motion import OdometryNoise
+
+_MIN_DEVIATION = np.array([0.01, 0.01, np.radians(0.2)])  # of a sure pose: m, m, rad
+
+
+@dataclass(frozen=True)
+class DeadReckoning:
+    """A pose carried by odometry alone since it was last sure."""
+
+    map_from_base: np.ndarray  # (3,)
+    covariance: np.ndarray  # (3, 3) over x [m], y [m], yaw [rad], in map
+    distance_m: float = 0.0  # driven since the pose was sure
+
+    def carried(self, step: np.ndarray, noise: OdometryNoise) -> DeadReckoning:
+        """After a step (3,) of odometry, in the robot's frame before it.
+
+        The noise of odometry is per step: steps are those between two updates of the particles.
+        """
+        _, _, yaw = self.map_from_base
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        turned = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])  # robot's axes before the step, in map
+        along_x, along_y, _ = turned @ step
+        by_pose = np.array([[1.0, 0.0, -along_y], [0.0, 1.0, along_x], [0.0, 0.0, 1.0]])
+        grown = by_pose @ self.covariance @ by_pose.T + turned @ motion.covariance(step, noise) @ turned.T
+        distance_m, _ = se2.travelled(step)
+        return DeadReckoning(se2.compose(self.map_from_base, step), grown, self.distance_m + distance_m)
+
+    def mahalanobis(self, poses: np.ndarray) -> np.ndarray:
+        """(K,) distances of poses (K, 3) in map from this one, in standard deviations."""
+        off = poses - self.map_from_base
+        off[:, 2] = angles.wrap(off[:, 2])
+        root = np.linalg.cholesky(self.covariance + np.diag(_MIN_DEVIATION**2))
+        return np.sqrt(np.sum(np.linalg.solve(root, off.T) ** 2, axis=0))
+
+    def log_likelihood(self, poses: np.ndarray, least: float = -np.inf) -> np.ndarray:
+        """(K,) log likelihoods of poses (K, 3) in map, relative to that of this one.
+
+        Args:
+            poses: in map.
+            least: no pose is less likely than this, because a robot may also be carried away.
+        """
+        return np.maximum(-0.5 * self.mahalanobis(poses) ** 2, least)

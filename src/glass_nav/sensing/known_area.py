@@ -1,0 +1,63 @@
+"""GridMap -> where does the map know something?  Beams that end elsewhere are no evidence about a pose.
+
+A mapper draws what it saw. Behind a pane, through an open door of a room that it did not enter and beyond the edge of
+the grid there may be anything: a beam that ends there agrees with every pose. Near a mapped wall it does not: a beam
+that ends somewhat behind a wall contradicts it. H rows, W columns, P poses, B beams.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+from glass_nav.geometry import se2
+from glass_nav.world.grid_map import UNKNOWN, GridMap
+
+_BESIDE_CELLS = 3  # next to an unknown cell: what is there may be drawn, or end, one or two cells off
+_NEAR_WALL_M = 0.5  # what is this close to a mapped wall is compared with it, also behind it
+
+
+class KnownArea:
+    """The part of one map that beams can be compared with."""
+
+    def __init__(self, grid_map: GridMap) -> None:
+        self._grid_map = grid_map
+        near = int(round(_NEAR_WALL_M / grid_map.resolution_m))
+        self._border = near + 1  # cells around the grid
+        unknown = np.pad(grid_map.occupancy == UNKNOWN, self._border, constant_values=True)
+        known = ~_grown(unknown, _BESIDE_CELLS) | _grown(np.pad(grid_map.occupied, self._border), near)
+        self._known = known.ravel()
+        self._stride = known.shape[1]
+        self._last = np.array(known.shape) - 1
+
+    def contains(self, points_m: np.ndarray) -> np.ndarray:
+        """Whether the map knows something of places.
+
+        Args:
+            points_m: (..., 2) x, y [m] in map.
+
+        Returns:
+            (...) bool; False in unknown cells, outside of the grid, and within 3 cells of either, unless a wall is
+            within half a metre.
+        """
+        rows, columns = self._grid_map.cells(points_m)
+        rows = np.clip(rows + self._border, 0, self._last[0])  # the outermost cells are unknown
+        columns = np.clip(columns + self._border, 0, self._last[1])
+        return self._known[rows * self._stride + columns]
+
+    def ends(self, points_m: np.ndarray, map_from_base: np.ndarray) -> np.ndarray:
+        """Which beams of a scan end where the map knows something, seen from each pose.
+
+        Args:
+            points_m: (B, 2) ends of beams [m] in the robot's frame, finite.
+            map_from_base: (P, 3) poses of the robot.
+
+        Returns:
+            (P, B) bool.
+        """
+        return self.contains(se2.transform_points(np.asarray(map_from_base, float)[:, None], points_m))
+
+
+def _grown(cells: np.ndarray, reach: int) -> np.ndarray:
+    """(H, W) bool: a cell of these is at most so many rows and columns away."""
+    return ndimage.maximum_filter(cells.view(np.uint8), 2 * reach + 1).view(bool)
