@@ -99,20 +99,25 @@ class Publishers:
     def send_transform(self, stamp_ns: int, map_from_odom: np.ndarray) -> None:
         """tf map -> odom after a scan, if wanted."""
         with self._sending:
-            self._send(self._map_to_odom.corrected(stamp_ns, map_from_odom, self._tolerance_ns))
+            if self._transform_is_wanted:
+                self._send(self._map_to_odom.corrected(stamp_ns, map_from_odom, self._tolerance_ns))
 
     def send_transform_again(self, scan_ns: int, now_ns: int) -> None:
         """tf map -> odom as it was last, the moment a scan arrives. May be called by any thread."""
         with self._sending:
-            self._send(self._map_to_odom.arrived(scan_ns, now_ns, self._tolerance_ns))
+            if self._transform_is_wanted:
+                self._send(self._map_to_odom.arrived(scan_ns, now_ns, self._tolerance_ns))
+
+    @property
+    def _transform_is_wanted(self) -> bool:
+        return self._p.tf_broadcast and (self._was_localized or self._p.publish_tf_before_localized)
 
     @property
     def _tolerance_ns(self) -> int:
         return round(self._p.transform_tolerance * 1e9)
 
     def _send(self, transform: Optional[StampedTransform]) -> None:
-        wanted = self._p.tf_broadcast and (self._was_localized or self._p.publish_tf_before_localized)
-        if transform is not None and wanted:
+        if transform is not None:
             self._broadcaster.sendTransform(
                 conversions.transform_stamped(
                     transform.stamp_ns, self._frame, self._p.odom_frame_id, transform.map_from_odom
