@@ -22,6 +22,7 @@ from glass_nav.localization.beam_classification.expected_ranges import ExpectedR
 from glass_nav.localization.beam_classification.glass_map import GlassMap
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
 from glass_nav.localization.integrity import pose_state, protection_level
+from glass_nav.localization.integrity.dead_reckoning import DeadReckoning
 from glass_nav.localization.integrity.kidnap_detector import KidnapDetector
 from glass_nav.localization.integrity.protection_level import ProtectionLevels
 from glass_nav.localization.localizer_params import LocalizerParams
@@ -36,6 +37,7 @@ from glass_nav.world.grid_map import GridMap
 from glass_nav.world.landmark_map import LandmarkMap
 
 _FOUND = np.array([0.1, 0.1, 0.05])  # deviations [m, m, rad] of a place that was found among all others
+_ASTRAY = 3.0  # deviations of dead reckoning from which a pose that scans do not support is given up
 _SHOWN = 500  # candidates drawn for particlecloud
 
 
@@ -105,6 +107,7 @@ class Localizer:
         self._schedule = UpdateSchedule()
         self._quality = pose_state.PoseQuality(params.quality)
         self._map_from_odom = np.zeros(3)  # since the last update of the particles
+        self._dead_reckoning: Optional[DeadReckoning] = None  # None: the pose has not been sure yet
         self._bearings: List[Tuple[LandmarkBearings, LandmarkMap, np.ndarray]] = []  # odom_from_base at their stamp
         self._look_at(grid_map, field)
 
@@ -239,6 +242,8 @@ class Localizer:
         step = self._schedule.step_to(odom_from_base)
         if step is not None:
             self._filter.predict(step)
+            if self._dead_reckoning is not None:
+                self._dead_reckoning = self._dead_reckoning.carried(step, self._params.odometry)
         for bearings, landmarks in self._bearings_from(odom_from_base):
             self._filter.weigh_by_bearings(bearings, landmarks)
         cases = self._correct(scan, odom_from_base)
@@ -257,7 +262,15 @@ class Localizer:
         self._filter.weigh(scan, cases, registration, self._classifier)
         self._filter.estimate()
         self._filter.resample()
+        if not self._filter.has_evidence:
+            self._keep_to_odometry()
         return cases
+
+    def _keep_to_odometry(self) -> None:
+        """The scan says nothing about the place: where the scans before led the pose astray, odometry has it back."""
+        reckoned = self._dead_reckoning
+        if reckoned is not None and reckoned.mahalanobis(self._filter.best.map_from_base[None])[0] > _ASTRAY:
+            self._filter.move_to(reckoned.map_from_base)
 
     def _find(self, scan: Scan, odom_from_base: np.ndarray) -> BeamCases:
         """The pose is not known: follow all places where it may be. The particles are those places."""
@@ -288,6 +301,8 @@ class Localizer:
             self._quality.observe(judged.inlier_ratio, judged.judged_share)
         judgement = self._quality.judge(self._filter.best)
         trusted = judgement.state == LocalizationState.LOCALIZED
+        if updated and trusted and self._filter.fits:
+            self._dead_reckoning = DeadReckoning(map_from_base, self._filter.best.covariance)
         return Estimate(
             scan.stamp_ns,
             map_from_base,
@@ -321,6 +336,7 @@ class Localizer:
         self._quality = pose_state.PoseQuality(self._params.quality)
         self._kidnap_detector = self._new_kidnap_detector(usual_fit)
         self._search = None
+        self._dead_reckoning = None
         self._bearings = []
 
     def _new_search(self, area: Optional[np.ndarray] = None) -> GlobalSearch:
