@@ -9,6 +9,8 @@ BEAM_CASES = "Header header\nuint8[] cases\nfloat32[] expected\nfloat32[] residu
 STATUS = (
     "uint8 UNKNOWN=0\nuint8 GLOBAL_SEARCH=1\nuint8 LOCALIZED=2\nuint8 UNCERTAIN=3\nuint8 LOST=4\n"
     "Header header\nuint8 state\nstring state_name\nstring reason\nfloat32 used_share\nfloat32 reliability\n"
+    "float32 level_95_along_m\nfloat32 level_95_across_m\nfloat32 level_95_heading_deg\n"
+    "float32 level_999_along_m\nfloat32 level_999_across_m\nfloat32 level_999_heading_deg\n"
 )
 
 

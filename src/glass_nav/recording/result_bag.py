@@ -147,8 +147,22 @@ class ResultBag(MessageWriter):
             poses=[self._pose(each) for each in shown],
         )
 
-    def status(self, stamp_ns: int, state: str, reason: str, used_share: float, reliability: float) -> None:
-        """The state in words, and its figures."""
+    def status(
+        self,
+        stamp_ns: int,
+        state: str,
+        reason: str,
+        used_share: float,
+        reliability: float,
+        level_95: np.ndarray,
+        level_999: np.ndarray,
+    ) -> None:
+        """The state in words, its figures, and protection levels (3,) along [m], across [m] and of the heading [rad]."""
+        levels = {
+            f"level_{name}_{what}": float(value)
+            for name, level in (("95", level_95), ("999", level_999))
+            for what, value in zip(("along_m", "across_m", "heading_deg"), (*level[:2], np.degrees(level[2])))
+        }
         self._send(
             NODE + "/status",
             stamp_ns,
@@ -158,6 +172,7 @@ class ResultBag(MessageWriter):
             reason=reason,
             used_share=used_share,
             reliability=reliability,
+            **levels,
         )
 
     def truth(self, stamp_ns: int, map_from_base: np.ndarray) -> None:

@@ -52,7 +52,15 @@ class _Writer:
             cases.weight,
         )
         bag.cloud(stamp_ns, beam_cloud.FIELDS, beam_cloud.points(scan, cases))
-        bag.status(stamp_ns, estimate.state, estimate.reason, estimate.inlier_ratio, estimate.confidence)
+        bag.status(
+            stamp_ns,
+            estimate.state,
+            estimate.reason,
+            estimate.inlier_ratio,
+            estimate.confidence,
+            estimate.levels.p95,
+            estimate.levels.p999,
+        )
         if estimate.updated:
             bag.pose(stamp_ns, estimate.map_from_base, estimate.covariance, estimate.particles)
         if self._truth is not None and bool(self._truth.covers(stamp_ns)):

@@ -158,7 +158,7 @@ class _Row:
     ) -> None:
         self.odom_from_base, self.cpu_ms = odom_from_base, cpu_ms
         self.stamp_ns, self.map_from_base = estimate.stamp_ns, estimate.map_from_base
-        self.deviation = np.sqrt(np.maximum(np.diag(estimate.covariance), 0.0))
+        self.covariance, self.levels = estimate.covariance, estimate.levels
         self.state, self.reason = estimate.state, estimate.reason
         self.used_share, self.updated = estimate.inlier_ratio, estimate.updated
         self.reliability, self.places = estimate.confidence, estimate.places
@@ -191,7 +191,9 @@ def _result(
         stamps_ns=np.array([row.stamp_ns for row in rows], np.int64),
         map_from_base=np.array([row.map_from_base for row in rows], float),
         odom_from_base=np.array([row.odom_from_base for row in rows], float),
-        deviation=np.array([row.deviation for row in rows], float),
+        covariance=np.array([row.covariance for row in rows], float),
+        level_95=np.array([row.levels.p95 for row in rows], float),
+        level_999=np.array([row.levels.p999 for row in rows], float),
         states=[row.state for row in rows],
         reasons=[row.reason for row in rows],
         used_share=np.array([row.used_share for row in rows], float),

@@ -26,6 +26,8 @@ from std_msgs.msg import Header
 
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
 from glass_nav.localization.initial_pose import PoseGuess
+from glass_nav.localization.integrity import protection_level
+from glass_nav.localization.integrity.protection_level import ProtectionLevels
 from glass_nav.localization.localizer import BeamCases, Estimate
 from glass_nav.msg import BeamCases as BeamCasesMsg
 from glass_nav.msg import LocalizationStatus
@@ -293,11 +295,20 @@ def grid_info(grid_map: GridMap) -> MapMetaData:
 
 
 def status_msg(
-    stamp_ns: int, map_frame: str, state: str, reason: str, used_share: float, reliability: float
+    stamp_ns: int,
+    map_frame: str,
+    state: str,
+    reason: str,
+    used_share: float,
+    reliability: float,
+    levels: ProtectionLevels = protection_level.UNKNOWN,
 ) -> LocalizationStatus:
-    return LocalizationStatus(
-        header(stamp_ns, map_frame), LocalizationState(state).code, state, reason, used_share, reliability
-    )
+    msg = LocalizationStatus(header=header(stamp_ns, map_frame), state=LocalizationState(state).code, state_name=state)
+    msg.reason, msg.used_share, msg.reliability = reason, used_share, reliability
+    msg.level_95_along_m, msg.level_95_across_m = levels.p95[:2].tolist()
+    msg.level_999_along_m, msg.level_999_across_m = levels.p999[:2].tolist()
+    msg.level_95_heading_deg, msg.level_999_heading_deg = np.degrees([levels.p95[2], levels.p999[2]]).tolist()
+    return msg
 
 
 def area_from_msg(msg: PolygonStamped, map_frame: str) -> np.ndarray:

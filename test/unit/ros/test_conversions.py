@@ -25,6 +25,7 @@ from std_msgs.msg import Header
 
 from glass_nav.geometry import angles
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
+from glass_nav.localization.integrity.protection_level import ProtectionLevels
 from glass_nav.localization.localizer import BeamCases, Estimate
 from glass_nav.msg import BeamCases as BeamCasesMsg
 from glass_nav.msg import LocalizationStatus
@@ -207,6 +208,14 @@ def test_the_status_says_the_state_as_number_and_word():
     msg = sent_and_received(conversions.status_msg(7, "map", "LOST", "nothing fits", 0.1, 0.25))
     assert (msg.state, msg.state_name, msg.reason) == (LocalizationStatus.LOST, "LOST", "nothing fits")
     assert (msg.used_share, msg.reliability) == pytest.approx((0.1, 0.25))
+    assert np.isnan([msg.level_95_along_m, msg.level_999_heading_deg]).all()
+
+
+def test_the_status_has_the_protection_levels_in_metres_and_degrees():
+    levels = ProtectionLevels(np.array([0.1, 0.2, np.radians(3.0)]), np.array([0.4, 0.5, np.radians(6.0)]))
+    msg = sent_and_received(conversions.status_msg(7, "map", "LOCALIZED", "fits", 0.9, 0.9, levels))
+    assert (msg.level_95_along_m, msg.level_95_across_m, msg.level_95_heading_deg) == pytest.approx((0.1, 0.2, 3.0))
+    assert (msg.level_999_along_m, msg.level_999_across_m, msg.level_999_heading_deg) == pytest.approx((0.4, 0.5, 6.0))
 
 
 def area(*corners, frame="/map"):

@@ -14,8 +14,9 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from glass_nav.evaluation.metrics import confidence, pose_errors, replay_result
+from glass_nav.evaluation.metrics import confidence, integrity_scores, pose_errors, replay_result
 from glass_nav.evaluation.metrics.confidence import Interval
+from glass_nav.evaluation.metrics.integrity_scores import IntegrityTrace
 from glass_nav.evaluation.metrics.pose_errors import PoseErrors
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.evaluation.metrics.thresholds import Threshold
@@ -43,6 +44,14 @@ FIGURES = (
     Figure("yaw_mean_deg", "yaw error, mean", "deg", 1.0, 2, -1),
     Figure("lost_share", "more than 0.5 m off", "%", 100.0, 2, -1),
     Figure("localized_share", "reports LOCALIZED", "%", 100.0, 1, 1),
+    Figure("misleading_share", "misleading", "%", 100.0, 2, -1),
+    Figure("misleading_max_s", "misleading, longest", "s", 1.0, 1, -1),
+    Figure("misleading_max_m", "misleading, longest", "m", 1.0, 2, -1),
+    Figure("nees_median", "NEES, median (consistent: 2.4)", "-", 1.0, 2, 0),
+    Figure("alarm_share", "false alarms", "%", 100.0, 2, -1),
+    Figure("level_ratio", "99.9 % level over error", "-", 1.0, 1, 0),
+    Figure("time_to_alarm_s", "time to alarm, longest", "s", 1.0, 1, -1),
+    Figure("time_back_s", "time back, longest", "s", 1.0, 1, -1),
     Figure("case_accuracy", "beam cases right", "%", 100.0, 2, 1),
     Figure("apart_mean_m", "distance from the first", "m", 1.0, 3, 0),
     Figure("cpu_ms_per_scan", "CPU per scan", "ms", 1.0, 1, -1, timing=True),
@@ -65,6 +74,7 @@ class Run:
     cpu_ms: Optional[np.ndarray]  # (S,)
     wall_s: float
     reference: Optional[Trajectory] = None  # map_from_base
+    integrity: Optional[IntegrityTrace] = None  # of the S scans; None: it claims nothing
 
     @property
     def sha256(self) -> str:
@@ -88,6 +98,7 @@ def run_of(contestant: str, log: str, result: ReplayResult, case_accuracy: Optio
         result.cpu_ms,
         result.wall_s,
         result.reference,
+        result.integrity,
     )
 
 
@@ -218,9 +229,22 @@ def _values(run: Run, stamps_ns: np.ndarray, first: Sequence[Run]) -> Dict[str, 
     is_first = any(each is run for each in first)
     found["apart_mean_m"] = math.nan if is_first or not apart else float(np.mean(apart))
     found["localized_share"] = math.nan if states is None else float((states == LocalizationState.LOCALIZED).mean())
+    found.update(_integrity(run, used))
     found["case_accuracy"] = math.nan if run.case_accuracy is None else run.case_accuracy
     found["cpu_ms_per_scan"] = math.nan if run.cpu_ms is None else float(run.cpu_ms[used].mean())
     return {figure.name: found[figure.name] for figure in FIGURES}
+
+
+def _integrity(run: Run, used: np.ndarray) -> Dict[str, float]:
+    """Figures of the claims about those scans; infinite: what was waited for did not happen."""
+    if run.integrity is None:
+        return dict.fromkeys(integrity_scores.METRICS, math.nan)
+    claims = run.integrity.part(used)
+    never = math.inf if claims.matched.any() else math.nan
+    return {
+        name: (never if name in integrity_scores.NEVER else math.nan) if value is None else value
+        for name, value in integrity_scores.summary(claims).items()
+    }
 
 
 def _apart_m(one: Run, other: Run, stamps_ns: np.ndarray) -> float:

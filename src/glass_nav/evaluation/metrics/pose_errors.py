@@ -15,6 +15,7 @@ from glass_nav.geometry import angles
 from glass_nav.geometry.trajectory import Trajectory
 
 LOST_M = 0.5  # "lost" in the figures of a run
+RIGHT_M, RIGHT_RAD = 0.7, np.radians(20.0)  # "right": the right room and the right direction
 LOST_FAR_M = 1.0  # and by the stricter reading of the published ones
 SLACK_NS = 1_000_000  # files of poses round their stamps; a scan that close to the ends is covered
 METRICS = (  # of summary(), in its order

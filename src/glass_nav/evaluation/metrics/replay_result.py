@@ -16,14 +16,27 @@ from typing import Any, Dict, List, Mapping, Optional, Tuple
 
 import numpy as np
 
-from glass_nav.evaluation.metrics import pose_errors
+from glass_nav.evaluation.metrics import integrity_scores, pose_errors
 from glass_nav.evaluation.metrics.case_scores import CaseScores, SurfaceScores
+from glass_nav.evaluation.metrics.integrity_scores import IntegrityTrace
 from glass_nav.evaluation.metrics.pose_errors import PoseErrors
 from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.vocabulary import BeamCase
 
 CASES = tuple(case.value for case in BeamCase)
 NO_BEAM = 255  # fills the rows of scans with fewer beams than the widest
+_ROW, _COLUMN = np.array([0, 0, 1]), np.array([1, 2, 2])  # of the covariances beside its diagonal
+_CLAIMS = (  # columns of per_scan.csv
+    "cov_x_y_m2",
+    "cov_x_yaw_m_rad",
+    "cov_y_yaw_m_rad",
+    "level_95_along_m",
+    "level_95_across_m",
+    "level_95_yaw_rad",
+    "level_999_along_m",
+    "level_999_across_m",
+    "level_999_yaw_rad",
+)
 
 
 @dataclass(frozen=True)
@@ -53,10 +66,12 @@ class ReplayResult:
     stamps_ns: np.ndarray  # (S,) int64
     map_from_base: np.ndarray  # (S, 3) estimates
     odom_from_base: np.ndarray  # (S, 3) what the odometry said
-    deviation: np.ndarray  # (S, 3) standard deviations the filter claims: x [m], y [m], yaw [rad]
+    covariance: np.ndarray  # (S, 3, 3) that the filter claims, over x [m], y [m], yaw [rad]
+    level_95: np.ndarray  # (S, 3) protection levels along the heading [m], across it [m], of the heading [rad]
+    level_999: np.ndarray  # (S, 3)
     states: List[str]  # S of them
     reasons: List[str]  # S of them
-    used_share: np.ndarray  # (S,) share of the answering beams that a case 1-4 explains
+    used_share: np.ndarray  # (S,) see LocalizationStatus.msg
     updated: np.ndarray  # (S,) bool: the scan moved the particles
     particles: np.ndarray  # (S,) int: how many there were
     reliability: np.ndarray  # (S,) probability that the pose is right, as the filter reports it
@@ -77,6 +92,25 @@ class ReplayResult:
         return len(self.stamps_ns)
 
     @property
+    def deviation(self) -> np.ndarray:
+        """(S, 3) standard deviations the filter claims: x [m], y [m], yaw [rad]."""
+        return np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=1, axis2=2), 0.0))
+
+    @property
+    def integrity(self) -> IntegrityTrace:
+        """What the filter claimed of every scan, against the reference."""
+        return integrity_scores.trace(
+            self.stamps_ns,
+            self.map_from_base,
+            self.odom_from_base,
+            self.states,
+            self.covariance,
+            self.level_95,
+            self.level_999,
+            self.reference,
+        )
+
+    @property
     def errors(self) -> PoseErrors:
         """Of every scan against the reference."""
         return pose_errors.of(self.stamps_ns, self.map_from_base, self.reference)
@@ -95,6 +129,7 @@ class ReplayResult:
             "updates": int(self.updated.sum()),
             "scans_without_ground_truth": None if self.reference is None else int((~errors.matched).sum()),
             **pose_errors.summary(errors),
+            **integrity_scores.summary(self.integrity),
             "case_share": {str(case): (float(count) / beams if beams else 0.0) for case, count in zip(CASES, counts)},
             "scans_with_true_cases": None
             if self.true_cases is None
@@ -175,6 +210,7 @@ def _write_per_scan(path: Path, result: ReplayResult) -> None:
     true = nowhere if result.reference is None or not len(result) else result.reference.at(result.stamps_ns)
     true = np.where(errors.matched[:, None], true, np.nan)
     counts = np.stack([(result.cases == case).sum(axis=1) for case in CASES], axis=1)
+    claims = np.concatenate([result.covariance[:, _ROW, _COLUMN], result.level_95, result.level_999], axis=1)
     with path.open("w", newline="") as file:
         rows = csv.writer(file, lineterminator="\n")
         rows.writerow(
@@ -203,6 +239,7 @@ def _write_per_scan(path: Path, result: ReplayResult) -> None:
                 "reliability",
                 "places",
                 *(f"beams_case_{case}" for case in CASES),
+                *_CLAIMS,
             ]
         )
         for i in range(len(result)):
@@ -223,6 +260,7 @@ def _write_per_scan(path: Path, result: ReplayResult) -> None:
                     *_texts([result.reliability[i]]),
                     int(result.places[i]),
                     *counts[i].tolist(),
+                    *("" if math.isnan(value) else f"{value:.9g}" for value in claims[i]),
                 ]
             )
 
@@ -254,6 +292,14 @@ def _read_worst(path: Path) -> List[KeptScan]:
         ]
 
 
+def _symmetric(deviation: np.ndarray, beside: np.ndarray) -> np.ndarray:
+    """Covariances (S, 3, 3) of standard deviations (S, 3) and of what stands beside the diagonal (S, 3)."""
+    covariance = np.zeros((len(deviation), 3, 3))
+    covariance[:, [0, 1, 2], [0, 1, 2]] = deviation**2
+    covariance[:, _ROW, _COLUMN] = covariance[:, _COLUMN, _ROW] = beside
+    return covariance
+
+
 def _from_rows(
     rows: List[Dict[str, str]],
     cases: np.ndarray,
@@ -282,7 +328,9 @@ def _from_rows(
         stamps_ns=stamps_ns,
         map_from_base=columns("x_m", "y_m", "yaw_rad"),
         odom_from_base=columns("odom_x_m", "odom_y_m", "odom_yaw_rad"),
-        deviation=columns("std_x_m", "std_y_m", "std_yaw_rad"),
+        covariance=_symmetric(columns("std_x_m", "std_y_m", "std_yaw_rad"), columns(*_CLAIMS[:3])),
+        level_95=columns(*_CLAIMS[3:6]),
+        level_999=columns(*_CLAIMS[6:]),
         states=[row["state"] for row in rows],
         reasons=[row["reason"] for row in rows],
         used_share=column("used_share"),

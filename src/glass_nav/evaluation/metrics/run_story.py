@@ -10,11 +10,10 @@ from typing import List, Optional, Tuple
 
 import numpy as np
 
-from glass_nav.evaluation.metrics.pose_errors import LOST_M, PoseErrors
+from glass_nav.evaluation.metrics.pose_errors import LOST_M, RIGHT_M, RIGHT_RAD, PoseErrors
 from glass_nav.evaluation.metrics.replay_result import NO_BEAM, ReplayResult
 from glass_nav.vocabulary import BeamCase, LocalizationState
 
-RIGHT_M, RIGHT_RAD = 0.7, np.radians(20.0)  # as test/benchmark/reliability.py has it
 SEARCHING = (LocalizationState.GLOBAL_SEARCH, LocalizationState.UNKNOWN)  # states without a pose to rely on
 GOOD, FAIR, BAD = "good", "fair", "bad"
 _MANY, _FEW = 0.95, 0.01  # shares of the scans

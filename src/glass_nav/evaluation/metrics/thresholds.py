@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, Callable, Dict, Mapping, Optional, Sequence
 
-from glass_nav.evaluation.metrics import pose_errors
+from glass_nav.evaluation.metrics import integrity_scores, pose_errors
 from glass_nav.vocabulary import BeamCase, LocalizationState
 
 COMPARISONS: "Dict[str, Callable[[float, float], bool]]" = {
@@ -20,6 +20,7 @@ COMPARISONS: "Dict[str, Callable[[float, float], bool]]" = {
 }
 KNOWN = (
     *pose_errors.METRICS,
+    *integrity_scores.METRICS,
     "scans",
     "scans_refused",
     "updates",
@@ -118,9 +119,9 @@ def _value(metrics: Mapping[str, Any], name: str) -> Optional[float]:
         value = value.get(inner, 0.0 if group in ("state_share", "case_share") else None)
     if (
         value is None
-        and name in pose_errors.METRICS
+        and name in (*pose_errors.METRICS, *integrity_scores.NEVER)
         and metrics.get("scans_without_ground_truth", metrics["scans"]) is not None
     ):
         matched = metrics["scans"] - metrics["scans_without_ground_truth"]
-        return math.inf if matched else None  # JSON has no number for an infinite error
+        return math.inf if matched else None  # JSON has no number for infinity
     return None if value is None else float(value)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Dict, List, Optional
 
 from glass_nav.evaluation.metrics.case_scores import NEAR_M
+from glass_nav.evaluation.metrics.integrity_scores import CONSISTENT_NEES
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.vocabulary import CASES_IN_ORDER
 
@@ -31,11 +32,30 @@ def run_lines(result: ReplayResult) -> List[str]:
             f"lost            {100 * figures['lost_share']:.1f} % of the scans more than 0.5 m off, "
             f"{100 * figures['lost_1m_share']:.1f} % more than 1 m"
         )
+    lines += _integrity_lines(figures)
     lines.append(
         "beam cases      "
         + "  ".join(f"{case.words} {100 * figures['case_share'][str(case.value)]:.1f} %" for case in CASES_IN_ORDER)
     )
     return lines + _case_lines(figures["cases"]) + _surface_lines(figures["scan_surfaces"])
+
+
+def _integrity_lines(figures: Dict[str, Any]) -> List[str]:
+    if figures["misleading_share"] is None:
+        return []
+    lines = [
+        f"integrity       {100 * figures['misleading_share']:.2f} % misleading, at most "
+        f"{figures['misleading_max_s']:.1f} s and {figures['misleading_max_m']:.2f} m in a row; false alarms "
+        f"{100 * figures['alarm_share']:.2f} %; NEES median {_figure(figures['nees_median'], 2)} "
+        f"(consistent: {CONSISTENT_NEES:.2f}); 99.9 % level {_figure(figures['level_ratio'], 1)} times the error's 95 %"
+    ]
+    if figures["time_to_alarm_s"] != 0.0 or figures["time_back_s"] != 0.0:
+        to_alarm, back = (
+            "never" if figures[name] is None else f"after {figures[name]:.1f} s"
+            for name in ("time_to_alarm_s", "time_back_s")
+        )
+        lines.append(f"  wrong pose      alarm {to_alarm}, right and LOCALIZED again {back}")
+    return lines
 
 
 def _case_lines(scores: Optional[Dict[str, Any]]) -> List[str]:

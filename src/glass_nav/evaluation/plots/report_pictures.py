@@ -14,6 +14,7 @@ from glass_nav.evaluation.plots.report import (
     cases_over_time,
     driven_path,
     errors,
+    integrity,
     reliability,
     update_time,
     walls,
@@ -22,7 +23,7 @@ from glass_nav.evaluation.plots.report import (
 from glass_nav.evaluation.plots.report import confusion as confusion_picture
 from glass_nav.evaluation.plots.report.ground import Ground
 
-OF_THE_RUN = (driven_path, cases_over_time, walls, errors, reliability, candidates, update_time)
+OF_THE_RUN = (driven_path, cases_over_time, walls, errors, integrity, reliability, candidates, update_time)
 
 
 def draw_all(

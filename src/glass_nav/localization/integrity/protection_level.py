@@ -1,0 +1,46 @@
+"""Covariance -> protection levels: how far off the pose may be, with a stated probability.
+
+The term is that of satellite navigation (RTCA DO-229): the error exceeds its protection level with at most the stated
+risk. An error above the level of a pose that is reported as LOCALIZED is misleading information.
+
+Errors of scan registration have heavier tails than a normal distribution, so the multiples of the standard deviation
+are those of Student's t. Its body is scaled to the same variance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import special
+
+_FREEDOM = 5.0  # degrees of freedom of the tails
+PROBABILITIES = (0.95, 0.999)
+
+
+def _multiple(probability: float) -> float:
+    """Of the standard deviation: an error of either sign is below it with that probability."""
+    return float(special.stdtrit(_FREEDOM, 0.5 + 0.5 * probability) * np.sqrt((_FREEDOM - 2.0) / _FREEDOM))
+
+
+_MULTIPLES = np.array([_multiple(each) for each in PROBABILITIES])
+
+
+@dataclass(frozen=True)
+class ProtectionLevels:
+    """Limits of the error along the robot's heading [m], across it [m], and of the heading [rad]."""
+
+    p95: np.ndarray  # (3,) each is exceeded with a probability of at most 5 %; NaN: no pose
+    p999: np.ndarray  # (3,) 0.1 %
+
+
+UNKNOWN = ProtectionLevels(np.full(3, np.nan), np.full(3, np.nan))
+
+
+def of(map_from_base: np.ndarray, covariance: np.ndarray) -> ProtectionLevels:
+    """Levels of a pose (3,) in map with a covariance (3, 3) over x [m], y [m], yaw [rad] in map."""
+    cos, sin = np.cos(map_from_base[2]), np.sin(map_from_base[2])
+    axes = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    deviations = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", axes, covariance, axes), 0.0))
+    p95, p999 = np.minimum(_MULTIPLES[:, None] * deviations, [np.inf, np.inf, np.pi])
+    return ProtectionLevels(p95, p999)
