@@ -7,7 +7,7 @@ from typing import Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from glass_nav.checkup import frame_checks, map_checks, motion_checks, scan_checks, time_checks
+from glass_nav.checkup import frame_checks, glass_checks, map_checks, motion_checks, scan_checks, time_checks
 from glass_nav.checkup.finding import Finding
 from glass_nav.checkup.map_checks import ScansOnMap
 from glass_nav.checkup.scan_motion import FARTHEST_M
@@ -221,9 +221,22 @@ def _check_motion_and_map(
     found: List[Finding] = []
     if grid_map is not None:
         found = [*map_checks.check(ScansOnMap(grid_map, [_in_base(scan) for scan, _ in in_order]), opposite)]
+        if not opposite and in_order and np.isfinite(in_order[0][1]).all():
+            found = _with_glass(found, grid_map, in_order)
         yield from found
     if opposite and not any(finding.name == "lidar-mirrored" for finding in found):
         yield _opposite(grid_map is not None, lidar, robot.link)
+
+
+def _with_glass(
+    found: List[Finding], grid_map: GridMap, placed: Sequence[Tuple[Scan, np.ndarray]]
+) -> List[Finding]:
+    """What was found on scans and map, with what the map lacks; where that is glass, scans do not fit for that reason."""
+    if any(finding.name != map_checks.MISMATCH for finding in found):
+        return found
+    odom_from_base = [se2.compose(odom_from_laser, se2.inverse(scan.base_from_laser)) for scan, odom_from_laser in placed]
+    changes = [*glass_checks.check(grid_map, [scan for scan, _ in placed], np.array(odom_from_base))]
+    return changes or found
 
 
 def _opposite(with_map: bool, lidar: str, link: str) -> Finding:

@@ -7,7 +7,7 @@ glass_localization.txt: decide beam by beam what the beam met, then weigh the pa
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Callable, List, Optional, Tuple
+from typing import Callable, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from glass_nav.localization.beam_classification.case_votes import BeamCases
 from glass_nav.localization.beam_classification.expected_ranges import ExpectedRanges
 from glass_nav.localization.beam_classification.glass_map import GlassMap
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
-from glass_nav.localization.beam_classification.unmapped_panes import PanesMemory, UnmappedPanes
+from glass_nav.localization.beam_classification.unmapped_panes import UnmappedPanes
 from glass_nav.localization.integrity import pose_state, protection_level
 from glass_nav.localization.integrity.kidnap_detector import KidnapDetector
 from glass_nav.localization.integrity.protection_level import ProtectionLevels
@@ -150,18 +150,19 @@ class Localizer:
         """Panes that the map lacks, found since set_map() or remembered, that count as surfaces."""
         return self._panes.drawn
 
-    def panes_memory(self) -> PanesMemory:
-        """All panes found, and the glass map, to be kept for a later run on the same map."""
-        return PanesMemory(self._panes.candidates, self.glass_map.arrays())
+    @property
+    def found_panes(self) -> Tuple[Pane, ...]:
+        """All of them, the most probable first, also those that do not count."""
+        return self._panes.candidates
 
-    def remember(self, memory: PanesMemory) -> None:
-        """What panes_memory() gave on the same map.
+    def remember(self, panes: Sequence[Pane], glass: Mapping[str, np.ndarray]) -> None:
+        """What an earlier run on the same map found: its found_panes and the arrays() of its glass map.
 
         Raises:
             ValueError: the glass map is of another one; nothing is changed.
         """
-        self.glass_map.restore(memory.glass)
-        self._panes = UnmappedPanes(self._grid_map, self._params.pane_use, self._params.panes, memory.panes)
+        self.glass_map.restore(glass)
+        self._panes = UnmappedPanes(self._grid_map, self._params.pane_use, self._params.panes, panes)
         self._draw_panes()
 
     def set_pose(self, map_from_base: np.ndarray, covariance: np.ndarray) -> None:

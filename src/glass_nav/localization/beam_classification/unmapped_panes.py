@@ -7,7 +7,7 @@ itself, on which everything else relies, never changes.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import List, Mapping, Sequence, Tuple
+from typing import List, Sequence, Tuple
 
 import numpy as np
 
@@ -32,14 +32,6 @@ class PaneUse:
     def __post_init__(self) -> None:
         if not 0.0 < self.pane_min_probability <= 1.0:
             raise ValueError(f"~pane_min_probability must be in (0, 1], got {self.pane_min_probability}")
-
-
-@dataclass(frozen=True)
-class PanesMemory:
-    """What a run leaves to the next one on the same map."""
-
-    panes: Sequence[Pane]  # all that were found
-    glass: Mapping[str, np.ndarray]  # GlassMap.arrays()
 
 
 class UnmappedPanes:
