@@ -12,6 +12,7 @@ from typing import List, Sequence, Tuple
 import numpy as np
 
 from glass_nav.panes.pane_finder import PaneFinder, PaneFinderParams
+from glass_nav.params import number
 from glass_nav.sensing.scan import Scan
 from glass_nav.world import drawn_panes
 from glass_nav.world.drawn_panes import PaneError
@@ -27,11 +28,7 @@ class PaneUse:
     """Whether panes that the map lacks are looked for, and which of them count."""
 
     find_panes: bool = True
-    pane_min_probability: float = 0.9  # of a pane that beams and scan_surfaces respect
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.pane_min_probability <= 1.0:
-            raise ValueError(f"~pane_min_probability must be in (0, 1], got {self.pane_min_probability}")
+    pane_min_probability: float = number(0.9, 0.0, 1.0)  # of a pane that beams and scan_surfaces respect
 
 
 class UnmappedPanes:

@@ -84,9 +84,3 @@ def test_panes_of_an_earlier_run_are_drawn_at_once(monkeypatch):
 def test_the_search_can_be_switched_off(panes):
     panes.reconfigure(PaneUse(find_panes=False))
     assert not observe(panes, pane())
-
-
-@pytest.mark.parametrize("probability", [0.0, 1.1, float("nan")])
-def test_a_probability_is_one(probability):
-    with pytest.raises(ValueError, match=r"~pane_min_probability must be in \(0, 1\], got"):
-        PaneUse(pane_min_probability=probability)
