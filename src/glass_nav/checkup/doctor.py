@@ -228,13 +228,13 @@ def _check_motion_and_map(
         yield _opposite(grid_map is not None, lidar, robot.link)
 
 
-def _with_glass(
-    found: List[Finding], grid_map: GridMap, placed: Sequence[Tuple[Scan, np.ndarray]]
-) -> List[Finding]:
+def _with_glass(found: List[Finding], grid_map: GridMap, placed: Sequence[Tuple[Scan, np.ndarray]]) -> List[Finding]:
     """What was found on scans and map, with what the map lacks; where that is glass, scans do not fit for that reason."""
     if any(finding.name != map_checks.MISMATCH for finding in found):
         return found
-    odom_from_base = [se2.compose(odom_from_laser, se2.inverse(scan.base_from_laser)) for scan, odom_from_laser in placed]
+    odom_from_base = [
+        se2.compose(odom_from_laser, se2.inverse(scan.base_from_laser)) for scan, odom_from_laser in placed
+    ]
     changes = [*glass_checks.check(grid_map, [scan for scan, _ in placed], np.array(odom_from_base))]
     return changes or found
 

@@ -34,9 +34,7 @@ class PaneUse:
 class UnmappedPanes:
     """The panes that one map lacks, as far as they are known."""
 
-    def __init__(
-        self, grid_map: GridMap, use: PaneUse, finder: PaneFinderParams, known: Sequence[Pane] = ()
-    ) -> None:
+    def __init__(self, grid_map: GridMap, use: PaneUse, finder: PaneFinderParams, known: Sequence[Pane] = ()) -> None:
         """
         Args:
             grid_map: the map.
