@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Iterator, List, Optional, Sequence, Tuple
+from typing import Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -84,6 +84,8 @@ def examine(seen: Observed, grid_map: Optional[GridMap] = None, names: FrameName
         grid_map = None if of_map else grid_map
     for topic, scans in seen.scans.items():
         findings += _check_lidar(topic, scans, robot, grid_map)
+    if grid_map is not None and all(finding.name == map_checks.MISMATCH for finding in findings):
+        findings = [*_check_glass(grid_map, robot)] or findings  # where glass is missing, scans do not fit for it
     unique = {(each.name, each.what): each for each in findings}
     return Report(lines, list(unique.values()))
 
@@ -93,6 +95,7 @@ class _Robot:
 
     def __init__(self, seen: Observed, names: FrameNames) -> None:
         self.findings: List[Finding] = []
+        self.placed: Dict[str, List[Tuple[Scan, np.ndarray]]] = {}  # by lidar: its scans and odom_from_laser
         self.tree = FrameTree()
         stamps: List[Tuple[int, int]] = []
         for each in seen.transforms:
@@ -213,6 +216,7 @@ def _check_motion_and_map(
         elif at is None or not len(at):
             placed.append((scan, np.full(3, np.nan)))
     in_order = [placed[index] for index in np.argsort([scan.stamp_ns for scan, _ in placed], kind="stable")]
+    robot.placed[lidar] = in_order
     opposite = False
     if in_order and np.isfinite(in_order[0][1]).all():
         moves = motion_checks.measure([_points(scan) for scan, _ in in_order], np.array([pose for _, pose in in_order]))
@@ -221,22 +225,19 @@ def _check_motion_and_map(
     found: List[Finding] = []
     if grid_map is not None:
         found = [*map_checks.check(ScansOnMap(grid_map, [_in_base(scan) for scan, _ in in_order]), opposite)]
-        if not opposite and in_order and np.isfinite(in_order[0][1]).all():
-            found = _with_glass(found, grid_map, in_order)
         yield from found
     if opposite and not any(finding.name == "lidar-mirrored" for finding in found):
         yield _opposite(grid_map is not None, lidar, robot.link)
 
 
-def _with_glass(found: List[Finding], grid_map: GridMap, placed: Sequence[Tuple[Scan, np.ndarray]]) -> List[Finding]:
-    """What was found on scans and map, with what the map lacks; where that is glass, scans do not fit for that reason."""
-    if any(finding.name != map_checks.MISMATCH for finding in found):
-        return found
-    odom_from_base = [
-        se2.compose(odom_from_laser, se2.inverse(scan.base_from_laser)) for scan, odom_from_laser in placed
-    ]
-    changes = [*glass_checks.check(grid_map, [scan for scan, _ in placed], np.array(odom_from_base))]
-    return changes or found
+def _check_glass(grid_map: GridMap, robot: _Robot) -> Iterator[Finding]:
+    """What the map lacks and has too much, as each lidar sees it; only for a robot without other faults."""
+    for placed in robot.placed.values():
+        known = [(scan, odom_from_laser) for scan, odom_from_laser in placed if np.isfinite(odom_from_laser).all()]
+        if known:
+            scans = [scan for scan, _ in known]
+            odom_from_base = [se2.compose(pose, se2.inverse(scan.base_from_laser)) for scan, pose in known]
+            yield from glass_checks.check(grid_map, scans, np.array(odom_from_base))
 
 
 def _opposite(with_map: bool, lidar: str, link: str) -> Finding:
