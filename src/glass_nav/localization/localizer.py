@@ -257,7 +257,9 @@ class Localizer:
         for bearings, landmarks in self._bearings_from(odom_from_base):
             self._filter.weigh_by_bearings(bearings, landmarks)
         cases = self._correct(scan, odom_from_base)
-        verdict = self._kidnap_detector.observe(scan, odom_from_base, self._filter.best.map_from_base)
+        verdict = self._kidnap_detector.observe(
+            scan, odom_from_base, self._filter.best.map_from_base, self._dead_reckoning
+        )
         self._quality.doubt(verdict)
         if verdict.found is not None:
             return self._settle(scan, odom_from_base, verdict.found, verdict.fit_there)
