@@ -3,14 +3,22 @@
 Every terminal line, picture, report, rviz display and message takes its names, its order and its colours from here. The
 numbers of the beam cases are those of the glass document (glass_localization.txt) and of msg/BeamCases.msg; the order of
 the other enums is that of the constants in the messages, which a test compares.
+
+The colours that are shown together were chosen so that people with deuteranopia or protanopia see them as different: in
+the simulations of Machado, Oliveira and Fernandes (2009) any two are MIN_COLOUR_DIFFERENCE or more apart in CIE Lab, and
+their lightness differs, which a print in grey keeps. A mark or a hatching repeats what a colour says.
+test/unit/test_colours.py computes the distances.
 """
 
 from __future__ import annotations
 
 from enum import Enum, IntEnum
-from typing import Dict, Iterable, List, Tuple
+from typing import Any, Dict, Iterable, List, Tuple
 
 Rgb = Tuple[int, int, int]  # 0..255
+
+MIN_COLOUR_DIFFERENCE = 25.0  # CIE Lab; 2.3 is just noticeable side by side
+MIN_LIGHTNESS_STEP = 7.0  # CIE L*, of 100
 
 
 class BeamCase(IntEnum):
@@ -42,6 +50,16 @@ class BeamCase(IntEnum):
         """The same as "#rrggbb"."""
         return hex_colour(self.rgb)
 
+    @property
+    def mark(self) -> str:
+        """The figure at the end of a beam, as matplotlib names it."""
+        return CASE_MARKS[self]
+
+    @property
+    def hatch(self) -> str:
+        """The pattern of its areas, as matplotlib names it."""
+        return CASE_HATCHES[self]
+
 
 # As far as a beam gets, and last the beams that nothing explains: the order of every table and legend.
 CASES_IN_ORDER = (
@@ -58,12 +76,26 @@ CASE_WORDS = {
     BeamCase.SECOND_PENETRATION: "behind two panes",
     BeamCase.UNCERTAIN: "uncertain",
 }
-CASE_RGB: Dict[BeamCase, Rgb] = {  # Okabe and Ito, Color Universal Design (2008)
-    BeamCase.DIFFUSE: (0, 158, 115),
-    BeamCase.SPECULAR: (204, 121, 167),
-    BeamCase.FIRST_PENETRATION: (86, 180, 233),
-    BeamCase.SECOND_PENETRATION: (0, 114, 178),
-    BeamCase.UNCERTAIN: (150, 150, 150),
+CASE_RGB: Dict[BeamCase, Rgb] = {
+    BeamCase.DIFFUSE: (63, 224, 58),
+    BeamCase.SPECULAR: (129, 108, 34),
+    BeamCase.FIRST_PENETRATION: (94, 169, 244),
+    BeamCase.SECOND_PENETRATION: (0, 65, 159),
+    BeamCase.UNCERTAIN: (138, 138, 138),
+}
+CASE_MARKS = {  # matplotlib's names of markers; rviz shows the same figures
+    BeamCase.DIFFUSE: "s",
+    BeamCase.SPECULAR: "^",
+    BeamCase.FIRST_PENETRATION: "+",
+    BeamCase.SECOND_PENETRATION: "D",
+    BeamCase.UNCERTAIN: "x",
+}
+CASE_HATCHES = {  # of areas, matplotlib's patterns
+    BeamCase.DIFFUSE: "",
+    BeamCase.SPECULAR: "//",
+    BeamCase.FIRST_PENETRATION: "+",
+    BeamCase.SECOND_PENETRATION: "x",
+    BeamCase.UNCERTAIN: ".",
 }
 
 
@@ -98,11 +130,25 @@ class LocalizationState(Word):
 
 
 STATE_COLOURS = {
-    LocalizationState.LOCALIZED: "#2ca02c",
-    LocalizationState.UNCERTAIN: "#ffbf00",
-    LocalizationState.LOST: "#d62728",
-    LocalizationState.GLOBAL_SEARCH: "#9467bd",
-    LocalizationState.UNKNOWN: "#7f7f7f",
+    LocalizationState.LOCALIZED: "#1aa3e8",
+    LocalizationState.UNCERTAIN: "#f7dc00",
+    LocalizationState.LOST: "#8f0000",
+    LocalizationState.GLOBAL_SEARCH: "#8b2bd8",
+    LocalizationState.UNKNOWN: "#bdbdbd",
+}
+STATE_MARKS = {  # along a path, matplotlib's names of markers
+    LocalizationState.LOCALIZED: "",
+    LocalizationState.UNCERTAIN: "^",
+    LocalizationState.LOST: "X",
+    LocalizationState.GLOBAL_SEARCH: "o",
+    LocalizationState.UNKNOWN: "s",
+}
+STATE_HATCHES = {  # of areas, matplotlib's patterns
+    LocalizationState.LOCALIZED: "",
+    LocalizationState.UNCERTAIN: "//",
+    LocalizationState.LOST: "xx",
+    LocalizationState.GLOBAL_SEARCH: "o",
+    LocalizationState.UNKNOWN: "..",
 }
 
 
@@ -111,11 +157,47 @@ def state_colour(state: str) -> str:
     return LocalizationState(state).colour if state in LocalizationState.__members__ else "#000000"
 
 
+def state_mark(state: str) -> str:
+    """The mark of a state along a path; none for one that a later version wrote."""
+    return STATE_MARKS[LocalizationState(state)] if state in LocalizationState.__members__ else ""
+
+
+def state_hatch(state: str) -> str:
+    """The pattern of a state's areas; none for one that a later version wrote."""
+    return STATE_HATCHES[LocalizationState(state)] if state in LocalizationState.__members__ else ""
+
+
 def states_in_order(states: Iterable[str]) -> List[str]:
     """Those that occur, each once, in the order of the colours; states that a later version wrote come last."""
     found = set(states)
     known = [str(state) for state in STATE_COLOURS if state in found]
     return known + sorted(found - set(known))
+
+
+class WallKind(Word):
+    """What a wall proved to be, by its probability of glass."""
+
+    SOLID = "solid"
+    UNDECIDED = "undecided"
+    GLASS = "glass"
+
+    @property
+    def rgb(self) -> Rgb:
+        """Its colour in every picture and in rviz."""
+        return WALL_RGB[self]
+
+    @property
+    def colour(self) -> str:
+        """The same as "#rrggbb"."""
+        return hex_colour(self.rgb)
+
+
+WALL_RGB: Dict[WallKind, Rgb] = {
+    WallKind.SOLID: (122, 74, 32),
+    WallKind.UNDECIDED: (240, 228, 66),
+    WallKind.GLASS: (0, 184, 212),
+}
+SOLID_BELOW, GLASS_FROM = 25, 75  # probability of glass [percent]
 
 
 class SearchState(Word):
@@ -131,11 +213,11 @@ class SearchState(Word):
     LOST = "LOST"
 
 
-SEARCH_RGB: Dict[SearchState, Rgb] = {  # of the candidates, in the states that have any; Okabe and Ito as well
-    SearchState.SEARCHING: (230, 159, 0),
-    SearchState.TENTATIVE: (86, 180, 233),
-    SearchState.CONFIRMED: (0, 158, 115),
-    SearchState.AMBIGUOUS: (204, 121, 167),
+SEARCH_RGB: Dict[SearchState, Rgb] = {  # of the candidates, in the states that have any
+    SearchState.SEARCHING: (143, 100, 8),
+    SearchState.TENTATIVE: (47, 151, 245),
+    SearchState.CONFIRMED: (20, 220, 171),
+    SearchState.AMBIGUOUS: (106, 51, 95),
 }
 SEARCH_IS_OVER = (SearchState.CONFIRMED, SearchState.AMBIGUOUS, SearchState.LOST)
 
@@ -169,6 +251,29 @@ class Outcome(Word):
     NOT_LOCALIZED = "NOT_LOCALIZED"
     NO_MOVE_BASE = "NO_MOVE_BASE"
     RESET = "RESET"
+
+
+TAG_RGB: Rgb = (0, 114, 178)  # a landmark
+USED_RGB: Rgb = (20, 220, 171)  # a bearing that the fix used
+LEFT_OUT_RGB: Rgb = (143, 45, 0)  # and one that it did not
+POSE_RGB: Rgb = (213, 94, 0)  # in rviz
+PARTICLE_RGB: Rgb = (230, 159, 0)
+PLACE_RGB: Rgb = (139, 43, 216)  # of a global search, in the colour of the state
+ATLAS_RGB: Rgb = (130, 130, 130)
+NODE_RGB: Rgb = (60, 60, 60)
+FOREST_RGB: Rgb = (0, 114, 178)
+TRUTH_COLOUR = "#111111"  # of paths, dashed
+SERIES_COLOURS = ("#004f9e", "#b85000", "#00c896", "#5c1f4f", "#f0d000", "#3aa0e8", "#000000")  # things to compare
+SERIES_LINES: Tuple[Any, ...] = (
+    "-",
+    "--",
+    "-.",
+    ":",
+    (0, (5, 1, 1, 1, 1, 1)),
+    (0, (8, 2)),
+    (0, (1, 2)),
+)  # and their lines
+SERIES_MARKS = ("s", "^", "o", "D", "v", "P", "X")
 
 
 def hex_colour(rgb: Rgb) -> str:

@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import numpy as np
 import rospy
 import rostest
-from geometry_msgs.msg import PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap, GetMapResponse
 from room_robot import BEAMS, Robot, changed, pose_message, room
@@ -27,11 +27,12 @@ from std_srvs.srv import Empty
 from visualization_msgs.msg import MarkerArray
 
 from glass_nav.geometry import angles, se2
-from glass_nav.msg import LocalizationStatus
+from glass_nav.localization.status_text import STATUS_NAMESPACE
+from glass_nav.msg import LocalizationStatus, SegmentQuality
 from glass_nav.ros import conversions
-from glass_nav.ros.localization import beam_displays, wall_display
 from glass_nav.sensing.raycast import RayCaster
-from glass_nav.vocabulary import BeamCase
+from glass_nav.srv import Locate
+from glass_nav.vocabulary import BeamCase, WallKind
 from glass_nav.world.grid_map import GridMap
 
 PANE_COLUMN = 160
@@ -242,8 +243,8 @@ class LocalizationOutputs(unittest.TestCase):
             "no scan has the stamp of the markers",
         )
         names = {marker.ns for marker in markers.last.markers}
-        self.assertEqual(names, {*(case.label for case in BeamCase), beam_displays.STATUS_NAMESPACE})
-        (status,) = [marker for marker in markers.last.markers if marker.ns == beam_displays.STATUS_NAMESPACE]
+        self.assertEqual(names, {*(case.label for case in BeamCase), STATUS_NAMESPACE})
+        (status,) = [marker for marker in markers.last.markers if marker.ns == STATUS_NAMESPACE]
         self.assertTrue(status.text.startswith("LOCALIZED"), status.text)
         self.assertEqual(status.header.frame_id, "map")
         through = [marker for marker in markers.last.markers if marker.ns == "3 behind one pane"]
@@ -252,7 +253,7 @@ class LocalizationOutputs(unittest.TestCase):
     def test_the_walls_are_shown_by_what_they_are(self) -> None:
         markers = Heard(f"{NODE}/wall_markers", MarkerArray)
         self.assertTrue(wait_until(lambda: len(markers), 30.0), "no ~wall_markers within 30 s")
-        self.assertEqual([marker.ns for marker in markers.last.markers], list(wall_display.WALL_NAMES))
+        self.assertEqual([marker.ns for marker in markers.last.markers], list(map(str, WallKind)))
 
     def test_silence_is_told_beside_the_robot(self) -> None:
         markers = Heard(f"{NODE}/beam_markers", MarkerArray)
@@ -270,6 +271,40 @@ class LocalizationOutputs(unittest.TestCase):
             self.assertTrue(wait_until(lambda legend=legend: len(legend), 30.0), "no ~legend within 30 s")
             self.assertEqual((legend.last.encoding, legend.last.step), ("rgb8", 3 * legend.last.width))
             self.assertEqual(len(legend.last.data), legend.last.height * legend.last.step)
+
+    # -- ~locate and ~segment_quality
+
+    def rough_pose(self, off: "list[float]", frame: str = "map") -> PoseStamped:
+        pose = conversions.pose_from_planar(self.robot.map_from_base() + off)
+        return PoseStamped(conversions.header(0, frame), pose)
+
+    def test_a_rough_pose_is_corrected_by_the_last_scan_or_by_one_that_is_given(self) -> None:
+        locate = rospy.ServiceProxy(f"{NODE}/locate", Locate)
+        for scan in (LaserScan(), self.scans.last):
+            answer = locate(scan, self.rough_pose([0.2, -0.1, 0.05]))
+            self.assertTrue(answer.success, answer.message)
+            self.assertTrue(answer.message.startswith("free: nothing"), answer.message)
+            left = conversions.planar_from_pose(answer.pose.pose) - self.robot.map_from_base()
+            self.assertLess(np.hypot(left[0], left[1]), 0.05)
+            self.assertLess(abs(angles.wrap(left[2])), 0.01)
+            self.assertGreater(answer.after.combined, answer.before.combined)
+            self.assertTrue(math.isnan(answer.free_heading))
+        far = locate(LaserScan(), self.rough_pose([50.0, 0.0, 0.0]))
+        self.assertFalse(far.success)
+        self.assertTrue(far.message.startswith("the scan fits nowhere near the pose"), far.message)
+        with self.assertRaises(rospy.ServiceException) as refused:
+            locate(LaserScan(), self.rough_pose([0.0, 0.0, 0.0], "odom"))
+        self.assertIn("the pose must be given in frame 'map', got 'odom'", str(refused.exception))
+
+    def test_the_quality_of_each_scan_is_sent_while_somebody_listens(self) -> None:
+        quality = Heard(f"{NODE}/segment_quality", SegmentQuality)
+        self.assertTrue(wait_until(lambda: len(quality), 30.0), "no ~segment_quality within 30 s")
+        last = quality.last
+        self.assertEqual(last.header.frame_id, "map")
+        self.assertGreater(last.points, 50)
+        self.assertGreater(last.ecf, 0.5)
+        self.assertTrue(0.0 < last.combined <= last.ecf)
+        self.assertLess(last.emse_inliers, 0.01)
 
 
 if __name__ == "__main__":

@@ -12,12 +12,8 @@ import numpy as np
 from glass_nav.evaluation.plots import location_picture
 from glass_nav.evaluation.plots.location_picture import LocatedScan
 from glass_nav.geometry import angles
-from glass_nav.localization.segments.segment_correction import (
-    METHODS,
-    SegmentCorrection,
-    SegmentCorrectionParams,
-    SegmentQuality,
-)
+from glass_nav.localization.segments import segment_locator
+from glass_nav.localization.segments.segment_correction import METHODS, SegmentCorrectionParams, SegmentQuality
 from glass_nav.localization.segments.segment_locator import Located, SegmentLocator
 from glass_nav.recording import scan_file
 from glass_nav.recording.log_file import open_log
@@ -29,9 +25,6 @@ HELP = "correct a rough pose by one scan"
 DESCRIPTION = """Moves a rough pose so that the scan's beams end at the wall segments of the map, and says how well they
 do there, and which directions the walls do not constrain. Draws the scan before and after. Good from
 about 0.5 m and 10 degrees away. Ends with 3 if the scan fits nowhere near the pose."""
-
-MIN_SHARE = 0.4  # of the answering beams, that must end at walls
-MAX_M, MAX_RAD = 1.0, np.radians(20.0)  # that a pose may move: from farther away a fit is chance
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -125,24 +118,9 @@ def main(arguments: argparse.Namespace) -> None:
         f"after: {_measures(found.after)}",
     )
     print(f"drawn to {arguments.out}")
-    _refuse_chance(scan, located, found.map_from_base - rough)
-
-
-def _refuse_chance(scan: Scan, located: Located, moved: np.ndarray) -> None:
-    """Raises ValueError if the scan does not fit, or only so far away that no rough pose led there."""
-    share = _share_at_walls(scan, located)
-    way_m, turn_rad = float(np.hypot(moved[0], moved[1])), float(abs(angles.wrap(moved[2])))
-    if share < MIN_SHARE:
-        raise ValueError(
-            f"the scan fits nowhere near the pose: {share:.0%} of its answering beams end at walls, "
-            f"at least {MIN_SHARE:.0%} must"
-        )
-    if way_m > MAX_M or turn_rad > MAX_RAD:
-        raise ValueError(
-            f"the scan fits nowhere near the pose: the correction led {way_m:.2f} m and "
-            f"{np.degrees(turn_rad):.0f} deg away, at most {MAX_M:g} m and {np.degrees(MAX_RAD):.0f} "
-            f"deg are no chance"
-        )
+    refusal = segment_locator.refusal(scan, located, rough)
+    if refusal is not None:
+        raise ValueError(refusal)
 
 
 def _params(arguments: argparse.Namespace) -> SegmentCorrectionParams:
@@ -173,11 +151,6 @@ def _scan(arguments: argparse.Namespace) -> Scan:
     return entry.scan
 
 
-def _share_at_walls(scan: Scan, located: Located) -> float:
-    at_walls = located.correction.after.inlier_share * np.count_nonzero(located.used)
-    return float(at_walls / np.count_nonzero(scan.answered))
-
-
 def _lines(scan: Scan, located: Located, rough: np.ndarray, segments: int) -> "list[str]":
     found = located.correction
     x, y, yaw = found.map_from_base
@@ -187,24 +160,11 @@ def _lines(scan: Scan, located: Located, rough: np.ndarray, segments: int) -> "l
         f"{np.count_nonzero(located.used)} pull; {segments} wall segments",
         f"pose      x {x:.3f} m  y {y:.3f} m  yaw {yaw:.4f} rad ({np.degrees(yaw):.2f} deg)",
         f"moved     {np.hypot(moved[0], moved[1]):.3f} m, {np.degrees(angles.wrap(moved[2])):+.2f} deg",
-        f"free      {free_in_words(found)}",
+        f"free      {segment_locator.free_in_words(found)}",
         f"quality   {_measures(found.after)}; {found.after.inlier_share:.0%} of those that pull within "
         f"{SegmentCorrectionParams().outlier_m:g} m of walls",
         f"before    {_measures(found.before)}",
     ]
-
-
-def free_in_words(found: SegmentCorrection) -> str:
-    """Which directions the walls do not constrain."""
-    if not len(found.free):
-        return "nothing: the walls constrain x, y and yaw"
-    if len(found.free) == 3:
-        return "x, y and yaw: the walls constrain nothing"
-    heading = found.free_heading_rad
-    if heading is not None:
-        return f"the direction {np.degrees(heading):.0f} deg of the map: not corrected"
-    names = [name for name, weight in zip(("x", "y", "yaw"), np.linalg.norm(found.free, axis=0)) if weight > 0.3]
-    return f"{len(found.free)} of 3 directions, of {', '.join(names)}: not corrected"
 
 
 def _measures(quality: SegmentQuality) -> str:

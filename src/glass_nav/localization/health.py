@@ -113,7 +113,9 @@ class LocalizationHealth:
         text = f"{answered} of {beams} beams answered"
         if answered < FEW_BEAMS:
             return Health(Level.WARN, f"only {text}: odometry leads", values)
-        return Health(Level.OK, f"{text}, {now.estimate.inlier_ratio:.0%} of them are explained", values)
+        if np.isnan(now.estimate.inlier_ratio):
+            return Health(Level.OK, f"{text}, none from where the map knows something", values)
+        return Health(Level.OK, f"{text}, the map explains {now.estimate.inlier_ratio:.0%} of those it covers", values)
 
     def _timing(self, now: Situation) -> Health:
         if not self._wall_s:

@@ -29,6 +29,7 @@ from glass_nav.localization.particle_filter.particle_filter import ONE_PLACE, Pa
 from glass_nav.localization.update_schedule import UpdateSchedule
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.known_area import KnownArea
 from glass_nav.sensing.scan import Scan
 from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
@@ -51,7 +52,7 @@ class Estimate:
     particles: np.ndarray  # (P, 3) poses in map
     state: LocalizationState
     reason: str  # the state in words
-    inlier_ratio: float  # share of the answering beams that a case 1-4 explains
+    inlier_ratio: float  # of the beams that say something, see beam_evidence.py; NaN without any
     updated: bool  # whether this scan moved the particles
     confidence: float  # chance that the pose is right, 0..1
     places: int = 1  # that are possible, see pose_state.Judgement
@@ -120,6 +121,7 @@ class Localizer:
 
     def _look_at(self, grid_map: GridMap, field: DistanceField) -> None:
         self._grid_map, self._field = grid_map, field
+        self._known_area = KnownArea(grid_map)
         self._everywhere = _LazyMatcher(grid_map, field)
         self._classifier = self._new_classifier(self._params.classifier, grid_map)
         self._kidnap_detector = self._new_kidnap_detector()
@@ -280,10 +282,10 @@ class Localizer:
     ) -> Estimate:
         """The pose with its state; `expected` is of that pose."""
         cases = self._classifier.seen_from(cases, scan, expected)
-        answered = int(scan.answered.sum())
-        inlier_ratio = float(np.count_nonzero(cases.case)) / answered if answered else float("nan")
+        evidence = self._classifier.evidence(scan, cases, expected, map_from_base, self._known_area)
         if updated:
-            self._quality.observe(inlier_ratio)
+            judged = evidence.without_crowd()
+            self._quality.observe(judged.inlier_ratio, judged.judged_share)
         judgement = self._quality.judge(self._filter.best)
         trusted = judgement.state == LocalizationState.LOCALIZED
         return Estimate(
@@ -296,7 +298,7 @@ class Localizer:
             self._filter.particles,
             judgement.state,
             judgement.reason,
-            inlier_ratio,
+            evidence.inlier_ratio,
             updated,
             judgement.confidence,
             judgement.places,

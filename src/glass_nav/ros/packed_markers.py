@@ -14,6 +14,8 @@ from geometry_msgs.msg import Pose, Quaternion, Vector3
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
+from glass_nav.shapes import Shape, ShapeKind, Text
+
 
 class PackedMarker(Marker):
     """A marker that holds its points as an array, of one colour and without text."""
@@ -68,6 +70,32 @@ def points_marker(
         pose=Pose(orientation=Quaternion(w=1.0)),
         scale=Vector3(width_m, width_m, 0.0),
         color=marker_colour,
+    )
+
+
+def shape_marker(header: Header, shape: Shape) -> PackedMarker:
+    """A shape of glass_nav.shapes as a marker."""
+    kind = Marker.POINTS if shape.kind is ShapeKind.SQUARES else Marker.LINE_LIST
+    rgba = colour(np.array(shape.rgb), shape.alpha)
+    return points_marker(
+        header, shape.namespace, shape.number, kind, shape.points_m, shape.height_m, shape.width_m, rgba
+    )
+
+
+def text_marker(header: Header, text: Text) -> Marker:
+    """A text of glass_nav.shapes as a marker."""
+    pose = Pose(orientation=Quaternion(w=1.0))
+    pose.position.x, pose.position.y, pose.position.z = map(float, text.at_m)
+    return Marker(
+        header=header,
+        ns=text.namespace,
+        id=text.number,
+        type=Marker.TEXT_VIEW_FACING,
+        action=Marker.ADD,
+        pose=pose,
+        scale=Vector3(0.0, 0.0, text.letter_m),
+        text=text.text,
+        color=colour(np.array(text.rgb)),
     )
 
 

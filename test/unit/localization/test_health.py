@@ -91,7 +91,7 @@ def test_scans_say_where_they_went_since_the_last_report(reporter):
 
 def test_beams_say_how_many_are_explained_and_which_case_they_are(reporter):
     level, text, values = said(reporter, "beams")
-    assert (level, text) == (OK, "100 of 100 beams answered, 90% of them are explained")
+    assert (level, text) == (OK, "100 of 100 beams answered, the map explains 90% of those it covers")
     assert list(values.items()) == [
         ("1 first surface", "75.0%"),
         ("2 mirrored", "0.0%"),

@@ -746,6 +746,13 @@ def test_threads_do_not_change_the_answer(drive):
         same(one, other)
 
 
+def test_mrpts_ray_casts_give_nearly_the_same_answer(drive):
+    ours, mrpts = drive.through(started()), drive.through(started(raycast_backend="mrpt"))
+    assert np.abs(drive.errors(ours) - drive.errors(mrpts)).max() < 0.03
+    same_case = [np.mean(one.cases.case == other.cases.case) for one, other in zip(ours, mrpts)]
+    assert np.mean(same_case) > 0.98
+
+
 def test_another_seed_gives_nearly_the_same_answer(drive):
     one, other = drive.through(started(seed=5)), drive.through(started(seed=6))
     assert not np.array_equal(one[-1].particles, other[-1].particles)
@@ -966,6 +973,7 @@ def test_on_a_map_without_walls_odometry_alone_leads():
         (Schedule, dict(update_min_a=float("nan")), "~update_min_a must be >= 0, got nan"),
         (Schedule, dict(resample_interval=0), "~resample_interval must be >= 1, got 0"),
         (Schedule, dict(raycast_threads=0), "~raycast_threads must be >= 1, got 0"),
+        (Schedule, dict(raycast_backend="gpu"), "~raycast_backend must be one of exact, mrpt, got 'gpu'"),
         (LaserLimits, dict(laser_min_range=float("nan")), "~laser_min_range must be finite, got nan"),
         (LaserLimits, dict(laser_max_range=float("inf")), "~laser_max_range must be finite, got inf"),
         (

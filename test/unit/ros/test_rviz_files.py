@@ -9,11 +9,14 @@ from typing import Any, Iterator
 
 import yaml
 
+from glass_nav.evaluation.plots import legend
+from glass_nav.localization.status_text import STATUS_NAMESPACE
+from glass_nav.ros import legend as legend_topic
 from glass_nav.ros.driver import driver_displays, driver_node
 from glass_nav.ros.landmarks import landmarks_node
-from glass_nav.ros.localization import beam_displays, localization_node, wall_display
+from glass_nav.ros.localization import localization_node
 from glass_nav.ros.topology import topology_displays
-from glass_nav.vocabulary import BeamCase
+from glass_nav.vocabulary import PARTICLE_RGB, POSE_RGB, BeamCase, WallKind
 
 REPO = Path(__file__).parents[3]
 CONFIG = yaml.safe_load((REPO / "rviz" / "glass_nav.rviz").read_text(encoding="utf-8"))
@@ -48,14 +51,14 @@ def test_what_is_called_value_is_what_is_enabled():
 
 
 def test_every_case_and_the_status_have_a_checkbox():
-    names = [*(case.label for case in BeamCase), beam_displays.STATUS_NAMESPACE]
+    names = [*(case.label for case in BeamCase), STATUS_NAMESPACE]
     assert named("Beams by case")["Namespaces"] == dict.fromkeys(names, True)
-    assert named("Glass map")["Namespaces"] == dict.fromkeys(wall_display.WALL_NAMES, True)
+    assert named("Glass map")["Namespaces"] == dict.fromkeys(map(str, WallKind), True)
 
 
-def test_the_topology_is_switched_off_and_has_a_checkbox_for_each_thing():
+def test_the_topology_is_switched_on_and_has_a_checkbox_for_each_thing():
     group = named("Topology")
-    assert group["Class"] == "rviz/Group" and group["Enabled"] is False
+    assert group["Class"] == "rviz/Group" and group["Enabled"] is True
     assert named("Atlas and search")["Namespaces"] == dict.fromkeys(topology_displays.NAMESPACES, True)
 
 
@@ -65,12 +68,12 @@ def test_the_driver_is_switched_off_and_has_a_checkbox_for_each_thing():
     assert "/glass_driver/markers" in topics() and "~markers" in driver_node.__doc__
 
 
-def test_the_displays_of_the_wake_up_are_the_same_with_topology_and_driver_switched_on():
+def test_the_displays_of_the_wake_up_are_the_same_with_the_driver_switched_on():
     text = (REPO / "rviz" / "wakeup.rviz").read_text(encoding="utf-8")
     wakeup = yaml.safe_load(text)
     shown = wakeup["Visualization Manager"]["Displays"]
     for display in shown:
-        if display["Name"] in ("Topology", "Driver"):
+        if display["Name"] == "Driver":
             assert display["Enabled"] is True
             display["Enabled"] = False
     assert wakeup == CONFIG
@@ -82,6 +85,7 @@ def test_the_topics_of_the_node_are_those_it_tells_of():
         match = re.fullmatch(r"/glass_localization/(\w+)", topic)
         if match:
             assert f"~{match[1]}" in told, topic
+    assert topics()[f"/{legend_topic.TOPIC}"] == "Legend"
     assert "/landmarks/markers" in topics() and "~markers" in landmarks_node.__doc__
 
 
@@ -102,3 +106,18 @@ def test_every_topic_below_a_node_can_be_remapped_to_another_name():
     defaults = {arg.get("name"): arg.get("default") for arg in launch.iter("arg")}
     assert (defaults["name"], defaults["topology_name"]) == ("glass_localization", "glass_topology")
     assert (defaults["landmarks_name"], defaults["driver_name"]) == ("landmarks", "glass_driver")
+
+
+def test_pose_and_particles_have_the_colours_of_the_legend():
+    assert named("Pose")["Color"] == "; ".join(map(str, POSE_RGB))
+    assert named("Particles")["Color"] == "; ".join(map(str, PARTICLE_RGB))
+
+
+def test_the_panel_of_the_legend_has_the_size_of_the_picture():
+    """QMainWindow's state: the left column is 0x15e wide; the panel is the picture and its title bar high."""
+    state = CONFIG["Window Geometry"]["QMainWindow State"]
+    name = "Legend".encode("utf-16-be").hex()
+    start = state.index(name) + len(name) + 2  # visible
+    height = int(state[start + 8 : start + 16], 16)
+    assert "0000015e" in state and int("15e", 16) == legend.WIDTH
+    assert legend.HEIGHT <= height <= legend.HEIGHT + 40

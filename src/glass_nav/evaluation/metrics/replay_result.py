@@ -71,7 +71,7 @@ class ReplayResult:
     level_999: np.ndarray  # (S, 3)
     states: List[str]  # S of them
     reasons: List[str]  # S of them
-    used_share: np.ndarray  # (S,) share of the answering beams that a case 1-4 explains
+    used_share: np.ndarray  # (S,) see LocalizationStatus.msg
     updated: np.ndarray  # (S,) bool: the scan moved the particles
     particles: np.ndarray  # (S,) int: how many there were
     reliability: np.ndarray  # (S,) probability that the pose is right, as the filter reports it

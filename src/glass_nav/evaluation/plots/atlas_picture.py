@@ -9,15 +9,18 @@ from typing import Any, Optional, Sequence
 import numpy as np
 
 from glass_nav.evaluation.plots.canvas import frame, new_figure
+from glass_nav.evaluation.plots.labels import Labels
 from glass_nav.evaluation.plots.map_layer import UNKNOWN_GREY, draw_map
+from glass_nav.vocabulary import SERIES_COLOURS
 from glass_nav.world.grid_map import GridMap
 
 MARGIN_M = 1.0
 MAX_NUMBERS = 250  # nodes; more numbers are unreadable
 MIN_NUMBERED_M = 0.8
-EDGE_COLOUR, CHOSEN_COLOUR, WALL_COLOUR = "#1f77b4", "#d62728", "#009e73"
-NODE_COLOURS = {1: "#ff8c00", 2: "#9467bd", 3: "#d62728", 4: "#2ca02c", 5: "#111111"}  # 5 and more
-NODE_NAMES = {1: "dead end", 2: "ring marker", 3: "meetpoint of 3", 4: "of 4", 5: "of 5 and more"}
+EDGE_COLOUR, CHOSEN_COLOUR, WALL_COLOUR = SERIES_COLOURS[0], SERIES_COLOURS[1], SERIES_COLOURS[2]
+NODE_COLOURS = {1: "#ffd21a", 2: "#8a2fd0", 3: "#c04a00", 4: "#14c08c", 5: "#111111"}  # 5 and more
+NODE_MARKS = {1: "v", 2: "s", 3: "o", 4: "D", 5: "P"}
+NODE_NAMES = {1: "degree 1 (dead end)", 2: "degree 2 (ring)", 3: "degree 3", 4: "degree 4", 5: "degree 5 or more"}
 
 
 @dataclass(frozen=True)
@@ -39,8 +42,7 @@ def draw_atlas(path: Path, grid: Optional[GridMap], atlas: AtlasDrawing, title: 
     figure.suptitle(f"{title}\n{_counts(atlas)}", fontsize=11)
     for axes in panels:
         _draw_ground(axes, grid, low, high)
-    _draw_edges(panels[0], atlas)
-    _draw_nodes(panels[0], atlas)
+    _draw_graph(panels[0], atlas)
     panels[0].legend(loc="best", fontsize=8, framealpha=0.9)
     for axes, seen, which in zip(panels[1:], (atlas.seen_there_m, atlas.seen_back_m), ("there", "back")):
         _draw_views(axes, atlas, seen, which)
@@ -54,8 +56,7 @@ def draw_edge(path: Path, grid: Optional[GridMap], atlas: AtlasDrawing, edge: in
     figure.suptitle(f"{title}: edge {edge}", fontsize=11)
     for axes, seen, way in zip(panels, (atlas.seen_there_m, atlas.seen_back_m), (1, -1)):
         _draw_ground(axes, grid, low, high)
-        _draw_edges(axes, atlas)
-        _draw_nodes(axes, atlas)
+        _draw_graph(axes, atlas)
         _draw_segments(axes, seen[edge], WALL_COLOUR, 3.0)
         line = atlas.lines_m[edge][::way]
         axes.plot(line[:, 0], line[:, 1], color=CHOSEN_COLOUR, linewidth=2.0)
@@ -92,7 +93,14 @@ def _draw_ground(axes: Any, grid: Optional[GridMap], low: np.ndarray, high: np.n
         axes.set_facecolor(str(UNKNOWN_GREY))
 
 
-def _draw_edges(axes: Any, atlas: AtlasDrawing) -> None:
+def _draw_graph(axes: Any, atlas: AtlasDrawing) -> None:
+    """Edges and nodes with their numbers; of numbers that would cover each other the nodes' are kept."""
+    labels = Labels(axes)
+    _draw_nodes(axes, atlas, labels)
+    _draw_edges(axes, atlas, labels)
+
+
+def _draw_edges(axes: Any, atlas: AtlasDrawing, labels: Labels) -> None:
     from matplotlib.collections import LineCollection
 
     axes.add_collection(LineCollection(list(atlas.lines_m), colors=EDGE_COLOUR, linewidths=1.3, zorder=2))
@@ -100,20 +108,18 @@ def _draw_edges(axes: Any, atlas: AtlasDrawing) -> None:
         for edge, line in enumerate(atlas.lines_m):
             if np.hypot(*np.ptp(line, axis=0)) < MIN_NUMBERED_M:
                 continue  # its number would hide it
-            axes.text(
-                *line[len(line) // 2],
+            labels.add(
+                line[len(line) // 2],
                 str(edge),
-                color=EDGE_COLOUR,
                 fontsize=5.5,
-                ha="center",
-                va="center",
+                centred=True,
+                color=EDGE_COLOUR,
                 zorder=4,
-                clip_on=True,
                 bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.7},
             )
 
 
-def _draw_nodes(axes: Any, atlas: AtlasDrawing) -> None:
+def _draw_nodes(axes: Any, atlas: AtlasDrawing, labels: Labels) -> None:
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Circle
 
@@ -129,32 +135,22 @@ def _draw_nodes(axes: Any, atlas: AtlasDrawing) -> None:
             axes.plot(
                 atlas.position_m[chosen, 0],
                 atlas.position_m[chosen, 1],
-                "o",
+                NODE_MARKS[degree],
                 color=colour,
+                markeredgecolor="#333333",
+                markeredgewidth=0.4,
                 markersize=4.5,
-                label=f"{chosen.sum()} {NODE_NAMES[degree]}",
+                label=f"{NODE_NAMES[degree]}: {chosen.sum()}",
                 zorder=3,
             )
     if len(atlas.r_m) <= MAX_NUMBERS:
         for node, point in enumerate(atlas.position_m):
-            axes.annotate(
-                str(node),
-                point,
-                textcoords="offset points",
-                xytext=(3, 3),
-                fontsize=6,
-                zorder=4,
-                clip_on=True,
-                annotation_clip=True,
-            )
+            labels.add(point, str(node), fontsize=6, zorder=4)
 
 
 def _draw_views(axes: Any, atlas: AtlasDrawing, seen: Sequence[np.ndarray], which: str) -> None:
-    from matplotlib import cm
-
-    colours = cm.tab20.colors
     for edge, (line, segments) in enumerate(zip(atlas.lines_m, seen)):
-        colour = colours[edge % len(colours)]
+        colour = SERIES_COLOURS[edge % len(SERIES_COLOURS)]
         _draw_segments(axes, segments, colour, 1.6)
         line = line if which == "there" else line[::-1]
         axes.plot(line[:, 0], line[:, 1], color=colour, linewidth=1.0)

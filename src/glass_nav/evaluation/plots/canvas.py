@@ -37,6 +37,15 @@ def frame(axes: Any, low: np.ndarray, high: np.ndarray) -> None:
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
     axes.tick_params(labelsize=7)
+    axes.set_xlabel("x [m]", fontsize=8)
+    axes.set_ylabel("y [m]", fontsize=8)
+
+
+def legend_below(axes: Any, columns: int) -> None:
+    """The legend below the name of the x axis."""
+    axes.legend(
+        loc="upper center", bbox_to_anchor=(0.5, 0.0), borderaxespad=3.6, ncol=columns, fontsize=9, frameon=False
+    )
 
 
 def save(folder: Path, figure: Any, name: str, title: str, alt: str, caption: str) -> Picture:

@@ -10,13 +10,13 @@ import numpy as np
 
 from glass_nav.evaluation.metrics import comparison
 from glass_nav.evaluation.metrics.comparison import Comparison, Figure, Run
-from glass_nav.evaluation.plots.canvas import Picture, frame, new_figure, save
+from glass_nav.evaluation.plots.canvas import Picture, frame, legend_below, new_figure, save
 from glass_nav.evaluation.plots.map_layer import draw_map
-from glass_nav.evaluation.plots.report.driven_path import TRUTH_COLOUR, bounds_of
+from glass_nav.evaluation.plots.report.driven_path import bounds_of
+from glass_nav.vocabulary import SERIES_COLOURS, SERIES_LINES, SERIES_MARKS, TRUTH_COLOUR
 from glass_nav.world.grid_map import GridMap
 
 MAX_LOGS = 6  # have pictures of their own; a sweep over hundreds has its figures
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")  # Okabe and Ito's
 _COLUMNS = 3  # of the panels
 _MIN_M = 1e-3  # errors below are drawn there, on a logarithmic axis
 _WIDE = 20.0  # times between the least and the largest value: then on a logarithmic axis
@@ -36,7 +36,17 @@ def draw_all(folder: Path, compared: Comparison, grids: Mapping[str, GridMap]) -
 
 
 def colour(compared: Comparison, contestant: str) -> str:
-    return COLOURS[compared.contestants.index(contestant) % len(COLOURS)]
+    return SERIES_COLOURS[compared.contestants.index(contestant) % len(SERIES_COLOURS)]
+
+
+def line(compared: Comparison, contestant: str) -> Any:
+    """Its line style, as matplotlib takes it."""
+    return SERIES_LINES[compared.contestants.index(contestant) % len(SERIES_LINES)]
+
+
+def mark(compared: Comparison, contestant: str) -> str:
+    """Its marker, as matplotlib names it."""
+    return SERIES_MARKS[compared.contestants.index(contestant) % len(SERIES_MARKS)]
 
 
 def _figures(folder: Path, compared: Comparison) -> Picture:
@@ -81,7 +91,7 @@ def _panel(axes: Any, compared: Comparison, each: Figure, named: bool) -> None:
             each.scale * interval.mean,
             row,
             xerr=each.scale * (interval.half_width or 0.0),
-            fmt="s",
+            fmt=mark(compared, name),
             color=colour(compared, name),
             capsize=4,
             markersize=6,
@@ -120,7 +130,9 @@ def _errors(folder: Path, compared: Comparison, log: str, number: int) -> Option
             np.maximum(values, _MIN_M) for values in (errors.min(axis=0), np.median(errors, axis=0), errors.max(axis=0))
         )
         axes.fill_between(seconds, low, high, color=colour(compared, name), alpha=0.2, linewidth=0)
-        axes.plot(seconds, middle, color=colour(compared, name), linewidth=1.1, label=name)
+        axes.plot(
+            seconds, middle, color=colour(compared, name), linestyle=line(compared, name), linewidth=1.1, label=name
+        )
     axes.set_yscale("log")
     axes.set_ylabel("position error [m]")
     axes.set_xlabel("time since the first scan [s]")
@@ -174,13 +186,14 @@ def _ways(folder: Path, compared: Comparison, log: str, number: int, grid: GridM
         axes.plot(
             *run.map_from_base[:, :2].T,
             color=colour(compared, name),
+            linestyle=line(compared, name),
             linewidth=width,
             alpha=0.85,
             zorder=4,
             label=name if run.seed is None else f"{name}, seed {run.seed}",
         )
     frame(axes, low, high)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.03), ncol=5, fontsize=9, frameon=False)
+    legend_below(axes, 5)
     return save(
         folder,
         figure,

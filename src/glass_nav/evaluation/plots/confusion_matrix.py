@@ -30,5 +30,5 @@ def draw_confusion(axes: Any, confusion: np.ndarray) -> None:
     axes.set_xticklabels(labels, rotation=30, ha="right", fontsize=8)
     axes.set_yticks(range(len(labels)))
     axes.set_yticklabels(labels, fontsize=8)
-    axes.set_xlabel("reported")
-    axes.set_ylabel("true")
+    axes.set_xlabel("reported case")
+    axes.set_ylabel("true case")

@@ -8,10 +8,11 @@ import numpy as np
 
 from glass_nav.evaluation.metrics.pose_errors import LOST_M
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
-from glass_nav.vocabulary import state_colour, states_in_order
+from glass_nav.vocabulary import SERIES_COLOURS, state_colour, state_hatch, states_in_order
 
 SCALE_FLOOR_M = 0.2  # errors below it shall not look like large ones
-ESTIMATE_COLOUR, YAW_COLOUR = "#d62728", "#8a8a8a"
+ESTIMATE_COLOUR, YAW_COLOUR = SERIES_COLOURS[0], "#8a8a8a"
+HATCH_COLOUR = "#00000050"
 RIBBON = 0.08  # share of the error axis below 0, for the states
 
 
@@ -65,11 +66,16 @@ def draw_errors(axes: Any, result: ReplayResult) -> None:
             -0.25 * RIBBON * top,
             where=holds,
             step="post",
-            color=state_colour(state),
+            facecolor=state_colour(state),
+            hatch=state_hatch(state),
+            edgecolor=HATCH_COLOUR,
             linewidth=0,
         )
     axes.legend(
-        handles=[Patch(color=state_colour(state), label=state) for state in present],
+        handles=[
+            Patch(facecolor=state_colour(state), hatch=state_hatch(state), edgecolor=HATCH_COLOUR, label=state)
+            for state in present
+        ],
         loc="upper right",
         fontsize=8,
         ncol=len(present),

@@ -8,13 +8,15 @@ from typing import Any, Tuple
 
 import numpy as np
 
-from glass_nav.evaluation.plots.canvas import new_figure
+from glass_nav.evaluation.plots.canvas import frame, new_figure
+from glass_nav.evaluation.plots.labels import Labels
 from glass_nav.evaluation.plots.map_layer import draw_map
+from glass_nav.vocabulary import LEFT_OUT_RGB, TAG_RGB, hex_colour
 from glass_nav.world.grid_map import GridMap
 
 MARGIN_M = 1.0
 LARGEST_M = 0.5  # of the colour scale; the seed document asks for 0.3 m
-TAG_COLOUR, NEW_COLOUR, NO_FIX_COLOUR = "#0072b2", "#d55e00", "#f0c4b4"
+TAG_COLOUR, NEW_COLOUR, NO_FIX_COLOUR = hex_colour(TAG_RGB), hex_colour(LEFT_OUT_RGB), "#f0c4b4"
 ARROW_M = 0.9
 
 
@@ -60,6 +62,8 @@ def _draw_panel(
     from matplotlib.patheffects import withStroke
 
     draw_map(axes, grid, low, high)
+    frame(axes, low, high)
+    labels = Labels(axes)
     corners = points_m[:, None] + 0.5 * spacing_m * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     known = np.isfinite(panel.sigma_m)
     axes.add_collection(PolyCollection(corners[~known], facecolors=NO_FIX_COLOUR, edgecolors="none", alpha=0.8))
@@ -67,9 +71,9 @@ def _draw_panel(
     squares.set_array(panel.sigma_m[known])
     squares.set_clim(0.0, LARGEST_M)
     axes.add_collection(squares)
-    for tags, colour in ((panel.tags, TAG_COLOUR), (panel.new, NEW_COLOUR)):
+    for tags, colour, mark in ((panel.tags, TAG_COLOUR, "o"), (panel.new, NEW_COLOUR, "D")):
         for name, (x, y), facing in zip(tags.names, tags.positions_m, tags.facing_rad):
-            axes.plot(x, y, "o", color=colour, markersize=7, markeredgecolor="white", zorder=4)
+            axes.plot(x, y, mark, color=colour, markersize=7, markeredgecolor="white", zorder=4)
             if np.isfinite(facing):
                 axes.annotate(
                     "",
@@ -78,21 +82,14 @@ def _draw_panel(
                     zorder=4,
                     arrowprops={"arrowstyle": "-|>", "color": colour, "linewidth": 1.6},
                 )
-            axes.annotate(
+            labels.add(
+                np.array([x, y]),
                 name,
-                (x, y),
-                textcoords="offset points",
-                xytext=(5, 5),
                 fontsize=9,
                 color=colour,
                 fontweight="bold",
                 zorder=5,
                 path_effects=[withStroke(linewidth=2.5, foreground="white")],
             )
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    axes.set_aspect("equal")
-    axes.set_xlabel("x [m]")
-    axes.set_ylabel("y [m]")
     axes.set_title(panel.title, fontsize=10)
     return squares

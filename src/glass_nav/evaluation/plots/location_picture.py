@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from glass_nav.evaluation.plots import beam_layer
 from glass_nav.evaluation.plots.canvas import frame, new_figure
 from glass_nav.evaluation.plots.map_layer import draw_map
 from glass_nav.geometry import se2
-from glass_nav.vocabulary import CASES_IN_ORDER, BeamCase
+from glass_nav.vocabulary import LEFT_OUT_RGB, SERIES_COLOURS, hex_colour
 from glass_nav.world.grid_map import GridMap
 
 MARGIN_M = 1.0
 ARROW_SHARE = 0.05  # of the picture's width
-SEGMENT_COLOUR, ROBOT_COLOUR = "#e69f00", "#d62728"
+SEGMENT_COLOUR, ROBOT_COLOUR = SERIES_COLOURS[1], hex_colour(LEFT_OUT_RGB)
 
 
 @dataclass(frozen=True)
@@ -44,10 +45,7 @@ def draw(path: Path, grid: GridMap, scan: LocatedScan, title: str, before: str, 
     for axes, pose, text in zip(figure.subplots(1, 2), (scan.rough, scan.corrected), (before, after)):
         _draw_scan(axes, grid, scan, pose, low, high)
         axes.set_title(text, fontsize=9)
-    cases = [case for case in CASES_IN_ORDER if np.any(scan.case[_answered(scan)] == case)]
-    handles = [
-        Line2D([], [], color=case.colour, marker="o", markersize=4, linestyle="", label=case.label) for case in cases
-    ] + [Line2D([], [], color=SEGMENT_COLOUR, label="segments")]
+    handles = beam_layer.handles(scan.case[_answered(scan)]) + [Line2D([], [], color=SEGMENT_COLOUR, label="segments")]
     figure.axes[1].legend(handles=handles, loc="best", fontsize=7, framealpha=0.9)
     figure.savefig(path)
 
@@ -67,10 +65,7 @@ def _draw_scan(
 
     draw_map(axes, grid, low, high)
     axes.add_collection(LineCollection(scan.segments_m.reshape(-1, 2, 2), colors=SEGMENT_COLOUR, linewidths=1.2))
-    ends = _ends(scan, pose)
-    axes.scatter(
-        ends[:, 0], ends[:, 1], c=[BeamCase(each).colour for each in scan.case[_answered(scan)]], s=5, zorder=3
-    )
+    beam_layer.draw_beams(axes, pose[:2], _ends(scan, pose), scan.case[_answered(scan)], rays=False)
     ahead = ARROW_SHARE * (high[0] - low[0]) * np.array([np.cos(pose[2]), np.sin(pose[2])])
     axes.annotate(
         "",
@@ -81,4 +76,3 @@ def _draw_scan(
     )
     axes.plot(*pose[:2], "o", color=ROBOT_COLOUR, markersize=5, zorder=4)
     frame(axes, low, high)
-    axes.set_xlabel("x [m]", fontsize=8)

@@ -1,4 +1,4 @@
-"""Picture of a drive over map and atlas: nodes seen green, missed red, false positives orange. By matplotlib."""
+"""Picture of a drive over map and atlas: nodes seen (discs), missed (crosses), false positives (diamonds). By matplotlib."""
 
 from __future__ import annotations
 
@@ -8,15 +8,17 @@ from typing import Any, Sequence
 import numpy as np
 
 from glass_nav.evaluation.metrics.passed_nodes import INVENTED, MISSED, SEEN, TopologyScore
-from glass_nav.evaluation.plots.canvas import new_figure
+from glass_nav.evaluation.plots.canvas import frame, new_figure
+from glass_nav.evaluation.plots.labels import Labels
 from glass_nav.evaluation.plots.map_layer import draw_map
+from glass_nav.vocabulary import SERIES_COLOURS
 from glass_nav.world.grid_map import GridMap
 
 MARGIN_M = 2.0
-COLOURS = {SEEN: "#2ca02c", MISSED: "#d62728", INVENTED: "#ff8c00"}
+COLOURS = {SEEN: SERIES_COLOURS[5], MISSED: "#8f0000", INVENTED: SERIES_COLOURS[4]}
 _MARKS = {SEEN: "o", MISSED: "X", INVENTED: "D"}
 _SIZES = {SEEN: 9.0, MISSED: 5.0, INVENTED: 5.0}  # a node seen once and missed once shows both
-_WAY_COLOUR, _EDGE_COLOUR, _NODE_COLOUR = "#1f77b4", "#b9b9b9", "#8a8a8a"
+_WAY_COLOUR, _EDGE_COLOUR, _NODE_COLOUR = SERIES_COLOURS[0], "#b9b9b9", "#8a8a8a"
 
 
 def draw(
@@ -46,14 +48,11 @@ def draw(
     axes.add_collection(LineCollection(list(lines_m), colors=_EDGE_COLOUR, linewidths=0.8, zorder=2))
     axes.plot(*score.known.position_m.T, ".", color=_NODE_COLOUR, markersize=3.0, zorder=2.5)
     axes.plot(*way_m.T, color=_WAY_COLOUR, linewidth=0.9, alpha=0.8, zorder=3, label="path of the robot")
+    frame(axes, low, high)
+    labels = Labels(axes)
     for verdict in COLOURS:
-        _draw_meetings(axes, score, verdict)
+        _draw_meetings(axes, score, verdict, labels)
     axes.legend(loc="best", fontsize=8, framealpha=0.9)
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    axes.set_aspect("equal")
-    axes.set_xlabel("x [m]")
-    axes.set_ylabel("y [m]")
     figures = score.metrics()
     axes.set_title(
         f"{title}\n{figures['passed']} nodes passed: {figures['seen']} seen, {figures['missed']} missed; "
@@ -63,7 +62,7 @@ def draw(
     figure.savefig(path)
 
 
-def _draw_meetings(axes: Any, score: TopologyScore, verdict: str) -> None:
+def _draw_meetings(axes: Any, score: TopologyScore, verdict: str, labels: Labels) -> None:
     """Where they are in the map: seen and missed ones as the atlas has them, with a line to what was seen."""
     meetings = score.of_kind(verdict)
     if not meetings:
@@ -98,14 +97,4 @@ def _draw_meetings(axes: Any, score: TopologyScore, verdict: str) -> None:
         )
         degree = int(score.known.degree[each.visit.node])
         if seen.degree != degree:
-            axes.annotate(
-                f"{seen.degree} of {degree}",
-                place,
-                textcoords="offset points",
-                xytext=(4, 4),
-                fontsize=6,
-                color="#333333",
-                zorder=6,
-                clip_on=True,
-                annotation_clip=True,
-            )
+            labels.add(place, f"{seen.degree} of {degree}", fontsize=6, color="#333333", zorder=6)

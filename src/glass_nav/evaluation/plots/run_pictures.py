@@ -8,15 +8,16 @@ from typing import Any, Tuple
 import numpy as np
 
 from glass_nav.evaluation.metrics.replay_result import BeamExample, ReplayResult
+from glass_nav.evaluation.plots import beam_layer
 from glass_nav.evaluation.plots.canvas import frame, new_figure
 from glass_nav.evaluation.plots.confusion_matrix import draw_confusion
 from glass_nav.evaluation.plots.error_curve import ESTIMATE_COLOUR, SCALE_FLOOR_M, draw_errors
 from glass_nav.evaluation.plots.map_layer import draw_map
-from glass_nav.vocabulary import BeamCase
+from glass_nav.vocabulary import SERIES_COLOURS, USED_RGB, BeamCase, hex_colour
 from glass_nav.world.grid_map import GridMap
 
 MARGIN_M = 3.0  # of map around the path
-REFERENCE_COLOUR = "#1f77b4"
+REFERENCE_COLOUR = SERIES_COLOURS[5]
 ERROR_COLOURS = ("#1b3a8a", "#8a2d9c", "#e0264f", "#ff8c00")  # small to large, all dark enough on white
 
 
@@ -50,34 +51,49 @@ def draw_cases(path: Path, grid: GridMap, result: ReplayResult, title: str) -> N
     assert result.case_scores is not None
     figures = result.case_scores.metrics()
     columns = len(result.examples)
-    figure = new_figure(5.5 + 4.2 * columns, 8.4 if columns else 6.0, dpi=100)
+    figure = new_figure(5.5 + 4.2 * columns, 9.0 if columns else 6.0, dpi=100)
     parts = figure.add_gridspec(2, columns + 1, width_ratios=[5.5] + [4.2] * columns)
     draw_confusion(figure.add_subplot(parts[:, 0]), result.case_scores.confusion)
+    half_m = max((_square(example)[1] for example in result.examples), default=0.0)  # one scale for all
     for column, example in enumerate(result.examples, 1):
         for row, (name, case) in enumerate((("true", example.true_case), ("reported", example.told_case))):
             axes = figure.add_subplot(parts[row, column])
-            _draw_beams(axes, grid, example, case)
+            _draw_beams(axes, grid, example, case, half_m)
             seconds = (example.stamp_ns - result.stamps_ns[0]) * 1e-9
             axes.set_title(f"{name}, {seconds:.1f} s", fontsize=10)
     accuracy, f1 = (
         f"{value:.3f}" if value is not None else "-" for value in (figures["accuracy"], figures["macro_f1"])
     )
+    if columns:
+        drawn = np.concatenate([part for each in result.examples for part in (each.true_case, each.told_case)])
+        figure.axes[0].legend(
+            handles=beam_layer.handles(drawn[drawn < len(BeamCase)]),
+            title="beams on the right",
+            loc="upper center",
+            bbox_to_anchor=(0.5, 0.0),
+            borderaxespad=9.0,
+            fontsize=9,
+            frameon=False,
+        )
     figure.suptitle(f"{title}\n{figures['beams']} beams, accuracy {accuracy}, macro F1 {f1}", fontsize=11)
     figure.savefig(path)
 
 
-def _draw_beams(axes: Any, grid: GridMap, example: BeamExample, case: np.ndarray) -> None:
-    from matplotlib.collections import LineCollection
-
-    answered = np.isfinite(example.points_m).all(axis=1)
-    shown = np.concatenate([example.points_m[answered], example.laser_m[None]])
+def _square(example: BeamExample) -> Tuple[np.ndarray, float]:
+    """Centre (2,) and half the side [m] of the square that holds the beams of a scan."""
+    ends = example.points_m[np.isfinite(example.points_m).all(axis=1)]
+    shown = np.concatenate([ends, example.laser_m[None]])
     low, high = shown.min(axis=0) - 1.0, shown.max(axis=0) + 1.0
+    return (low + high) / 2.0, float((high - low).max()) / 2.0
+
+
+def _draw_beams(axes: Any, grid: GridMap, example: BeamExample, case: np.ndarray, half_m: float) -> None:
+    """The beams of one scan in a square of `half_m` to each side."""
+    answered = np.isfinite(example.points_m).all(axis=1)
+    centre, _ = _square(example)
+    low, high = centre - half_m, centre + half_m
     draw_map(axes, grid, low, high)
-    ends = example.points_m[answered]
-    rays = np.stack([np.broadcast_to(example.laser_m, ends.shape), ends], axis=1)
-    colours = [BeamCase(each).colour for each in case[answered]]
-    axes.add_collection(LineCollection(rays, colors=colours, linewidths=0.4, alpha=0.5))
-    axes.scatter(ends[:, 0], ends[:, 1], c=colours, s=5, zorder=3)
+    beam_layer.draw_beams(axes, example.laser_m, example.points_m[answered], case[answered])
     axes.plot(*example.laser_m, "o", color="#111111", markersize=4)
     frame(axes, low, high)
 
@@ -121,7 +137,9 @@ def _draw_ways(figure: Any, axes: Any, result: ReplayResult) -> None:
         bar.set_label("position error of the estimate [m]")
     else:
         axes.plot(way[:, 0], way[:, 1], color=ESTIMATE_COLOUR, linewidth=1.4, label="estimate")
-    axes.plot(*way[0], "o", color="#2ca02c", markersize=8, markeredgecolor="white", label="first scan", zorder=5)
+    axes.plot(
+        *way[0], "o", color=hex_colour(USED_RGB), markersize=8, markeredgecolor="white", label="first scan", zorder=5
+    )
     axes.plot(*way[-1], "s", color="#111111", markersize=7, markeredgecolor="white", label="last scan", zorder=5)
     axes.legend(loc="best", fontsize=9, framealpha=0.9)
 

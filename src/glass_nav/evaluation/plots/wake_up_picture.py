@@ -13,13 +13,14 @@ from typing import Any, List, Optional
 import numpy as np
 
 from glass_nav.evaluation.plots.canvas import frame, new_figure
+from glass_nav.evaluation.plots.labels import Labels
 from glass_nav.evaluation.plots.map_layer import draw_map
 from glass_nav.world.grid_map import GridMap
 
 MARGIN_M = 1.5
 MAX_PANELS = 8  # of depths; the first and the last ones
 COLUMNS = 2
-SEARCH_COLOUR, TOUR_COLOUR, CANDIDATE_COLOUR, TRUE_COLOUR = "#e69f00", "#0072b2", "#cc79a7", "#009e73"
+SEARCH_COLOUR, TOUR_COLOUR, CANDIDATE_COLOUR, TRUE_COLOUR = "#c98c00", "#0072b2", "#55104a", "#14dcab"
 
 
 @dataclass(frozen=True)
@@ -87,24 +88,17 @@ def _ground(axes: Any, grid: GridMap, low: np.ndarray, high: np.ndarray) -> None
 
 def _draw_way(axes: Any, grid: GridMap, story: WakeUpStory, low: np.ndarray, high: np.ndarray) -> None:
     _ground(axes, grid, low, high)
-    for way, colour, width, label in (
-        (story.tour_m, TOUR_COLOUR, 3.2, "true path of the tour"),
-        (story.search_m, SEARCH_COLOUR, 1.8, "true path of the search"),
+    for way, colour, style, width, label in (
+        (story.tour_m, TOUR_COLOUR, "-", 3.2, "true path of the tour"),
+        (story.search_m, SEARCH_COLOUR, "--", 1.8, "true path of the search"),
     ):
         if len(way):
-            axes.plot(way[:, 0], way[:, 1], color=colour, linewidth=width, label=label, zorder=3)
+            axes.plot(way[:, 0], way[:, 1], color=colour, linestyle=style, linewidth=width, label=label, zorder=3)
             axes.plot(*way[0], "o", color=colour, markersize=5, zorder=4)
+    labels = Labels(axes)
     for number, depth in enumerate(story.depths):
         if depth.truth is not None:
-            axes.annotate(
-                str(number),
-                depth.truth[:2],
-                textcoords="offset points",
-                xytext=(4, 4),
-                fontsize=8,
-                annotation_clip=True,
-                zorder=6,
-            )
+            labels.add(depth.truth[:2], str(number), fontsize=8, zorder=6)
     for pose, colour, label in (
         (story.handed_over, CANDIDATE_COLOUR, "pose handed over"),
         (story.truth, TRUE_COLOUR, "true pose at the end"),

@@ -12,18 +12,21 @@ from typing import Tuple
 import numpy as np
 
 from glass_nav.localization.beam_classification import (
+    beam_evidence,
     case_votes,
     expected_ranges,
     glass_map,
     preliminary_samples,
     surface_scan,
 )
+from glass_nav.localization.beam_classification.beam_evidence import BeamEvidence
 from glass_nav.localization.beam_classification.case_votes import BeamCases, CaseVote
 from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, ExpectedRanges
 from glass_nav.localization.beam_classification.glass_map import GlassEvidence, GlassMap
 from glass_nav.localization.beam_classification.preliminary_samples import PreliminarySamples
 from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
+from glass_nav.sensing.known_area import KnownArea
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
 from glass_nav.sensing.wall_thickness import wall_thickness
@@ -43,6 +46,7 @@ class BeamClassifierParams:
     min_sigma_m: float  # limits of the learnt spread of beams around walls
     max_sigma_m: float
     raycast_threads: int = 1
+    raycast_backend: str = "exact"
 
 
 class BeamClassifier:
@@ -50,15 +54,18 @@ class BeamClassifier:
 
     def __init__(self, params: BeamClassifierParams, grid_map: GridMap) -> None:
         self._params = params
-        self.caster = RayCaster(grid_map, threads=params.raycast_threads)
+        self.caster = RayCaster(grid_map, params.raycast_backend, params.raycast_threads)
         self.thickness_m = wall_thickness(grid_map)  # (H * W,)
         self.residuals = RangeResiduals(_DEPTH_SHARE, params.min_sigma_m)
         self.glass_map = GlassMap(grid_map, params.glass)
 
     def reconfigure(self, params: BeamClassifierParams) -> None:
         """Other parameters from the next scan on; what was learnt stays."""
-        if params.raycast_threads != self._params.raycast_threads:
-            self.caster = RayCaster(self.caster.grid_map, threads=params.raycast_threads)
+        if (params.raycast_backend, params.raycast_threads) != (
+            self._params.raycast_backend,
+            self._params.raycast_threads,
+        ):
+            self.caster = RayCaster(self.caster.grid_map, params.raycast_backend, params.raycast_threads)
         self.glass_map.weigh_by(params.glass)
         self._params = params
 
@@ -111,6 +118,15 @@ class BeamClassifier:
             scan.range_max_m,
             trusted,
         )
+
+    def evidence(
+        self, scan: Scan, cases: BeamCases, expected: ExpectedRanges, map_from_base: np.ndarray, known_area: KnownArea
+    ) -> BeamEvidence:
+        """How much of the scan speaks for the pose (3,), of which `expected` is, and how much against it."""
+        known_end = np.zeros(len(scan), bool)
+        known_end[scan.answered] = known_area.ends(scan.points_in_base()[scan.answered], map_from_base[None])[0]
+        seen_through = self.glass_map.chances(expected.cell[0, 0])[0]
+        return beam_evidence.of(scan.ranges_m, cases.case, expected, seen_through, known_end)
 
     @property
     def max_glass_thickness_m(self) -> float:

@@ -28,7 +28,7 @@ class QualityLimits:
     localized_max_position_sigma_m: float = 0.3
     localized_max_heading_sigma_rad: float = 0.2
     localized_min_cluster_share: float = 0.8
-    uncertain_used_share: float = 0.4  # of the answering beams explained, mean of the last updates
+    uncertain_used_share: float = 0.4  # of the beams that say something explained, mean of the last updates
     lost_used_share: float = 0.2
     localized_min_reliability: float = 0.7  # chance that the pose is right
 
@@ -71,11 +71,16 @@ class PoseQuality:
         """Other limits from now on; what was seen stays."""
         self._limits = limits
 
-    def observe(self, inlier_ratio: float) -> None:
-        """Take in one update; NaN when no beam answered, which says nothing."""
+    def observe(self, inlier_ratio: float, judged_share: float = 1.0) -> None:
+        """Take in one update.
+
+        Args:
+            inlier_ratio: of the beams that say something about the pose, the share that the map explains; NaN: none does.
+            judged_share: of the beams that returned, the share that says something; the fewer, the less it counts.
+        """
         if np.isfinite(inlier_ratio):
             past = inlier_ratio if np.isnan(self._inlier_ratio) else self._inlier_ratio
-            self._inlier_ratio = self._MEMORY * past + (1.0 - self._MEMORY) * inlier_ratio
+            self._inlier_ratio = past + (1.0 - self._MEMORY) * judged_share * (inlier_ratio - past)
 
     def follow_search(self, candidates: Candidates) -> None:
         """A global search runs; these places are possible."""
@@ -109,7 +114,7 @@ class PoseQuality:
         )
         if np.isnan(self._inlier_ratio):
             return Judgement(LocalizationState.UNCERTAIN, f"no scan has been used yet; {spread}", 0.0)
-        explained = f"the map explains {self._inlier_ratio:.0%} of the answering beams"
+        explained = f"the map explains {self._inlier_ratio:.0%} of the beams that it covers"
         confidence = _confidence(self._inlier_ratio, self._verdict, best)
         elsewhere = _elsewhere(self._verdict)
         if elsewhere is not None and self._verdict is not None and self._verdict.log_ratio > _LOST:

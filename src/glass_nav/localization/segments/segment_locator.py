@@ -10,6 +10,7 @@ Unlike the particle filter, this does not learn where glass is. B beams.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Optional
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from glass_nav.localization.segments.segment_correction import (
     SegmentCorrection,
     SegmentCorrectionParams,
     SegmentCorrector,
+    SegmentQuality,
 )
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
@@ -37,6 +39,8 @@ _ROUNDS = 3  # of classification, then correction
 _AGAIN = 0.5  # of the first neighbourhood: by then the pose is nearly right
 _MIDDLE = 0.5  # of a wall: where beams end in it
 _MIN_ENDS = 20  # beams of known case needed to correct a pose
+MIN_SHARE = 0.4  # of the answering beams, that must end at walls
+MAX_M, MAX_RAD = 1.0, np.radians(20.0)  # that a pose may move: from farther away a fit is chance
 _SAME = np.array([1e-3, 1e-3, 1e-4])  # [m, m, rad] smaller moves count as none
 
 
@@ -91,6 +95,10 @@ class SegmentLocator:
         before, after = (self._again.quality(points[used], each) for each in (rough, pose))
         return Located(replace(found, map_from_base=pose, before=before, after=after), case, used)
 
+    def quality(self, scan: Scan, case: np.ndarray, map_from_base: np.ndarray) -> SegmentQuality:
+        """How well the beams of a scan that ended at walls, by their cases (B,), lie on the segments at a pose (3,)."""
+        return self._again.quality(scan.points_in_base()[importance_weights.known_ends(case)], map_from_base)
+
     def _cases(self, scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
         vote = CaseVote()
         samples = preliminary_samples.around(map_from_base, np.zeros((3, 3)), PreliminarySamples())
@@ -99,6 +107,41 @@ class SegmentLocator:
         )
         glass = self._glass_map.chances(expected.cell[[0, 2], 0])
         return case_votes.classify(scan.ranges_m, expected, self._residuals, vote, glass, scan.range_max_m).case
+
+
+def refusal(scan: Scan, located: Located, rough: np.ndarray) -> Optional[str]:
+    """Why a corrected pose is not to be used: the scan does not fit, or fits so far from the rough pose (3,) that it is
+    chance; None if it may be used.
+    """
+    at_walls = located.correction.after.inlier_share * np.count_nonzero(located.used)
+    share = float(at_walls / max(np.count_nonzero(scan.answered), 1))
+    if share < MIN_SHARE:
+        return (
+            f"the scan fits nowhere near the pose: {share:.0%} of its answering beams end at walls, "
+            f"at least {MIN_SHARE:.0%} must"
+        )
+    moved = located.correction.map_from_base - rough
+    distance_m, turn_rad = float(np.hypot(moved[0], moved[1])), float(abs(angles.wrap(moved[2])))
+    if distance_m > MAX_M or turn_rad > MAX_RAD:
+        return (
+            f"the scan fits nowhere near the pose: the correction led {distance_m:.2f} m and "
+            f"{np.degrees(turn_rad):.0f} deg away, at most {MAX_M:g} m and {np.degrees(MAX_RAD):.0f} "
+            f"deg are no chance"
+        )
+    return None
+
+
+def free_in_words(found: SegmentCorrection) -> str:
+    """Which directions the walls do not constrain: the document's hallway effect."""
+    if not len(found.free):
+        return "nothing: the walls constrain x, y and yaw"
+    if len(found.free) == 3:
+        return "x, y and yaw: the walls constrain nothing"
+    heading = found.free_heading_rad
+    if heading is not None:
+        return f"the direction {np.degrees(heading):.0f} deg of the map: not corrected"
+    names = [name for name, weight in zip(("x", "y", "yaw"), np.linalg.norm(found.free, axis=0)) if weight > 0.3]
+    return f"{len(found.free)} of 3 directions, of {', '.join(names)}: not corrected"
 
 
 def _kept_where_free(found: SegmentCorrection, rough: np.ndarray) -> np.ndarray:

@@ -12,10 +12,12 @@ Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseAr
     and -1 for all beams while the pose is not trusted: the scan is then passed on raw. One for every scan that is
     used; none for a scan that is rejected or has no transforms, because it is unknown where to cut it;
     ~glass_map (OccupancyGrid, latched): probability of glass by wall cell [percent], -1 where unknown;
+    ~segment_quality (SegmentQuality), while somebody listens: how well the scan lies on the wall segments of the map;
     for rviz, while somebody listens: ~beam_cloud (PointCloud2), ~beam_markers (MarkerArray, a namespace per case
-    and one for the status), ~wall_markers (MarkerArray, latched: the known cells of the glass map), ~legend
+    and one for the status), ~wall_markers (MarkerArray, latched: the known cells of the glass map), legend and ~legend
     (Image, latched).
-Services: global_localization, request_nomotion_update (Empty), set_map (SetMap), ~set_parameters (Reconfigure, with
+Services: global_localization, request_nomotion_update (Empty), set_map (SetMap), ~locate (Locate: a rough pose
+    corrected by wall segments), ~set_parameters (Reconfigure, with
     its topics ~parameter_descriptions and ~parameter_updates). Calls static_map (GetMap).
 Parameters: LocalizationNodeParams and LocalizerParams; explained in config/localization.yaml.
 """
@@ -26,7 +28,7 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Optional
+from typing import Any, Callable, Dict, List, Optional, Tuple, TypeVar
 
 import numpy as np
 import rospkg
@@ -50,16 +52,19 @@ from glass_nav.ros.localization.bearing_input import BearingInput
 from glass_nav.ros.localization.map_source import MapSource
 from glass_nav.ros.localization.publishers import Publishers
 from glass_nav.ros.localization.reconfigure import ReconfigureServer
+from glass_nav.ros.localization.segment_service import SegmentService
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
 from glass_nav.ros.scan_input import ScanInput
 from glass_nav.ros.tf_transforms import TfTransforms
-from glass_nav.sensing.scan import ScanError
+from glass_nav.sensing.scan import Scan, ScanError
 from glass_nav.sensing.scan_placement import RawScan
+from glass_nav.srv import LocateRequest
 from glass_nav.world import landmark_file
 from glass_nav.world.grid_map import GridMap
 
+T = TypeVar("T")
 NO_SCAN_WARNING_S = 15.0  # as AMCL
 SETTLING_S = 5.0  # a player in a launch file needs some seconds: no warning before
 SERVICE_TIMEOUT_S = 30.0
@@ -95,6 +100,7 @@ class LocalizationNode:
         rospy.Service("global_localization", Empty, self._serve_global_localization)
         rospy.Service("request_nomotion_update", Empty, self._serve_nomotion_update)
         rospy.Service("set_map", SetMap, self._serve_set_map)
+        self._segments = SegmentService(p.node.global_frame_id, self._scan_and_map)
         self._reconfigure = ReconfigureServer(
             params.changeable(p),
             reconfigure.explanations(_parameter_file()),
@@ -140,8 +146,8 @@ class LocalizationNode:
     def _command(self, handle: Callable[[Any], None]) -> Callable[[Any], None]:
         return lambda msg: self._inbox.put("commands", lambda: handle(msg))
 
-    def _in_run_loop(self, work: Callable[[], None]) -> None:
-        mailbox.outcome(self._inbox.submit("commands", work), SERVICE_TIMEOUT_S)
+    def _in_run_loop(self, work: Callable[[], T]) -> T:
+        return mailbox.outcome(self._inbox.submit("commands", work), SERVICE_TIMEOUT_S)
 
     def _serve_global_localization(self, _request: EmptyRequest) -> EmptyResponse:
         try:
@@ -165,6 +171,16 @@ class LocalizationNode:
             rospy.logwarn(f"set_map refused: {err}")
             return SetMapResponse(success=False)
         return SetMapResponse(success=True)
+
+    def _scan_and_map(self, request: LocateRequest) -> Tuple[Scan, GridMap]:
+        """Of the service ~locate."""
+        scan, grid_map = self._session.scan, self._session.grid_map
+        if request.scan.ranges:
+            raw = conversions.raw_scan_from_msg(request.scan)
+            scan = self._in_run_loop(lambda: self._scans.place(raw)).scan
+        if grid_map is None or scan is None:
+            raise ValueError(f"there is no {'map' if grid_map is None else 'scan'} yet")
+        return scan, grid_map
 
     # -- maps, poses and parameters from outside
 
@@ -232,6 +248,7 @@ class LocalizationNode:
             return
         self._scans.counts.used += 1
         self._outputs.send(placed, estimate, self._clock.now_s, session.pose_is_news)
+        self._segments.send_quality(session.grid_map, scan, estimate)
         session.pose_is_news = False
         self._memory.take(estimate, session.grid_map.digest, self._p.node.save_pose_rate, self._clock.now_s)
 

@@ -9,14 +9,14 @@ import rospy
 import tf2_ros
 from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
-from sensor_msgs.msg import Image, LaserScan, PointCloud2
+from sensor_msgs.msg import LaserScan, PointCloud2
 from visualization_msgs.msg import MarkerArray
 
 from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.msg import BeamCases, LocalizationStatus
 from glass_nav.rate_limiter import RateLimiter, period_s
-from glass_nav.ros import conversions
-from glass_nav.ros.localization import beam_displays, legend, wall_display
+from glass_nav.ros import conversions, legend
+from glass_nav.ros.localization import beam_displays, wall_display
 from glass_nav.ros.localization.params import LocalizationNodeParams
 from glass_nav.sensing.scan_placement import PlacedScan
 from glass_nav.vocabulary import LocalizationState
@@ -45,8 +45,7 @@ class Publishers:
         self._beam_cloud = rospy.Publisher("~beam_cloud", PointCloud2, queue_size=2)
         self._beam_markers = rospy.Publisher("~beam_markers", MarkerArray, queue_size=2)
         self._wall_markers = rospy.Publisher("~wall_markers", MarkerArray, queue_size=1, latch=True)
-        self._legend = rospy.Publisher("~legend", Image, queue_size=1, latch=True)
-        self._legend.publish(legend.image_msg(self._frame))
+        self._legends = legend.publish(self._frame, "~legend")
 
     def reconfigure(self, p: LocalizationNodeParams) -> None:
         """Change the parameters."""

@@ -2,7 +2,7 @@
 
 Namespaces: `atlas` (edges) and `nodes`; candidates as arrows in `searching`, `tentative`, `confirmed` or `ambiguous`,
 by the state of the search; `ruled_out`, crosses where candidates of the last row were left without a successor;
-`forest`, the paths of the candidates; `text`. Colours are of the Okabe-Ito set.
+`forest`, the paths of the candidates; `text`.
 """
 
 from __future__ import annotations
@@ -21,10 +21,9 @@ from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search.search_forest import NO_PARENT
 from glass_nav.topology.search_session import SearchStatus
-from glass_nav.vocabulary import SEARCH_RGB
+from glass_nav.vocabulary import ATLAS_RGB, FOREST_RGB, LEFT_OUT_RGB, NODE_RGB, SEARCH_RGB
 
 NAMESPACES = ("atlas", "nodes", *(state.lower() for state in SEARCH_RGB), "ruled_out", "forest", "text")
-ATLAS_RGB, NODE_RGB, RULED_OUT_RGB, FOREST_RGB = (130, 130, 130), (60, 60, 60), (213, 94, 0), (0, 114, 178)
 MAX_PATHS = 50  # of candidates; more would only hide the map
 
 _ARROW_M = np.array([[0.0, 0.0], [0.8, 0.0], [0.8, 0.0], [0.5, 0.2], [0.8, 0.0], [0.5, -0.2]])  # pairs of ends
@@ -73,7 +72,7 @@ def search_markers(
         for state, points in arrows.items()
     ]
     markers.append(
-        points_marker(header, "ruled_out", 0, Marker.LINE_LIST, ruled_out, 2 * _HEIGHT_M, 0.06, _rgb(RULED_OUT_RGB))
+        points_marker(header, "ruled_out", 0, Marker.LINE_LIST, ruled_out, 2 * _HEIGHT_M, 0.06, _rgb(LEFT_OUT_RGB))
     )
     markers.append(points_marker(header, "forest", 0, Marker.LINE_LIST, forest, 2 * _HEIGHT_M, 0.12, _rgb(FOREST_RGB)))
     return PackedMarkerArray([*atlas_shown, *markers, _text(header, atlas, f"{status.state}\n{status.reason}")])

@@ -10,7 +10,7 @@ Subscribes: meetpoint (Meetpoint), edge_traversal (EdgeTraversal): of the driver
 Publishes: turn_choice (TurnChoice): the answer to each meetpoint while there is something to find out;
     initialpose (PoseWithCovarianceStamped) once when CONFIRMED, with the stamp of the meetpoint;
     ~candidates (TopologyCandidates, latched), ~status (TopologyStatus, latched), ~markers (MarkerArray, latched):
-    see topology_displays.py for the namespaces.
+    see topology_displays.py for the namespaces; legend (Image, latched): what the marks in rviz mean.
 Action: localize_globally (LocalizeGlobally): begins a search; feedback is ~status; succeeds when CONFIRMED, is aborted
     when AMBIGUOUS or LOST, and when preempted the search is over.
 Services: ~restart (Trigger): forget the search, the next meetpoint begins one; ~reload_atlas (Trigger): read the file
@@ -44,7 +44,7 @@ from glass_nav.msg import (
     TopologyStatus,
     TurnChoice,
 )
-from glass_nav.ros import action_status, conversions, mailbox, shutdown
+from glass_nav.ros import action_status, conversions, legend, mailbox, shutdown
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
@@ -80,6 +80,7 @@ class TopologyNode:
         self._candidates = rospy.Publisher("~candidates", TopologyCandidates, queue_size=2, latch=True)
         self._status = rospy.Publisher("~status", TopologyStatus, queue_size=10, latch=True)
         self._markers = rospy.Publisher("~markers", MarkerArray, queue_size=2, latch=True)
+        self._legends = legend.publish(p.node.global_frame_id)
         self._server = actionlib.SimpleActionServer("localize_globally", LocalizeGloballyAction, auto_start=False)
         self._server.register_goal_callback(lambda: self._inbox.put("commands", self._accept_goal))
         self._server.register_preempt_callback(lambda: self._inbox.put("commands", self._preempt))

@@ -71,8 +71,10 @@ def test_parameters_change_from_the_next_scan_on_and_what_was_learnt_stays():
     np.testing.assert_array_equal(classifier.glass_map.occupancy(), percent)
     scan, _ = seen(True)
     assert (classifier.classify(scan, POSE, NARROW)[0].case == BeamCase.UNCERTAIN).mean() > 0.5
-    classifier.reconfigure(replace(PARAMS, raycast_threads=2))
-    assert classifier.caster is not caster
+    for other in (replace(PARAMS, raycast_threads=2), replace(PARAMS, raycast_backend="mrpt")):
+        caster = classifier.caster
+        classifier.reconfigure(other)
+        assert classifier.caster is not caster
 
 
 @pytest.mark.parametrize("trusted", [True, False])

@@ -52,7 +52,7 @@ def test_a_narrow_pose_that_explains_the_scan_is_localized():
     state, reason = judged([0.9, 0.9, 0.9])
     assert state == "LOCALIZED"
     assert reason == (
-        "the map explains 90% of the answering beams; 100% of the weight in one place, sigma 0.05 m, 1.1 deg"
+        "the map explains 90% of the beams that it covers; 100% of the weight in one place, sigma 0.05 m, 1.1 deg"
     )
 
 
@@ -109,17 +109,28 @@ def test_a_scan_without_answers_says_nothing():
     assert judged([0.9, np.nan, np.nan]) == judged([0.9])
 
 
+def test_the_fewer_beams_say_something_the_less_a_scan_counts():
+    quality = PoseQuality(LIMITS)
+    quality.observe(0.9)
+    for _ in range(5):
+        quality.observe(0.0, judged_share=0.02)
+    assert quality.judge(best()).state == "LOCALIZED"
+    for _ in range(5):
+        quality.observe(0.0)
+    assert quality.judge(best()).state == "UNCERTAIN"
+
+
 def test_scans_that_fit_better_elsewhere_make_a_pose_uncertain_and_lost_if_they_do_by_far():
     better = dict(fit=0.8, doubted=True, candidates=candidates())
     assert judged([0.9], log_ratio=2.0, **better) == (
         "UNCERTAIN",
         "the scans fit as well or better elsewhere, best at x 2.0 m, y 1.0 m; the map explains 90% of the "
-        "answering beams; 100% of the weight in one place, sigma 0.05 m, 1.1 deg",
+        "beams that it covers; 100% of the weight in one place, sigma 0.05 m, 1.1 deg",
     )
     assert judged([0.9], log_ratio=4.0, **better) == (
         "LOST",
         "the scans fit as well or better elsewhere, best at x 2.0 m, y 1.0 m; the map explains 90% of the "
-        "answering beams",
+        "beams that it covers",
     )
     assert judged([0.9], log_ratio=-2.0, **better)[0] == "LOCALIZED"
 

@@ -102,10 +102,12 @@ def test_a_beam_that_was_cut_has_a_line_from_the_surface_to_its_end():
 
 def test_a_case_without_beams_still_shows_its_name_but_no_point():
     scan, cases, surface = beams([1], [1.0], [np.nan])
-    line, ends = received(beam_displays.beam_markers(scan, cases, surface, HEIGHT_M, "base_link"))["2 mirrored"]
+    line, ends, figures = received(beam_displays.beam_markers(scan, cases, surface, HEIGHT_M, "base_link"))[
+        "2 mirrored"
+    ]
     assert line.action == Marker.ADD
     assert points(line) == pytest.approx(np.array([[0.2, 0.0, 0.4]] * 2))  # in the laser, without length
-    assert ends.action == Marker.DELETE  # and what it had before goes away
+    assert ends.action == figures.action == Marker.DELETE  # and what it had before goes away
 
 
 def test_beams_without_an_answer_leave_no_nan_in_the_markers():
@@ -120,7 +122,7 @@ def test_beams_without_an_answer_leave_no_nan_in_the_markers():
 def test_no_marker_that_rviz_would_call_wrong():
     scan, cases, surface = beams([0, 1, 2, 3], [1.0, 2.0, 3.0, 4.0], [np.nan, np.nan, 2.0, 3.0])
     for name, both in received(beam_displays.beam_markers(scan, cases, surface, HEIGHT_M, "base_link")).items():
-        assert [marker.id for marker in both] == [0, 1]
+        assert [marker.id for marker in both] == [0, 1, 2]
         for marker in both:
             assert (marker.header.frame_id, marker.header.stamp.to_nsec()) == ("base_link", 9_000_000_001)
             assert marker.pose.orientation.w == 1.0 and marker.color.a > 0.0 and marker.scale.x > 0.0

@@ -11,6 +11,7 @@ from glass_nav.evaluation.metrics import run_story
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.evaluation.metrics.run_story import SEARCHING
 from glass_nav.evaluation.plots.canvas import Picture, new_figure, save
+from glass_nav.evaluation.plots.error_curve import ESTIMATE_COLOUR
 from glass_nav.evaluation.plots.report.errors import MIN_M
 from glass_nav.evaluation.plots.report.ground import Ground
 from glass_nav.vocabulary import LocalizationState
@@ -36,10 +37,15 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
         linewidth=1.6,
     )
     panels[0].set_yscale("log")
-    panels[0].set_ylabel("places possible")
+    panels[0].set_ylabel("places possible [1]")
     if known:
         panels[1].step(
-            seconds, np.maximum(errors.position_m[rows], MIN_M), where="post", color="#d62728", linewidth=1.6
+            seconds,
+            np.maximum(errors.position_m[rows], MIN_M),
+            where="post",
+            color=ESTIMATE_COLOUR,
+            linestyle="--",
+            linewidth=1.6,
         )
         panels[1].set_yscale("log")
         panels[1].set_ylabel("error of\nthe best [m]")
@@ -60,5 +66,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
         "candidates",
         "From anywhere to one place",
         f"Number of places that were possible over time: up to {most}, {ending}.",
-        "The green line is where the search ended." if after is not None else "The search went on until the log ended.",
+        "The upright line is where the search ended."
+        if after is not None
+        else "The search went on until the log ended.",
     )

@@ -10,6 +10,7 @@ import numpy as np
 from glass_nav.evaluation.metrics import run_story
 from glass_nav.evaluation.metrics.replay_result import NO_BEAM, ReplayResult
 from glass_nav.evaluation.plots.canvas import Picture, new_figure, save
+from glass_nav.evaluation.plots.error_curve import HATCH_COLOUR
 from glass_nav.evaluation.plots.report import states
 from glass_nav.evaluation.plots.report.ground import Ground
 from glass_nav.vocabulary import CASES_IN_ORDER, BeamCase
@@ -30,7 +31,9 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
             np.append(top, top[-1]),
             step="post",
             linewidth=0,
-            color=case.colour,
+            facecolor=case.colour,
+            hatch=case.hatch,
+            edgecolor=HATCH_COLOUR,
             label=case.label,
         )
         below = top
@@ -38,8 +41,8 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
     axes.set_ylim(-0.09, 1.0)
     axes.set_xlim(edges[0], edges[-1])
     axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0])
-    axes.set_yticklabels(["0", "25", "50", "75", "100 %"])
-    axes.set_ylabel("of the beams")
+    axes.set_yticklabels(["0", "25", "50", "75", "100"])
+    axes.set_ylabel("share of the beams [%]")
     axes.set_xlabel("time since the first scan [s]")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.16), ncol=5, fontsize=8, frameon=False)
     counts = np.bincount(result.cases.ravel(), minlength=NO_BEAM + 1)[: len(BeamCase)]

@@ -9,14 +9,15 @@ import numpy as np
 
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.evaluation.metrics.run_story import SEARCHING
-from glass_nav.evaluation.plots.canvas import Picture, frame, new_figure, save
+from glass_nav.evaluation.plots.canvas import Picture, frame, legend_below, new_figure, save
+from glass_nav.evaluation.plots.labels import Labels
 from glass_nav.evaluation.plots.map_layer import draw_map
 from glass_nav.evaluation.plots.report import states
 from glass_nav.evaluation.plots.report.ground import Ground
-from glass_nav.vocabulary import state_colour, states_in_order
+from glass_nav.vocabulary import TRUTH_COLOUR, state_colour, state_mark, states_in_order
 
 MARGIN_M = 3.0
-TRUTH_COLOUR = "#111111"
+MARKED = 40  # scans of a path have the mark of their state
 _JUMP_M = 2.0  # farther apart, two poses are not joined by a line: nobody drove there
 
 
@@ -40,15 +41,16 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
             zorder=3,
         )
     _draw_states(axes, result)
-    for number, kept in reversed(list(enumerate(result.worst, 1))):
+    frame(axes, low, high)
+    labels = Labels(axes)
+    for number, kept in enumerate(result.worst, 1):  # of scans at one place only the worst is numbered
         spot = result.map_from_base[kept.row, :2]
         if np.all(np.isfinite(spot)) and np.all(spot >= low) and np.all(spot <= high):
-            axes.annotate(
-                str(number),
+            labels.add(
                 spot,
+                str(number),
                 fontsize=7,
-                ha="center",
-                va="center",
+                centred=True,
                 zorder=6,
                 color="white",
                 bbox={"boxstyle": "circle,pad=0.25", "facecolor": "#333333", "edgecolor": "white"},
@@ -62,8 +64,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
         label="last scan",
         zorder=7,
     )
-    frame(axes, low, high)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.03), ncol=6, fontsize=9, frameon=False)
+    legend_below(axes, 6)
     shares = states.shares(result)
     return save(
         folder,
@@ -86,17 +87,24 @@ def _draw_states(axes: Any, result: ReplayResult) -> None:
     with np.errstate(invalid="ignore"):  # a pose that is NaN is joined to none
         joined = apart <= drove + _JUMP_M
     for state in states_in_order(result.states):
-        colour = state_colour(state)
+        colour, mark = state_colour(state), state_mark(state)
         here = reported == state
         if state in SEARCHING:  # the best candidate jumps about: dots
-            axes.scatter(*way[here].T, s=8, color=colour, alpha=0.5, linewidths=0, zorder=4)
-            axes.plot([], [], "o", color=colour, markersize=5, label=state)
+            axes.scatter(*way[here].T, s=8, color=colour, marker=mark, alpha=0.5, linewidths=0, zorder=4)
+            axes.plot([], [], mark, color=colour, markersize=5, label=state)
             continue
         segments = joined & here[1:]
         lines = np.stack([way[:-1][segments], way[1:][segments]], axis=1)
         axes.add_collection(LineCollection(lines, colors=colour, linewidths=2.2, zorder=5, capstyle="round"))
         axes.scatter(*way[here].T, s=3, color=colour, linewidths=0, zorder=5)
-        axes.plot([], [], color=colour, linewidth=3, label=state)
+        if mark:
+            marked = np.nonzero(here)[0][:: max(1, len(way) // MARKED)]
+            axes.scatter(
+                *way[marked].T, s=30, color=colour, marker=mark, edgecolors="#333333", linewidths=0.5, zorder=5.5
+            )
+        axes.plot(
+            [], [], color=colour, marker=mark or None, markeredgecolor="#333333", markersize=6, linewidth=3, label=state
+        )
 
 
 def bounds(result: ReplayResult) -> "Tuple[np.ndarray, np.ndarray]":

@@ -10,7 +10,7 @@ import numpy as np
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.evaluation.metrics.run_story import metres
 from glass_nav.evaluation.plots.canvas import Picture, new_figure, save
-from glass_nav.evaluation.plots.error_curve import draw_errors
+from glass_nav.evaluation.plots.error_curve import ESTIMATE_COLOUR, draw_errors
 from glass_nav.evaluation.plots.report.ground import Ground
 
 MIN_M = 1e-3  # errors below are drawn there, on a logarithmic axis
@@ -34,7 +34,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
     draw_errors(left, result)
     off = np.sort(errors.position_m[errors.matched])
     finite = np.maximum(off[np.isfinite(off)], MIN_M)
-    beside.plot(finite, 100.0 * np.arange(1, len(finite) + 1) / len(off), color="#d62728", linewidth=1.6)
+    beside.plot(finite, 100.0 * np.arange(1, len(finite) + 1) / len(off), color=ESTIMATE_COLOUR, linewidth=1.6)
     beside.set_xscale("log")
     beside.set_ylim(0.0, 100.0)
     beside.set_xlabel("position error below [m]")

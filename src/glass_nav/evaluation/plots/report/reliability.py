@@ -12,7 +12,7 @@ from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.evaluation.plots.canvas import Picture, new_figure, save
 from glass_nav.evaluation.plots.report.errors import MIN_M
 from glass_nav.evaluation.plots.report.ground import Ground
-from glass_nav.vocabulary import state_colour, states_in_order
+from glass_nav.vocabulary import SERIES_COLOURS, state_colour, state_mark, states_in_order
 
 
 def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture]:
@@ -20,10 +20,10 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
     if not errors.matched.any():
         figure = new_figure(10.0, 2.6)
         axes = figure.subplots()
-        axes.plot(run_story.seconds_of(result), result.reliability, color="#1f77b4", linewidth=1.0)
+        axes.plot(run_story.seconds_of(result), result.reliability, color=SERIES_COLOURS[0], linewidth=1.0)
         axes.set_ylim(0.0, 1.02)
         axes.set_xlabel("time since the first scan [s]")
-        axes.set_ylabel("reliability")
+        axes.set_ylabel("reliability [1]")
         axes.grid(True, axis="y", linewidth=0.4, alpha=0.6)
         return save(
             folder,
@@ -43,27 +43,28 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
         left.scatter(
             reported[here],
             np.clip(off[here], MIN_M, 1e3),
-            s=7,
-            alpha=0.5,
+            s=12,
+            alpha=0.6,
             linewidths=0,
+            marker=state_mark(state) or ".",
             color=state_colour(state),
             label=state,
         )
     left.set_yscale("log")
     left.axhline(pose_errors.RIGHT_M, color="#555555", linewidth=0.8, linestyle="--")
     left.set_xlim(-0.02, 1.02)
-    left.set_xlabel("reported reliability")
+    left.set_xlabel("reported reliability [1]")
     left.set_ylabel("true position error [m]")
     left.legend(loc="lower left", fontsize=8, frameon=True, markerscale=2.0)
     centres, share, counts = calibration(reported, right)
     beside.plot([0.0, 1.0], [0.0, 1.0], color="#888888", linewidth=0.8, linestyle="--")
-    beside.bar(centres, share, width=0.085, color="#1f77b4")
+    beside.bar(centres, share, width=0.085, color=SERIES_COLOURS[0])
     for centre, height, count in zip(centres, share, counts):
         beside.annotate(str(count), (centre, height), ha="center", va="bottom", fontsize=7)
     beside.set_xlim(0.0, 1.0)
     beside.set_ylim(0.0, 1.1)
-    beside.set_xlabel("reported reliability")
-    beside.set_ylabel("share that was right")
+    beside.set_xlabel("reported reliability [1]")
+    beside.set_ylabel("share that was right [1]")
     return save(
         folder,
         figure,

@@ -11,6 +11,7 @@ from glass_nav.evaluation.metrics import run_story
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.evaluation.plots.canvas import Picture, new_figure, save
 from glass_nav.evaluation.plots.report.ground import Ground
+from glass_nav.vocabulary import SERIES_COLOURS
 
 
 def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture]:
@@ -18,15 +19,25 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
     period_s = run_story.scan_period_s(result)
     figure = new_figure(10.0, 2.8)
     axes = figure.subplots()
-    for rows, name, colour in (
-        (~result.updated, "scan that moved nothing", "#9ecae1"),
-        (result.updated, "update of the particles", "#08519c"),
+    for rows, name, colour, mark in (
+        (~result.updated, "scan that moved nothing", SERIES_COLOURS[5], "o"),
+        (result.updated, "update of the particles", SERIES_COLOURS[0], "^"),
     ):
-        axes.scatter(seconds[rows], np.maximum(result.cpu_ms[rows], 0.05), s=6, color=colour, linewidths=0, label=name)
+        axes.scatter(
+            seconds[rows],
+            np.maximum(result.cpu_ms[rows], 0.05),
+            s=8,
+            color=colour,
+            marker=mark,
+            linewidths=0,
+            label=name,
+        )
     axes.set_yscale("log")
     words, caption = "", "One dot is one scan, CPU time of all threads."
     if period_s is not None:
-        axes.axhline(1e3 * period_s, color="#d62728", linewidth=1.2, label="scan period (median)")
+        axes.axhline(
+            1e3 * period_s, color=SERIES_COLOURS[3], linestyle="--", linewidth=1.2, label="scan period (median)"
+        )
         late = float(np.mean(result.cpu_ms > 1e3 * period_s))
         words = f"; the scan period is {1e3 * period_s:.0f} ms, {run_story.percent(late)} of the scans took longer"
         caption += (

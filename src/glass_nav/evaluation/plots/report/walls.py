@@ -12,10 +12,9 @@ from glass_nav.evaluation.plots.canvas import Picture, frame, new_figure, save
 from glass_nav.evaluation.plots.map_layer import draw_map
 from glass_nav.evaluation.plots.report.ground import Ground
 from glass_nav.geometry import se2
+from glass_nav.vocabulary import GLASS_FROM, SOLID_BELOW, WallKind
 
-SOLID_BELOW, GLASS_FROM = 25, 75  # [percent] as in rviz
-WALL_NAMES = ("solid", "undecided", "glass")
-WALL_COLOURS = ("#8c5f3c", "#e6c700", "#00b3b3")
+WALL_MARKS = {WallKind.SOLID: "s", WallKind.UNDECIDED: "^", WallKind.GLASS: "o"}
 
 
 def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture]:
@@ -33,12 +32,12 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
     kinds = percent < SOLID_BELOW, (percent >= SOLID_BELOW) & (percent < GLASS_FROM), percent >= GLASS_FROM
     counts = [int(kind.sum()) for kind in kinds]
     dot = max(2.0, (72 * 9.0 / width * grid.resolution_m) ** 2)
-    for kind, name, colour, count in zip(kinds, WALL_NAMES, WALL_COLOURS, counts):
+    for kind, name, count in zip(kinds, WallKind, counts):
         axes.scatter(
             *at[kind].T,
-            s=dot if name != "glass" else max(dot, 5.0),
-            marker="s",
-            color=colour,
+            s=dot if name != WallKind.GLASS else max(dot, 5.0),
+            marker=WALL_MARKS[name],
+            color=name.colour,
             linewidths=0,
             label=f"{name}: {count} cells",
             zorder=3,
@@ -47,7 +46,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
     frame(axes, low, high)
     axes.legend(
         loc="upper center",
-        bbox_to_anchor=(0.5, -0.03),
+        bbox_to_anchor=(0.5, -0.1),
         ncol=3,
         fontsize=9,
         frameon=False,

@@ -1,0 +1,64 @@
+"""Scan, cases -> how much of the scan speaks for the pose, and how much against it?
+
+A beam that a case explains speaks for the pose. One that ended in front of everything mapped, or behind a surface that
+lets no beam pass, speaks against it. One that ended where the map knows nothing, in an unmapped room or outdoors,
+says nothing, unless it crossed a wall on its way; it crosses a pane freely. B beams.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glass_nav.localization.beam_classification.expected_ranges import ExpectedRanges
+
+
+@dataclass(frozen=True)
+class BeamEvidence:
+    """Numbers of beams, not whole: a beam that may have crossed a pane counts in part."""
+
+    answered: float  # all that returned
+    explained: float  # of them by a case 1 to 4
+    short: float  # ended in front of everything mapped: at people, at what is new, or the pose is wrong
+    passed: float  # went through a wall, or ended at nothing behind a pane
+
+    @property
+    def inlier_ratio(self) -> float:
+        """Of the beams that say something, the share that the map explains; NaN without any."""
+        judged = self.explained + self.short + self.passed
+        return self.explained / judged if judged > 0.0 else float("nan")
+
+    def without_crowd(self) -> "BeamEvidence":
+        """With at most half of the beams short: what stands around the robot hides the map, it does not contradict it."""
+        return BeamEvidence(self.answered, self.explained, min(self.short, self.explained + self.passed), self.passed)
+
+    @property
+    def judged_share(self) -> float:
+        """Of the beams that returned, the share that says something."""
+        return (self.explained + self.short + self.passed) / max(self.answered, 1.0)
+
+
+def of(
+    measured_m: np.ndarray, case: np.ndarray, expected: ExpectedRanges, seen_through: np.ndarray, known_end: np.ndarray
+) -> BeamEvidence:
+    """The evidence of one scan about a pose.
+
+    Args:
+        measured_m: (B,) ranges by REP 117.
+        case: (B,) what each beam met.
+        expected: of the pose, its sample 0.
+        seen_through: (B,) probability that the first surface along the beam can be seen through.
+        known_end: (B,) bool: the map knows something of where the beam ended.
+    """
+    answered = np.isfinite(measured_m)
+    unexplained = answered & (case == 0)
+    with np.errstate(invalid="ignore"):
+        crossed = measured_m > expected.line_m[0]
+    weight = np.where(known_end, 1.0, np.where(crossed, 1.0 - seen_through, 0.0))
+    return BeamEvidence(
+        float(np.count_nonzero(answered)),
+        float(np.count_nonzero(answered & (case > 0))),
+        float(weight[unexplained & ~crossed].sum()),
+        float(weight[unexplained & crossed].sum()),
+    )
