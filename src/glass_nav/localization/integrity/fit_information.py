@@ -29,7 +29,8 @@ _EDGE_CELLS = 0.29  # deviation of an edge that is drawn in whole cells
 _MIN_DEVIATION_M = 0.002  # of walls and of their pieces
 _PRIOR_WEIGHT, _MEMORY = 10.0, 0.98  # beams that _EDGE_CELLS is worth, and weight of the past per scan
 _FITTED = 2.0  # sides whose error the fit takes up: their offset is a shift of the robot
-_PRIOR_BEAMS = 0.05  # weight of FREE_M
+_PRIOR_BEAMS = 0.01  # weight of FREE_M
+_UNMAPPED_BEAMS = 4.0  # that may have ended at another thing as near as a piece of a wall errs
 _FAR_M = 0.15  # nearer, the linearized fit holds
 _STEPS_M = np.array([0.08, _FAR_M, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0])
 _STEPS_M = np.concatenate([-_STEPS_M[::-1], [0.0], _STEPS_M])
@@ -43,7 +44,8 @@ class FitInformation:
     """Of one scan at one pose."""
 
     covariance: np.ndarray  # (3, 3) over x [m], y [m], yaw [rad], in map
-    scale_m: float  # deviation of the beams' ends from the walls
+    offset: np.ndarray  # (3,) the pose that was looked at, less the one at which the scan fits best: a Gauss-Newton step
+    share: float  # of the beams, that ended at a wall
 
 
 class ScanFit:
@@ -57,20 +59,21 @@ class ScanFit:
         """
         self._field = field
         self._edge_m = _EDGE_CELLS * resolution_m
+        self._scale_m = self._edge_m  # of what is left between beams and walls
         self._squares = np.full(4, _PRIOR_WEIGHT * self._edge_m**2)  # what fits left: offset, sides, pieces, beams
         self._freedom = np.full(4, _PRIOR_WEIGHT)  # beams, less what the fits took up
 
     def of(
-        self, points_m: np.ndarray, laser_m: np.ndarray, map_from_base: np.ndarray, beam_share: float, learn: bool = True
+        self, points_m: np.ndarray, laser_m: np.ndarray, map_from_base: np.ndarray, beam_share: float, matched: bool
     ) -> FitInformation:
-        """Covariance of the fit.
+        """How well a scan determines its pose.
 
         Args:
             points_m: (B, 2) finite end points of the beams in the robot's frame, by ascending angle; B > 0.
             laser_m: (2,) the lidar in the robot's frame.
-            map_from_base: (3,) pose at which the scan fits.
+            map_from_base: (3,) pose to look at.
             beam_share: of all beams that the pose was fitted to, how many these are; the noise of one beam averages out.
-            learn: from what this scan leaves.
+            matched: the pose was fitted to this scan: learn from what is left, and look at other places where it fits.
         """
         cos, sin = np.cos(map_from_base[2]), np.sin(map_from_base[2])
         turn = np.array([[cos, sin], [-sin, cos]])
@@ -82,22 +85,25 @@ class ScanFit:
         normals = np.stack([along_x, along_y], axis=1)  # away from the wall
         steepness = np.sqrt(along_x**2 + along_y**2)
         normals /= np.maximum(steepness, 1e-9)[:, None]
-        residual_m = -_BEFORE_WALL_M * np.einsum("bi,bi->b", beams, normals) - distance_m
-        near = np.abs(residual_m) < 2.0 * _BEFORE_WALL_M
-        scale_m = float(max(self._edge_m, 1.4826 * np.median(np.abs(residual_m[near])) if near.any() else 0.0))
-        kernel = (_KERNEL_SCALES * scale_m) ** 2
+        residual_m = -_BEFORE_WALL_M * np.einsum("bi,bi->b", beams, normals) - distance_m  # of the end behind the wall
+        if matched:
+            near = np.abs(residual_m) < 2.0 * _BEFORE_WALL_M
+            spread_m = 1.4826 * float(np.median(np.abs(residual_m[near]))) if near.any() else 0.0
+            self._scale_m = max(self._edge_m, spread_m)
+        kernel = (_KERNEL_SCALES * self._scale_m) ** 2
         weight = (kernel / (kernel + residual_m**2) * np.minimum(steepness, 1.0)) ** 2
-        lever_m = max(float(np.sqrt(np.mean(arms_m**2) * 2.0)), 0.5)
+        lever_m = max(float(np.sqrt(2.0 * np.mean(arms_m**2))), 0.5)
         lever = normals[:, 1] * arms_m[:, 0] - normals[:, 0] * arms_m[:, 1]
         jacobian = np.column_stack([normals, lever / lever_m])  # of x [m], y [m], yaw times lever_m [m]
         weighted = weight[:, None] * jacobian
         inverse = np.linalg.inv(weighted.T @ jacobian + _PRIOR_BEAMS * np.eye(3))
         side = np.round(np.arctan2(along_y, along_x) * (_SIDES / (2.0 * np.pi))).astype(int) % _SIDES
         first = _first_of_each_piece(points_m, normals)
-        piece = np.cumsum(np.bincount(first, minlength=len(points_m))) - 1
-        if learn:
+        if matched:
+            piece = np.cumsum(np.bincount(first, minlength=len(points_m))) - 1
             self._learn(weight, residual_m, piece, side[first])
-        variance = (_PRIOR_BEAMS * FREE_M) ** 2 * np.eye(3)
+        unmapped = _UNMAPPED_BEAMS**2 * (self._variance(1) + self._variance(2))
+        variance = ((_PRIOR_BEAMS * FREE_M) ** 2 + unmapped) * np.eye(3)
         clusters = (
             weighted.sum(axis=0)[None],
             (side == np.arange(_SIDES)[:, None]).astype(float) @ weighted,
@@ -106,9 +112,12 @@ class ScanFit:
         )
         for size, sums in enumerate(clusters):
             variance += self._variance(size) * sums.T @ sums
-        covariance = self._widened(inverse @ variance @ inverse, arms_m, map_from_base, lever_m, scale_m)
+        covariance = inverse @ variance @ inverse
+        if matched:
+            covariance = self._widened(covariance, arms_m, map_from_base, lever_m)
         to_yaw = np.array([1.0, 1.0, 1.0 / lever_m])
-        return FitInformation(covariance * np.outer(to_yaw, to_yaw), scale_m)
+        offset = -(inverse @ (weighted.T @ residual_m)) * to_yaw
+        return FitInformation(covariance * np.outer(to_yaw, to_yaw), offset, float(weight.mean()))
 
     def _learn(self, weight: np.ndarray, residual_m: np.ndarray, piece: np.ndarray, side: np.ndarray) -> None:
         """Split what is left between walls and scan after the fit into an offset, sides, pieces and beams: a nested
@@ -148,7 +157,7 @@ class ScanFit:
             each[size] = _MEMORY * each[size] + (1.0 - _MEMORY) * value
 
     def _widened(
-        self, covariance: np.ndarray, arms_m: np.ndarray, map_from_base: np.ndarray, lever_m: float, scale_m: float
+        self, covariance: np.ndarray, arms_m: np.ndarray, map_from_base: np.ndarray, lever_m: float
     ) -> np.ndarray:
         """Covariance (3, 3), in metres, with what the loss along its longest axis adds."""
         variances, axes = np.linalg.eigh(covariance)
@@ -160,7 +169,7 @@ class ScanFit:
             map_from_base[1] + _STEPS_M[:, None] * axis[1] + sin * x + cos * y,
         )
         squared = distance_m**2
-        kernel = (_KERNEL_SCALES * scale_m) ** 2
+        kernel = (_KERNEL_SCALES * self._scale_m) ** 2
         loss = (0.5 * _KERNEL_SCALES**2 * _LOSS_SHARE) * np.sum(squared / (squared + kernel), axis=1)
         likelihood = np.exp(-np.maximum(loss - loss[len(loss) // 2], 0.0)) * _STEP_WIDTHS_M
         variance = float(likelihood @ _FAR_SQUARED / likelihood.sum())

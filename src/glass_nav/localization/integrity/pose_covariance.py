@@ -21,7 +21,7 @@ from glass_nav.localization.integrity.fit_information import FitInformation
 from glass_nav.localization.particle_filter.motion import OdometryNoise
 
 _MEMORY = 0.95  # weight of the past per update, of the scale of odometry's noise
-_MIN_SCALE = 0.04  # of the variances of the model of odometry
+_MIN_SCALE = 0.01  # of the variances of the model of odometry
 _ALIKE = 1.5  # ratio of variances up to which the scan is as good as the carried pose
 _MAX_CORRECTION = 6.0  # deviations: a larger one is an event of its own
 
@@ -90,6 +90,15 @@ def better_of(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     mixed = root @ axes
     ratio = np.where(values > 1.0, 1.0 + (values - 1.0) * np.exp(-(values - 1.0) / _ALIKE), values)
     return (mixed * ratio) @ mixed.T
+
+
+def larger_of(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """(3, 3): in each direction the larger of two covariances."""
+    root = np.linalg.cholesky(first + 1e-12 * np.eye(3))
+    half = np.linalg.solve(root, second)
+    values, axes = np.linalg.eigh(np.linalg.solve(root, half.T))
+    mixed = root @ axes
+    return (mixed * np.maximum(values, 1.0)) @ mixed.T
 
 
 def _turned(yaw: float) -> np.ndarray:
