@@ -82,11 +82,7 @@ class LocalizationInterface(RoomTest):
             (changed(fresh(), info__resolution=0.0), pose_message(here), "resolution > 0"),
             (changed(fresh(), info__resolution=math.nan), pose_message(here), "resolution > 0"),
             (changed(fresh(), info__origin__position__x=math.nan), pose_message(here), "origin"),
-            (
-                changed(fresh(), info__origin__orientation__w=0.0, info__origin__orientation__z=0.0),
-                pose_message(here),
-                "origin",
-            ),
+            (changed(fresh(), info__origin__orientation__w=math.nan), pose_message(here), "origin"),
             (fresh(), changed(pose_message(here), header__frame_id="odom"), "frame 'map'"),
             (fresh(), pose_message(outside), "outside the map"),
         ):
@@ -135,7 +131,9 @@ class LocalizationInterface(RoomTest):
             maps.publish(bad)
             return bool(self.lines.having("the map of topic /other_map is refused", "got 1"))
 
+        status = Heard("/by_topic/status", LocalizationStatus)
         refused = wait_until(refused_is_heard, 30.0)
+        said = wait_until(lambda: len(status) and "/other_map is refused: a map of" in status.last.reason, 30.0)
         maps.publish(self.map_msg)
         heard = wait_until(lambda: len(poses), 30.0)
         maps.publish(self.map_msg)
@@ -143,7 +141,8 @@ class LocalizationInterface(RoomTest):
         kept = self.stays_right_on(maps, poses, self.graded_map())
         code, printed = node.end()
         self.assertTrue(
-            connected and refused and heard and same and kept, (connected, refused, heard, same, kept, printed)
+            connected and refused and said and heard and same and kept,
+            (connected, refused, said, heard, same, kept, printed),
         )
         self.assertEqual(code, 0, printed)
 
@@ -344,7 +343,15 @@ class LocalizationInterface(RoomTest):
     def test_a_single_beam_is_too_few(self) -> None:
         code, printed = self.start("one_beam", "_laser_max_beams:=1").wait(30.0)
         self.assertEqual(code, 2, printed)
-        self.assertIn("~laser_max_beams must be >= 2, got 1", printed)
+        self.assertIn("~laser_max_beams must be in [2, 10000], got 1", printed)
+
+    def test_a_value_that_amcl_ignores_is_a_warning_of_amcl_alone(self) -> None:
+        code, printed = self.start("written", "_initial_cov_xx:='0.5*0.5'").wait(30.0)
+        self.assertEqual(code, 2, printed)
+        self.assertIn("~initial_cov_xx must be float, got '0.5*0.5'", printed)
+        self.start("copied", "_initial_cov_xx:='0.5*0.5'", "_tf_broadcast:=1", script="amcl")
+        self.expect_line("/copied: ~initial_cov_xx must be float, got '0.5*0.5'; not used, as by amcl")
+        self.expect_line("/copied: ~tf_broadcast must be bool, got 1; not used, as by amcl")
 
     def test_a_bag_is_not_for_the_node(self) -> None:
         code, printed = Process("amcl", "__name:=with_a_bag", "--run-from-bag", "run.bag").wait(30.0)

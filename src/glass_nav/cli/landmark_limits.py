@@ -17,6 +17,10 @@ DESCRIPTION = """limits: how wrong a position from three landmarks can be if the
 (Tsukiyama 2009, Tables 1 and 2), and which step keeps the error within a limit. The landmarks are given in one of three
 ways: by --tags and --at, by --ranges and --between as the document gives them, or from a file by --landmarks, --ids and
 --at."""
+EXAMPLES = (
+    "glass_nav landmarks limits --tags 0 0 6 0 3 5 --at 3 2 --step-deg 1",
+    "glass_nav landmarks limits --landmarks landmarks.yaml --ids a b c --at 3 2 --within 0.2",
+)
 
 WITHIN_M = 0.3  # the seed document's bar
 WAYS = (("tags", "at"), ("ranges", "between"), ("landmarks", "ids", "at"))

@@ -11,6 +11,7 @@ from typing import List, Optional
 import numpy as np
 
 from glass_nav.cli import landmark_limits
+from glass_nav.cli.parser import give_examples
 from glass_nav.evaluation.plots import landmark_picture
 from glass_nav.evaluation.plots.landmark_picture import Panel, Tags
 from glass_nav.localization.bearings import bearing_errors, landmark_planning
@@ -24,6 +25,10 @@ HELP = "plan where landmarks for bearings shall hang"
 DESCRIPTION = """plan: how well a robot that sees the landmarks of a file will know its position, all over a map, and
 where more of them help most. Prints a line for each state, writes the picture landmarks.png and the file
 landmarks.yaml with the suggested ones added."""
+EXAMPLES = (
+    "glass_nav landmarks plan floor.yaml landmarks.yaml --out plan",
+    "glass_nav landmarks plan floor.yaml landmarks.yaml --add 3 --glass-map results/glass_map.yaml",
+)
 
 GOOD_M = 0.3  # the seed document's bar for a position
 GLASS_PERCENT = 50  # of a cell of a glass map that lets the light through
@@ -35,8 +40,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     tasks = parser.add_subparsers(dest="task", metavar="TASK")
     tasks.required = True
     limits = tasks.add_parser("limits", help=landmark_limits.HELP, description=landmark_limits.DESCRIPTION)
+    give_examples(limits, landmark_limits.EXAMPLES)
     landmark_limits.add_arguments(limits)
     plan = tasks.add_parser("plan", help=HELP, description=DESCRIPTION)
+    give_examples(plan, EXAMPLES)
     plan.add_argument("map", type=Path, metavar="MAP", help="map_server .yaml or MRPT .gridmap[.gz]")
     plan.add_argument(
         "landmarks",

@@ -1,6 +1,6 @@
 """localization_node: where is the robot in a map of walls and glass? Also startable as `amcl`.
 
-Wiring only; the Localizer computes the answer. Callbacks only store; one loop alone touches the filter.
+Wiring only; the Localizer computes the answer. Callbacks only store, and send tf again; one loop alone touches the filter.
 
 Subscribes: scan (LaserScan; or each of ~scan_topics), initialpose (PoseWithCovarianceStamped), map (OccupancyGrid, if
     ~use_map_topic), global_localization_area (PolygonStamped in the map's frame: where to search for the robot),
@@ -37,6 +37,7 @@ import tf2_ros
 from geometry_msgs.msg import PolygonStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import SetMap, SetMapRequest, SetMapResponse
+from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from glass_nav.localization import health, initial_pose
@@ -44,7 +45,7 @@ from glass_nav.localization.health import LocalizationHealth, Situation
 from glass_nav.localization.pose_memory import PoseMemory
 from glass_nav.localization.saved_pose import SavedPose
 from glass_nav.localization.session import Inputs, LocalizationSession
-from glass_nav.ros import conversions, mailbox, shutdown
+from glass_nav.ros import command_line, conversions, mailbox, shutdown
 from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.landmarks.bearing_messages import LONGEST_TURN_S
 from glass_nav.ros.localization import params, reconfigure
@@ -108,7 +109,7 @@ class LocalizationNode:
         )
         # Subscribers last: they may fire at once.
         self._listener = tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
-        self._scans.subscribe(lambda msg: self._inbox.put("scans", msg))
+        self._scans.subscribe(self._take_scan)
         self._bearings.subscribe(self._command(self._bearings.receive))
         rospy.Subscriber("initialpose", PoseWithCovarianceStamped, self._command(self._take_guess), queue_size=2)
         rospy.Subscriber("global_localization_area", PolygonStamped, self._command(self._take_area), queue_size=2)
@@ -142,6 +143,10 @@ class LocalizationNode:
         self._memory.save()
 
     # -- callbacks of other threads: they store, services also wait for the outcome
+
+    def _take_scan(self, msg: LaserScan) -> None:
+        self._inbox.put("scans", msg)
+        self._outputs.send_transform_again(conversions.ns_from_stamp(msg.header.stamp), rospy.Time.now().to_nsec())
 
     def _command(self, handle: Callable[[Any], None]) -> Callable[[Any], None]:
         return lambda msg: self._inbox.put("commands", lambda: handle(msg))
@@ -327,6 +332,8 @@ def _parameter_file() -> Optional[Path]:
 
 def main(name: str = "glass_localization") -> None:
     """Start the node; exit code 2 if a parameter or the landmark file is unusable."""
+    if command_line.answers_help(__doc__):
+        return
     rospy.init_node(name, disable_signals=True)
     if "--run-from-bag" in rospy.myargv():
         rospy.logfatal(
@@ -337,9 +344,11 @@ def main(name: str = "glass_localization") -> None:
     ending = shutdown.event_on_signals()
     shutdown.core_logs_to_rosout()
     given: Dict[str, Any] = rospy.get_param("~", {})
-    unknown: List[str] = []
+    ignored: List[str] = []
     if name == "amcl":
         given, unknown = params.without_unknown(given, rospy.get_name())
+        given, wrong = params.as_amcl_reads(given, rospy.get_name())
+        ignored = unknown + wrong
     try:
         p, unused = params.localization_params(given, rospy.get_name())
     except params.ParamError as err:
@@ -348,7 +357,7 @@ def main(name: str = "glass_localization") -> None:
         node = LocalizationNode(p)
     except landmark_file.LandmarkError as err:
         shutdown.refuse_to_start(err)
-    for line in unknown:
+    for line in ignored:
         rospy.logwarn(line)
     if unused:
         rospy.loginfo(f"parameters of amcl that this filter does not use: ~{', ~'.join(unused)}")
