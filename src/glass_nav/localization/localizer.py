@@ -247,9 +247,12 @@ class Localizer:
         step = self._schedule.step_to(odom_from_base)
         if step is not None:
             self._filter.predict(step)
-        for bearings, landmarks in self._bearings_from(odom_from_base):
+        taken = self._bearings_from(odom_from_base)
+        for bearings, landmarks in taken:
             self._filter.weigh_by_bearings(bearings, landmarks)
         cases = self._correct(scan, odom_from_base, step)
+        if taken:
+            self._integrity.narrow(self._filter.best.covariance)
         verdict = self._kidnap_detector.observe(scan, odom_from_base, self._filter.best.map_from_base)
         self._quality.doubt(verdict)
         if verdict.found is not None:

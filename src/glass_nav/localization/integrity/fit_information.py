@@ -23,20 +23,19 @@ FREE_M = 2.0  # deviation in a direction that no wall constrains
 _SAME_WALL_M, _SAME_WALL_COS = 0.5, np.cos(np.radians(25.0))  # of neighbouring beams
 _PIECE_M = 1.0  # of a wall: pieces err by themselves
 _SIDES = 8  # directions that walls face
-_BEFORE_WALL_M = 0.15  # where the field is looked at: there it has one direction
+_BEFORE_WALL_M = 0.25  # where the field is looked at: there it has one direction
 _KERNEL_SCALES = 3.0  # residuals beyond are not of that wall
+_CLOSE_M = 0.3  # residuals that tell how much map and lidar disagree
+_NEAR_M = 0.15  # the kernel of a scan that may fit beside the pose
 _EDGE_CELLS = 0.29  # deviation of an edge that is drawn in whole cells
 _MIN_DEVIATION_M = 0.002  # of walls and of their pieces
 _PRIOR_WEIGHT, _MEMORY = 10.0, 0.98  # beams that _EDGE_CELLS is worth, and weight of the past per scan
 _FITTED = 2.0  # sides whose error the fit takes up: their offset is a shift of the robot
 _PRIOR_BEAMS = 0.01  # weight of FREE_M
 _UNMAPPED_BEAMS = 4.0  # that may have ended at another thing as near as a piece of a wall errs
-_FAR_M = 0.15  # nearer, the linearized fit holds
-_STEPS_M = np.array([0.08, _FAR_M, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0])
+_STEPS_M = np.array([0.04, 0.08, 0.13, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0])
 _STEPS_M = np.concatenate([-_STEPS_M[::-1], [0.0], _STEPS_M])
 _STEP_WIDTHS_M = np.gradient(_STEPS_M)
-_FAR_SQUARED = np.where(np.abs(_STEPS_M) >= _FAR_M, _STEPS_M**2, 0.0)
-_LOSS_SHARE = 0.5  # of the beams that err independently, when the scan is compared with itself elsewhere
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,9 @@ class FitInformation:
     """Of one scan at one pose."""
 
     covariance: np.ndarray  # (3, 3) over x [m], y [m], yaw [rad], in map
-    offset: np.ndarray  # (3,) the pose that was looked at, less the one at which the scan fits best: a Gauss-Newton step
+    offset: (
+        np.ndarray
+    )  # (3,) the pose that was looked at, less the one at which the scan fits best: a Gauss-Newton step
     share: float  # of the beams, that ended at a wall
 
 
@@ -85,13 +86,19 @@ class ScanFit:
         normals = np.stack([along_x, along_y], axis=1)  # away from the wall
         steepness = np.sqrt(along_x**2 + along_y**2)
         normals /= np.maximum(steepness, 1e-9)[:, None]
-        residual_m = -_BEFORE_WALL_M * np.einsum("bi,bi->b", beams, normals) - distance_m  # of the end behind the wall
+        facing = -np.einsum("bi,bi->b", beams, normals)
+        residual_m = _BEFORE_WALL_M * facing - distance_m  # of the end behind the wall
+        steepness = np.where(facing > 0.0, np.minimum(steepness, 1.0), 0.0)  # 0: the beam ended far behind a wall
         if matched:
-            near = np.abs(residual_m) < 2.0 * _BEFORE_WALL_M
-            spread_m = 1.4826 * float(np.median(np.abs(residual_m[near]))) if near.any() else 0.0
-            self._scale_m = max(self._edge_m, spread_m)
-        kernel = (_KERNEL_SCALES * self._scale_m) ** 2
-        weight = (kernel / (kernel + residual_m**2) * np.minimum(steepness, 1.0)) ** 2
+            left_m = np.abs(residual_m)
+            left_m = left_m[left_m < _CLOSE_M]
+            self._scale_m = max(self._edge_m, 1.4826 * float(np.median(left_m)) if len(left_m) else 0.0)
+        weight, near = (
+            (kernel**2 / (kernel**2 + residual_m**2) * steepness) ** 2
+            for kernel in (_KERNEL_SCALES * self._scale_m, max(_KERNEL_SCALES * self._scale_m, _NEAR_M))
+        )
+        if not matched:
+            weight = near
         lever_m = max(float(np.sqrt(2.0 * np.mean(arms_m**2))), 0.5)
         lever = normals[:, 1] * arms_m[:, 0] - normals[:, 0] * arms_m[:, 1]
         jacobian = np.column_stack([normals, lever / lever_m])  # of x [m], y [m], yaw times lever_m [m]
@@ -114,10 +121,11 @@ class ScanFit:
             variance += self._variance(size) * sums.T @ sums
         covariance = inverse @ variance @ inverse
         if matched:
-            covariance = self._widened(covariance, arms_m, map_from_base, lever_m)
+            covariance = self._widened(covariance, arms_m, map_from_base, lever_m, len(first))
         to_yaw = np.array([1.0, 1.0, 1.0 / lever_m])
-        offset = -(inverse @ (weighted.T @ residual_m)) * to_yaw
-        return FitInformation(covariance * np.outer(to_yaw, to_yaw), offset, float(weight.mean()))
+        weighted = near[:, None] * jacobian
+        offset = np.linalg.solve(weighted.T @ jacobian + _PRIOR_BEAMS * np.eye(3), weighted.T @ -residual_m) * to_yaw
+        return FitInformation(covariance * np.outer(to_yaw, to_yaw), offset, float(near.mean()))
 
     def _learn(self, weight: np.ndarray, residual_m: np.ndarray, piece: np.ndarray, side: np.ndarray) -> None:
         """Split what is left between walls and scan after the fit into an offset, sides, pieces and beams: a nested
@@ -157,7 +165,7 @@ class ScanFit:
             each[size] = _MEMORY * each[size] + (1.0 - _MEMORY) * value
 
     def _widened(
-        self, covariance: np.ndarray, arms_m: np.ndarray, map_from_base: np.ndarray, lever_m: float
+        self, covariance: np.ndarray, arms_m: np.ndarray, map_from_base: np.ndarray, lever_m: float, pieces: int
     ) -> np.ndarray:
         """Covariance (3, 3), in metres, with what the loss along its longest axis adds."""
         variances, axes = np.linalg.eigh(covariance)
@@ -170,9 +178,9 @@ class ScanFit:
         )
         squared = distance_m**2
         kernel = (_KERNEL_SCALES * self._scale_m) ** 2
-        loss = (0.5 * _KERNEL_SCALES**2 * _LOSS_SHARE) * np.sum(squared / (squared + kernel), axis=1)
+        loss = (0.5 * _KERNEL_SCALES**2 * pieces / len(arms_m)) * np.sum(squared / (squared + kernel), axis=1)
         likelihood = np.exp(-np.maximum(loss - loss[len(loss) // 2], 0.0)) * _STEP_WIDTHS_M
-        variance = float(likelihood @ _FAR_SQUARED / likelihood.sum())
+        variance = float(likelihood @ _STEPS_M**2 / likelihood.sum())
         return covariance + max(0.0, variance - variances[2]) * np.outer(axis, axis)
 
 

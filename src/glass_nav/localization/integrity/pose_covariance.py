@@ -15,7 +15,7 @@ from typing import Optional
 
 import numpy as np
 
-from glass_nav.geometry import angles, se2
+from glass_nav.geometry import angles
 from glass_nav.localization.integrity.dead_reckoning import DeadReckoning
 from glass_nav.localization.integrity.fit_information import FitInformation
 from glass_nav.localization.particle_filter.motion import OdometryNoise
@@ -56,6 +56,10 @@ class PoseCovariance:
         if fit is not None:
             self._at_update = better_of(self._at_update, fit.covariance)
         self._last = np.array(map_from_base, float)
+
+    def narrow(self, covariance: np.ndarray) -> None:
+        """Something else determines the pose at the last update, with that covariance (3, 3)."""
+        self._at_update = better_of(self._at_update, covariance)
 
     def carried(self, step: Optional[np.ndarray], noise: OdometryNoise) -> np.ndarray:
         """(3, 3) after a step (3,) of odometry since the last update, in the robot's frame then."""
