@@ -246,13 +246,9 @@ class Localizer:
         self._map_from_odom = se2.compose(self._filter.best.map_from_base, se2.inverse(odom_from_base))
         map_from_base = se2.compose(self._map_from_odom, odom_from_base)
         expected = self._classifier.expected_at(scan, map_from_base)  # the beams were classified at the registered pose
-<<<<<<< HEAD
-        return self._judged(scan, map_from_base, cases, expected, None)
-=======
-        estimate = self._judged(scan, map_from_base, cases, expected, updated=True)
+        estimate = self._judged(scan, map_from_base, cases, expected, None)
         self._look_for_panes(scan, estimate)
         return estimate
->>>>>>> main
 
     # -- one update
 
