@@ -57,6 +57,7 @@ from glass_nav.ros.localization.segment_service import SegmentService
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
+from glass_nav.ros.localization.shown_parameters import ShownParameters
 from glass_nav.ros.scan_input import ScanInput
 from glass_nav.ros.tf_transforms import TfTransforms
 from glass_nav.sensing.scan import Scan, ScanError
@@ -221,7 +222,6 @@ class LocalizationNode:
         p = params.changed(self._p, values, rospy.get_name())
         self._session.reconfigure(p.session)
         self._p = p
-        _show_on_server(p)
         self._scans.reconfigure(p.node, p.deskew, p.localizer.limits.laser_max_range)
         self._outputs.reconfigure(p.node)
         self._health.warn_deviations = p.node.warn_deviations
@@ -325,16 +325,6 @@ class LocalizationNode:
             self._log.warn(hint, NO_SCAN_WARNING_S)
 
 
-def _show_on_server(p: params.LocalizationParams) -> None:
-    """The parameters in effect, so that they can be read back, as AMCL's; an error is no reason to stop."""
-    for name, value in params.on_server(p).items():
-        try:
-            rospy.set_param(f"~{name}", value)
-        except OSError as err:
-            rospy.logwarn(f"the parameters in effect cannot be shown: no parameter server ({err})")
-            return
-
-
 def _keep_on_server(saved: SavedPose) -> None:
     """As AMCL does; OSError without a parameter server."""
     for name, value in zip(("x", "y", "a"), saved.map_from_base):
@@ -378,7 +368,7 @@ def main(name: str = "glass_localization") -> None:
         node = LocalizationNode(p)
     except landmark_file.LandmarkError as err:
         shutdown.refuse_to_start(err)
-    _show_on_server(p)
+    shown = ShownParameters(params.on_server(p), given)
     for line in ignored:
         rospy.logwarn(line)
     if unused:
@@ -386,5 +376,6 @@ def main(name: str = "glass_localization") -> None:
     try:
         node.run(ending)
     finally:
+        shown.hide()
         node.save_pose()
         rospy.signal_shutdown("ended")
