@@ -260,6 +260,7 @@ class LocalizationStart(unittest.TestCase):
         self.check_many_at_once(client)
         self.assertTrue(self.is_right())
         self.end()
+        self.assertFalse(rospy.has_param("/under_test/min_particles"), "the next start would take it as given")
 
     def check_many_at_once(self, client: Client) -> None:
         """Callers beside each other do not undo one another's values."""

@@ -69,6 +69,7 @@ def test_a_good_run_is_told_as_one():
     assert [(each.name, each.value) for each in story.figures] == [
         ("Position error", "2.0 cm"),
         ("Heading error", "0.00°"),
+        ("Relative error", "0.0 cm"),
         ("Reported LOCALIZED", "100 %"),
         ("Beams explained", "90.0 %"),
         ("Update", "20 ms"),
