@@ -54,10 +54,10 @@ from glass_nav.ros.localization.map_source import MapSource
 from glass_nav.ros.localization.publishers import Publishers
 from glass_nav.ros.localization.reconfigure import ReconfigureServer
 from glass_nav.ros.localization.segment_service import SegmentService
+from glass_nav.ros.localization.shown_parameters import ShownParameters
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
-from glass_nav.ros.localization.shown_parameters import ShownParameters
 from glass_nav.ros.scan_input import ScanInput
 from glass_nav.ros.tf_transforms import TfTransforms
 from glass_nav.sensing.scan import Scan, ScanError
@@ -376,6 +376,6 @@ def main(name: str = "glass_localization") -> None:
     try:
         node.run(ending)
     finally:
-        shown.hide()
         node.save_pose()
+        shown.hide()
         rospy.signal_shutdown("ended")

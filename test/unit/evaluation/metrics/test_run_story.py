@@ -74,8 +74,8 @@ def test_a_good_run_is_told_as_one():
         ("Beams explained", "90.0 %"),
         ("Update", "20 ms"),
     ]
-    assert story.figures[3].note == "of those that came back; 25.0 % of all were mirrored or went through glass"
-    assert story.figures[4].note == "CPU, median; a scan came every 1000 ms"
+    assert story.figures[4].note == "of those that came back; 25.0 % of all were mirrored or went through glass"
+    assert story.figures[5].note == "CPU, median; a scan came every 1000 ms"
 
 
 @pytest.mark.parametrize(
