@@ -59,23 +59,6 @@ class Estimate:
     levels: ProtectionLevels = protection_level.UNKNOWN  # how far off the pose may be
 
 
-class _LazyMatcher:
-    """The matcher over a whole map, made at its first use.
-
-    It does not refer to the localizer, so that a localizer that is dropped leaves the memory at once and not with some
-    later collection of cycles.
-    """
-
-    def __init__(self, grid_map: GridMap, field: DistanceField) -> None:
-        self._grid_map, self._field = grid_map, field
-        self._matcher: Optional[ScanMatcher] = None
-
-    def __call__(self) -> ScanMatcher:
-        if self._matcher is None:
-            self._matcher = ScanMatcher(self._grid_map, self._field)
-        return self._matcher
-
-
 class Localizer:
     """Tracks a pose with a particle filter, finds it with a global search, and notices when it is wrong."""
 
@@ -122,7 +105,8 @@ class Localizer:
     def _look_at(self, grid_map: GridMap, field: DistanceField) -> None:
         self._grid_map, self._field = grid_map, field
         self._known_area = KnownArea(grid_map)
-        self._everywhere = _LazyMatcher(grid_map, field)
+        # Made with the map: on a large one that takes longer than a scan may wait.
+        self._everywhere = ScanMatcher(grid_map, field) if grid_map.free.any() else None
         self._classifier = self._new_classifier(self._params.classifier, grid_map)
         self._kidnap_detector = self._new_kidnap_detector()
 
@@ -325,9 +309,9 @@ class Localizer:
 
     def _new_search(self, area: Optional[np.ndarray] = None) -> GlobalSearch:
         """Over the free cells of area (H, W), or all of them."""
-        matcher = self._everywhere() if area is None else ScanMatcher(self._grid_map, self._field, area)
-        return GlobalSearch(matcher, self._field, self._params.search)
+        matcher = self._everywhere if area is None else ScanMatcher(self._grid_map, self._field, area)
+        assert matcher is not None  # there are free cells
+        return GlobalSearch(matcher, self._field, self._params.search, self._known_area)
 
     def _new_kidnap_detector(self, usual_fit: Optional[float] = None) -> KidnapDetector:
-        matcher = self._everywhere if self._grid_map.free.any() else None
-        return KidnapDetector(self._field, matcher, self._params.search, usual_fit)
+        return KidnapDetector(self._field, self._everywhere, self._params.search, usual_fit, self._known_area)
