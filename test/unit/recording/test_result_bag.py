@@ -88,6 +88,7 @@ def test_the_cloud_has_the_ranges_that_the_lidar_measured(messages):
         np.testing.assert_array_equal(points[:, 4], cases.cases)
 
 
+@pytest.mark.long_run
 def test_the_glass_map_of_the_end_is_the_one_that_was_saved(messages, tmp_path):
     found = messages()
     (glass,) = found[NODE + "/glass_map"]
