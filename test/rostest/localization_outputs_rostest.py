@@ -29,6 +29,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from glass_nav.geometry import angles, se2
+from glass_nav.localization.place_shapes import PLACES_NAMESPACE
 from glass_nav.localization.status_text import STATUS_NAMESPACE
 from glass_nav.msg import LocalizationStatus, SegmentQuality
 from glass_nav.ros import conversions
@@ -221,7 +222,7 @@ class LocalizationOutputs(unittest.TestCase):
             "no scan has the stamp of the markers",
         )
         names = {marker.ns for marker in markers.last.markers}
-        self.assertEqual(names, {*(case.label for case in BeamCase), STATUS_NAMESPACE})
+        self.assertEqual(names, {*(case.label for case in BeamCase), PLACES_NAMESPACE, STATUS_NAMESPACE})
         (status,) = [marker for marker in markers.last.markers if marker.ns == STATUS_NAMESPACE]
         self.assertTrue(status.text.startswith("LOCALIZED"), status.text)
         self.assertEqual(status.header.frame_id, "map")
