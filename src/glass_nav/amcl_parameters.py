@@ -27,6 +27,7 @@ NAMES = frozenset(
 # Ours that is left to its default, the parameter of AMCL that goes before it, and which of the two holds.
 _GIVES_WAY: "Tuple[Tuple[str, str, Callable[[Any, Any], Any]], ...]" = (
     ("min_particles", "max_particles", min),
+    ("max_particles", "min_particles", max),
     ("laser_sigma_hit_max", "laser_sigma_hit", max),
 )
 

@@ -17,6 +17,19 @@ def folder(name: str, module: Path = Path(__file__)) -> Optional[Path]:
     return None
 
 
+def package_xml(module: Path = Path(__file__)) -> Path:
+    """The manifest of the checkout that a module is part of, or of where it is installed.
+
+    Raises:
+        FileNotFoundError: there is none.
+    """
+    for above in module.resolve().parents:
+        for path in (above / "package.xml", above / "share" / "glass_nav" / "package.xml"):
+            if path.is_file():
+                return path
+    raise FileNotFoundError(f"no package.xml belongs to {module}")
+
+
 def by_name(folder_name: str, *file_names: str) -> Dict[str, Path]:
     """Name of each folder in that folder -> the last of these files that it holds; empty if there is none."""
     above = folder(folder_name)

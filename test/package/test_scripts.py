@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 from typing import Tuple
 
@@ -44,3 +46,23 @@ def test_setup_refuses_a_path_that_catkin_cannot_build_in(tmp_path: Path) -> Non
 )
 def test_demo_names_a_wrong_argument(arguments: "list[str]", message: str) -> None:
     assert run(SCRIPTS / "demo", *arguments) == (2, message)
+
+
+@pytest.mark.parametrize("script, words", [("demo", "--seeds 3"), ("test", "test/unit/geometry"), ("setup", "--dev")])
+@pytest.mark.parametrize("option", ["--help", "-h"])
+def test_each_script_explains_itself(script: str, words: str, option: str) -> None:
+    code, out = run(SCRIPTS / script, option)
+    assert code == 0 and words in out and "set -euo" not in out
+
+
+NODES = ("amcl", "driver_node", "landmarks_node", "localization_node", "map_node", "simulator_node", "topology_node")
+
+
+@pytest.mark.parametrize("node", [*NODES, "bag_player", "wakeup_demo"])
+def test_each_node_explains_itself_without_a_master(node: str) -> None:
+    environment = {**os.environ, "ROS_MASTER_URI": "http://localhost:1"}
+    done = subprocess.run(
+        [sys.executable, str(SCRIPTS / node), "--help"], env=environment, stdout=subprocess.PIPE, text=True, timeout=60
+    )
+    assert done.returncode == 0
+    assert "Parameters:" in done.stdout or "parameter" in done.stdout

@@ -344,7 +344,15 @@ class LocalizationInterface(RoomTest):
     def test_a_single_beam_is_too_few(self) -> None:
         code, printed = self.start("one_beam", "_laser_max_beams:=1").wait(30.0)
         self.assertEqual(code, 2, printed)
-        self.assertIn("~laser_max_beams must be >= 2, got 1", printed)
+        self.assertIn("~laser_max_beams must be in [2, 10000], got 1", printed)
+
+    def test_a_value_that_amcl_ignores_is_a_warning_of_amcl_alone(self) -> None:
+        code, printed = self.start("written", "_initial_cov_xx:='0.5*0.5'").wait(30.0)
+        self.assertEqual(code, 2, printed)
+        self.assertIn("~initial_cov_xx must be float, got '0.5*0.5'", printed)
+        self.start("copied", "_initial_cov_xx:='0.5*0.5'", "_tf_broadcast:=1", script="amcl")
+        self.expect_line("/copied: ~initial_cov_xx must be float, got '0.5*0.5'; not used, as by amcl")
+        self.expect_line("/copied: ~tf_broadcast must be bool, got 1; not used, as by amcl")
 
     def test_a_bag_is_not_for_the_node(self) -> None:
         code, printed = Process("amcl", "__name:=with_a_bag", "--run-from-bag", "run.bag").wait(30.0)

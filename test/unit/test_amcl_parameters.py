@@ -20,6 +20,7 @@ def loaded(**given):
         ({"max_particles": 2000}, 300),
         ({}, 300),
         ({"max_particles": 100, "min_particles": 50}, 50),
+        ({"min_particles": 6000}, 6000),
     ],
 )
 def test_few_particles_may_be_asked_for_by_their_maximum_alone(given, least):
@@ -36,9 +37,17 @@ def test_a_wide_scatter_of_ranges_widens_its_limit(sigma, most):
     [
         (
             {"max_particles": 100, "min_particles": 300},
-            "/amcl: ~min_particles must be in [1, max_particles = 100], got 300",
+            "/amcl: ~min_particles must be in [1, ~max_particles = 100], got 300",
         ),
-        ({"max_particles": 0}, "/amcl: ~min_particles must be in [1, max_particles = 0], got 0"),
+        ({"max_particles": 0}, "/amcl: ~max_particles must be in [1, 100000], got 0"),
+        ({"max_particles": -4}, "/amcl: ~max_particles must be in [1, 100000], got -4"),
+        ({"max_particles": 1234567890}, "/amcl: ~max_particles must be in [1, 100000], got 1234567890"),
+        ({"max_particles": 20_000_000}, "/amcl: ~max_particles must be in [1, 100000], got 20000000"),
+        ({"min_particles": 20_000_000}, "/amcl: ~min_particles must be in [1, 100000], got 20000000"),
+        ({"sample_count": 10**9}, "/amcl: ~sample_count must be in [1, 1000], got 1000000000"),
+        ({"raycast_threads": 10**6}, "/amcl: ~raycast_threads must be in [1, 256], got 1000000"),
+        ({"laser_max_beams": 1}, "/amcl: ~laser_max_beams must be in [2, 10000], got 1"),
+        ({"vote_mode": "hard"}, "/amcl: ~vote_mode must be one of soft, paper, got 'hard'"),
         ({"max_particles": "many"}, "/amcl: ~max_particles must be int, got 'many'"),
         (
             {"laser_sigma_hit": 0.5, "laser_sigma_hit_max": 0.2},

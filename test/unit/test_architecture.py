@@ -45,7 +45,17 @@ MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or les
     "demo",
 }
 # modules of no room
-FOR_ALL = {"amcl_parameters", "health", "log_line", "package_files", "params", "rate_limiter", "shapes", "vocabulary"}
+FOR_ALL = {
+    "amcl_parameters",
+    "health",
+    "log_line",
+    "machine",
+    "package_files",
+    "params",
+    "rate_limiter",
+    "shapes",
+    "vocabulary",
+}
 ONLY_BY = {  # compiled modules, each behind its face; and what is heavy, where it is needed
     "glass_nav._beam_vote": "localization",
     "glass_nav._mrpt_grid": "hypotheses sensing",

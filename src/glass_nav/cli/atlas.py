@@ -6,9 +6,14 @@ import argparse
 from typing import Any, Dict, Optional
 
 from glass_nav.cli import atlas_build, atlas_check, atlas_explain, atlas_show, atlas_wake_up
+from glass_nav.cli.parser import add_commands
 
 HELP = "build, check and try out an atlas"
 DESCRIPTION = "The hierarchical atlas of a floor, and what a robot that wakes up can make of it. Needs no roscore."
+EXAMPLES = (
+    "glass_nav atlas build floor.yaml --out atlas/floor",
+    "glass_nav atlas show glass_office --out pictures",
+)
 
 MODULES: Dict[str, Any] = {
     "build": atlas_build,
@@ -21,10 +26,7 @@ MODULES: Dict[str, Any] = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """A subcommand for each module."""
-    commands = parser.add_subparsers(dest="atlas_command", metavar="COMMAND")
-    commands.required = True
-    for name, module in MODULES.items():
-        module.add_arguments(commands.add_parser(name, help=module.HELP, description=module.DESCRIPTION))
+    add_commands(parser, "atlas_command", "COMMAND", MODULES)
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:

@@ -20,6 +20,10 @@ from glass_nav.world import map_file
 HELP = "make the atlas of a map"
 DESCRIPTION = """Makes the atlas of a map: the generalized Voronoi graph of its free space, measured, with the wall
 segments that a robot sees on each edge in each direction. Glass needs no marking: it is occupied like any wall."""
+EXAMPLES = (
+    "glass_nav atlas build floor.yaml --out atlas/floor",
+    "glass_nav atlas build floor.yaml --out atlas/floor --force",
+)
 
 NPZ_FROM_NODES = 10000  # a JSON of that many is slow to load
 

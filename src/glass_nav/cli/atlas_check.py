@@ -19,6 +19,10 @@ from glass_nav.world import map_file
 HELP = "validate an atlas, and list places that are indistinguishable"
 DESCRIPTION = """Checks every rule of an atlas, then sends a robot without errors through the search from everywhere:
 which places are indistinguishable from which, and how many edges a robot needs at most and on average."""
+EXAMPLES = (
+    "glass_nav atlas check glass_office",
+    "glass_nav atlas check atlas/floor --map floor.yaml",
+)
 
 MAX_STARTS = 2000
 MAX_LISTED = 20

@@ -21,6 +21,10 @@ HELP = "print a search forest row by row"
 DESCRIPTION = """Wakes up a robot without errors and prints its search forest: in each row every edge of every
 search node that was active in the row before, and what rules it out. Without arguments it is the worked example
 of the document on the global localization procedure, searched as it says."""
+EXAMPLES = (
+    "glass_nav atlas explain",
+    "glass_nav atlas explain glass_office --dart 5 --best",
+)
 
 EXAMPLE = "document_example"
 DEEPEST = 50

@@ -8,6 +8,7 @@ from typing import Optional
 
 import numpy as np
 
+from glass_nav.cli import out_file
 from glass_nav.evaluation.plots import atlas_picture
 from glass_nav.evaluation.plots.atlas_picture import AtlasDrawing
 from glass_nav.simulation import shipped_buildings
@@ -19,6 +20,10 @@ from glass_nav.world.grid_map import GridMap
 HELP = "draw an atlas over its map"
 DESCRIPTION = """Writes a PNG: the map, nodes and edges with their numbers, and the wall segments that a robot sees on
 each edge, there and back; or one edge alone."""
+EXAMPLES = (
+    "glass_nav atlas show glass_office --out pictures",
+    "glass_nav atlas show atlas/floor --edge 3 --map floor.yaml",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,7 +41,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "package that the atlas was made from, else none",
     )
     parser.add_argument("--edge", type=int, metavar="N", help="draw this one only")
-    parser.add_argument("--out", type=Path, metavar="PNG", help="default: here, NAME.png or NAME_edge_N.png")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("."),
+        metavar="DIR",
+        help="folder for NAME.png or NAME_edge_N.png, or the file (default .)",
+    )
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
@@ -58,7 +69,7 @@ def main(arguments: argparse.Namespace) -> None:
     if edge is not None and edge >= len(atlas.edges):
         raise AtlasError(f"{path}: --edge must be 0 to {len(atlas.edges) - 1}, got {edge}")
     grid = _map(atlas, arguments.map)
-    out = arguments.out or Path(f"{atlas.name}.png" if edge is None else f"{atlas.name}_edge_{edge}.png")
+    out = out_file.in_folder(arguments.out, f"{atlas.name}.png" if edge is None else f"{atlas.name}_edge_{edge}.png")
     if edge is None:
         atlas_picture.draw_atlas(out, grid, _drawing(atlas), atlas.name)
     else:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Dict, Optional
 
 from glass_nav import params
-from glass_nav.cli import search_params
+from glass_nav.cli import out_file, search_params
 from glass_nav.cli.progress import Progress
 from glass_nav.evaluation.metrics import replay_result
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
@@ -19,6 +19,12 @@ DESCRIPTION = """Simulated robots wake up anywhere in an atlas, report what they
 the tolerances say) and drive as the search asks. Writes metrics.json: shares of robots that were confirmed at
 the right place or at a wrong one, that are ambiguous, that are lost and that were still searching; the
 edges they drove; the CPU time of the slowest step."""
+EXAMPLES = (
+    "glass_nav atlas wake-up glass_office --trials 100",
+    "glass_nav atlas wake-up atlas/floor --missed 0.1 --out results",
+)
+
+FILE = "metrics.json"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,7 +57,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--max-edges", type=int, default=100, metavar="N", help="then a robot gives up (default 100)")
     parser.add_argument("--params", type=Path, metavar="FILE", help="yaml of parameters, names as for topology_node")
     parser.add_argument(
-        "--out", type=Path, default=Path("metrics.json"), metavar="FILE", help="default: metrics.json here"
+        "--out",
+        type=Path,
+        default=Path("."),
+        metavar="DIR",
+        help=f"folder for {FILE}, or the file (default .)",
     )
 
 
@@ -95,8 +105,9 @@ def main(arguments: argparse.Namespace) -> None:
     finally:
         progress.finish()
     figures = wake_up_trials.metrics(done)
+    out = out_file.in_folder(arguments.out, FILE)
     replay_result.write_json(
-        arguments.out,
+        out,
         {
             **figures,
             "atlas": str(path),
@@ -109,7 +120,7 @@ def main(arguments: argparse.Namespace) -> None:
         },
     )
     print(_table(figures))
-    print(f"written to {arguments.out}")
+    print(f"written to {out}")
 
 
 def _table(figures: Dict[str, float]) -> str:

@@ -24,6 +24,10 @@ timings.csv. A contestant is a folder that `glass_nav replay --out` wrote, a yam
 or poses that the log has: topic:/amcl_pose, or tf:map for what tf says. NAME=CONTESTANT names it; folders of one name
 are runs of one contestant. The others are compared with the first, seed by seed, over the scans that all have a pose
 for. A mean has its 95 % interval: Student's t over the seeds of each log, the logs as they are."""
+EXAMPLES = (
+    "glass_nav compare default mine.yaml --log run.bag=floor.yaml --seeds 3 --out compared",
+    "glass_nav compare before=results_1 after=results_2 --out compared",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -18,6 +18,10 @@ HELP = "say what is wrong with a bag or a running robot, and what to do"
 DESCRIPTION = """Looks at the scans, frames, stamps and odometry in a bag (of ROS 1 or ROS 2), or of the running
 robot, and with --map at how the scans fit the map; says what is wrong, each with what to do. Exit code 0: nothing,
 1: something is wrong, 2: wrong usage, 3: bad input."""
+EXAMPLES = (
+    "glass_nav doctor run.bag --map floor.yaml",
+    "glass_nav doctor --live --seconds 20",
+)
 LIVE_MODULE = "glass_nav.ros.tools.doctor_live"
 
 

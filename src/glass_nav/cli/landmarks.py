@@ -1,4 +1,4 @@
-"""glass_nav landmarks plan: what positions from landmark bearings will be worth, and where one more tag helps most."""
+"""glass_nav landmarks: what positions from landmark bearings will be worth, and where one more tag helps most."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from typing import List, Optional
 
 import numpy as np
 
+from glass_nav.cli import landmark_limits
+from glass_nav.cli.parser import give_examples
 from glass_nav.evaluation.plots import landmark_picture
 from glass_nav.evaluation.plots.landmark_picture import Panel, Tags
 from glass_nav.localization.bearings import bearing_errors, landmark_planning
@@ -23,6 +25,10 @@ HELP = "plan where landmarks for bearings shall hang"
 DESCRIPTION = """plan: how well a robot that sees the landmarks of a file will know its position, all over a map, and
 where more of them help most. Prints a line for each state, writes the picture landmarks.png and the file
 landmarks.yaml with the suggested ones added."""
+EXAMPLES = (
+    "glass_nav landmarks plan floor.yaml landmarks.yaml --out plan",
+    "glass_nav landmarks plan floor.yaml landmarks.yaml --add 3 --glass-map results/glass_map.yaml",
+)
 
 GOOD_M = 0.3  # the seed document's bar for a position
 GLASS_PERCENT = 50  # of a cell of a glass map that lets the light through
@@ -33,7 +39,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the subcommand."""
     tasks = parser.add_subparsers(dest="task", metavar="TASK")
     tasks.required = True
+    limits = tasks.add_parser("limits", help=landmark_limits.HELP, description=landmark_limits.DESCRIPTION)
+    give_examples(limits, landmark_limits.EXAMPLES)
+    landmark_limits.add_arguments(limits)
     plan = tasks.add_parser("plan", help=HELP, description=DESCRIPTION)
+    give_examples(plan, EXAMPLES)
     plan.add_argument("map", type=Path, metavar="MAP", help="map_server .yaml or MRPT .gridmap[.gz]")
     plan.add_argument(
         "landmarks",
@@ -66,6 +76,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
     """What is wrong with the options as such, before any file is opened."""
+    if arguments.task == "limits":
+        return landmark_limits.usage_error(arguments)
     if arguments.add < 0:
         return f"--add must be >= 0, got {arguments.add}"
     if not 0.0 < arguments.step_deg <= 45.0:
@@ -76,11 +88,14 @@ def usage_error(arguments: argparse.Namespace) -> Optional[str]:
 
 
 def main(arguments: argparse.Namespace) -> None:
-    """Load, plan, write.
+    """Load, plan, write; or print the limits.
 
     Raises:
         MapError, LandmarkError, ValueError, OSError: bad input; one line.
     """
+    if arguments.task == "limits":
+        landmark_limits.main(arguments)
+        return
     grid_map, landmarks = map_file.load(arguments.map), landmark_file.load(arguments.landmarks)
     _check_inside(arguments, grid_map, landmarks)
     walls = RayCaster(_see_through(grid_map, arguments.glass_map))

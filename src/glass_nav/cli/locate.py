@@ -9,6 +9,7 @@ from typing import Optional
 
 import numpy as np
 
+from glass_nav.cli import out_file
 from glass_nav.evaluation.plots import location_picture
 from glass_nav.evaluation.plots.location_picture import LocatedScan
 from glass_nav.geometry import angles
@@ -25,6 +26,12 @@ HELP = "correct a rough pose by one scan"
 DESCRIPTION = """Moves a rough pose so that the scan's beams end at the wall segments of the map, and says how well they
 do there, and which directions the walls do not constrain. Draws the scan before and after. Good from
 about 0.5 m and 10 degrees away. Ends with 3 if the scan fits nowhere near the pose."""
+EXAMPLES = (
+    "glass_nav locate --map floor.yaml --scan scan.yaml --pose 4.3 4.0 0.0",
+    "glass_nav locate --map floor.yaml --scan run.bag --index 120 --pose 4.3 4.0 0.0 --out pictures",
+)
+
+PICTURE = "located.png"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"steps of a correction (default {SegmentCorrectionParams().iterations}; document 40)",
     )
     parser.add_argument(
-        "--out", type=Path, default=Path("located.png"), metavar="PNG", help="the picture (default located.png)"
+        "--out", type=Path, default=Path("."), metavar="DIR", help=f"folder for {PICTURE}, or the file (default .)"
     )
     parser.add_argument("--scan-topic", metavar="TOPIC", help="of a log; default: the only one, or /scan")
     parser.add_argument("--base-frame", metavar="FRAME", help="of a bag; default: base_link, else base_footprint")
@@ -109,15 +116,16 @@ def main(arguments: argparse.Namespace) -> None:
     for line in _lines(scan, located, rough, len(locator.segments_m)):
         print(line)
     drawn = LocatedScan(scan.points_in_base(), located.case, locator.segments_m, rough, found.map_from_base)
+    out = out_file.in_folder(arguments.out, PICTURE)
     location_picture.draw(
-        arguments.out,
+        out,
         grid_map,
         drawn,
         f"{arguments.scan.name} on {arguments.map.name}",
         f"before: {_measures(found.before)}",
         f"after: {_measures(found.after)}",
     )
-    print(f"drawn to {arguments.out}")
+    print(f"drawn to {out}")
     refusal = segment_locator.refusal(scan, located, rough)
     if refusal is not None:
         raise ValueError(refusal)

@@ -4,8 +4,16 @@ from __future__ import annotations
 
 import argparse
 import sys
+import xml.etree.ElementTree as ElementTree
 from typing import Any, Dict, List, Optional
 
+from glass_nav import package_files
+from glass_nav.cli.parser import CommandParser, add_commands, unknown
+
+EXAMPLES = (
+    "glass_nav replay run.bag --map floor.yaml --out results",
+    "glass_nav doctor run.bag --map floor.yaml",
+)
 DONE, FAILED, USAGE, BAD_INPUT, INTERRUPTED = 0, 1, 2, 3, 130
 
 
@@ -39,16 +47,53 @@ def main(argv: Optional[List[str]] = None) -> int:
         "report": report,
         "simulate": simulate,
     }  # each: see replay.py
-    parser = argparse.ArgumentParser(prog="glass_nav", description="Localization in buildings of glass: offline tools.")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
-    commands.required = True  # as an attribute: the argument came with Python 3.7 only for some callers
-    for name, module in modules.items():
-        module.add_arguments(commands.add_parser(name, help=module.HELP, description=module.DESCRIPTION))
+    words = sys.argv[1:] if argv is None else argv
+    parser = _parser(modules)
+    complete(parser)
+    if not words:
+        parser.print_help()
+        return USAGE
+    wrong = unknown(words[0], modules, "glass_nav")
+    if wrong is None and words[0] in modules and len(words) > 1:
+        below = getattr(modules[words[0]], "MODULES", None)
+        wrong = below and unknown(words[1], below, f"glass_nav {words[0]}")
+    if wrong:
+        print(wrong, file=sys.stderr)
+        return USAGE
     try:
-        arguments = parser.parse_args(argv)
+        arguments = parser.parse_args(words)
     except SystemExit as err:  # argparse has written what is wrong
         return int(err.code or 0)
     return _run(f"glass_nav {arguments.command}", modules[arguments.command], arguments)
+
+
+def complete(parser: argparse.ArgumentParser) -> None:
+    """Answer the shell if it asks for completions by tab, and end; argcomplete is optional."""
+    try:
+        import argcomplete
+    except ImportError:
+        return
+    argcomplete.autocomplete(parser)
+
+
+def _parser(modules: Dict[str, Any]) -> CommandParser:
+    parser = CommandParser(prog="glass_nav", description="Localization in buildings of glass: offline tools.")
+    parser.examples = EXAMPLES
+    parser.add_argument("--version", action=_Version)
+    add_commands(parser, "command", "COMMAND", modules)
+    return parser
+
+
+class _Version(argparse.Action):
+    """Prints the version of the package: that of package.xml, which is read only if it is asked for."""
+
+    def __init__(self, option_strings: Any, dest: str, **_: Any) -> None:
+        super().__init__(option_strings, dest, nargs=0, help="print the version and exit")
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        version = ElementTree.parse(package_files.package_xml()).findtext("version")
+        print(f"{parser.prog} {version}")
+        parser.exit()
 
 
 def _run(program: str, module: Any, arguments: argparse.Namespace) -> int:

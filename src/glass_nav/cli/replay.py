@@ -21,6 +21,10 @@ DESCRIPTION = """Runs the localization on a recorded log, every scan of it, and 
 trajectory.tum, per_scan.csv, beam_cases.npz, worst_scans.npz, glass_map.yaml (probability of glass of each wall cell)
 and trajectory.png; where the log has the truth about its beams, as
 simulated ones do, also the scores of the cases and cases.png. Needs no roscore."""
+EXAMPLES = (
+    "glass_nav replay run.bag --map floor.yaml --out results",
+    "glass_nav replay run.bag --map floor.yaml --global --duration 60 --out results --bag results/shown.bag",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

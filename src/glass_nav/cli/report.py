@@ -24,6 +24,10 @@ PNG files: the path over the map by state, what the beams met over time, the pro
 reliability against the truth, places possible until one was left, update time, and the ten worst scans. Takes the
 folder that `glass_nav replay --out` wrote, or a log, which is replayed first (all options but --map and --out are for
 that)."""
+EXAMPLES = (
+    "glass_nav report results --out report",
+    "glass_nav report run.bag --map floor.yaml --out report",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
     """What is wrong with the options as such, before any file is opened."""
-    if arguments.map is None and not _is_results(arguments.run):
+    if arguments.map is None and arguments.run.exists() and not _is_results(arguments.run):
         return "a log needs --map"
     try:
         _options(arguments)
@@ -59,6 +63,8 @@ def main(arguments: argparse.Namespace) -> None:
         ValueError, OSError: bad input; one line.
     """
     folder = arguments.run
+    if not folder.exists():
+        raise ValueError(f"{folder}: does not exist")
     if not _is_results(folder):
         replay.run(_options(arguments), Outputs(arguments.out, pictures=False))
         folder = arguments.out

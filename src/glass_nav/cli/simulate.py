@@ -12,6 +12,7 @@ from typing import Dict, Optional
 
 import numpy as np
 
+from glass_nav.cli import out_file
 from glass_nav.cli.progress import Progress
 from glass_nav.recording.bag_writer import BagWriter
 from glass_nav.simulation import (
@@ -40,6 +41,10 @@ DESCRIPTION = """Drives a robot along a path through a building, and writes a ba
 /clock) with the truth beside (/ground_truth, /true_beams: the case of every beam), and the map of the building.
 Needs no roscore. The same seed gives the same bag. Real mappers erase glass; --glass-erased and --mapper do so to the
 map, and leave the bag as it is: its truth is in terms of the whole building."""
+EXAMPLES = (
+    "glass_nav simulate glass_office --seed 1 --out simulated",
+    "glass_nav simulate glass_bridge --lidar coated --speed 0.4 --out bridge.bag",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -54,8 +59,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         required=True,
         type=Path,
-        metavar="BAG",
-        help="the bag, such as run.bag; the map goes beside it as run.map.yaml; where it lacks glass, the whole one as "
+        metavar="DIR",
+        help="folder for BUILDING.bag, or the bag, such as run.bag; the map goes beside it as run.map.yaml; where it lacks glass, the whole one as "
         "run.complete.map.yaml",
     )
     parser.add_argument(
@@ -149,11 +154,11 @@ def main(arguments: argparse.Namespace) -> None:
     pace = PathFollowerParams(speed_m_s=arguments.speed)
     way_m = simulation.follower(arguments.path, pace).length_m
     maps = _maps(arguments, building)
-    arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    out = out_file.in_folder(arguments.out, f"{Path(arguments.building).stem}.bag")
     tally, shown_m = _Tally(), 0
     progress = Progress("simulate", math.ceil(way_m), unit="m")
     try:
-        with BagWriter(arguments.out) as bag:
+        with BagWriter(out) as bag:
             bag.mounting(simulation.stamp_ns, simulation.base_from_laser)
             for frame in simulation.drive(arguments.path, pace):
                 write_frame(bag, frame, simulation.scan_period_s)
@@ -164,8 +169,8 @@ def main(arguments: argparse.Namespace) -> None:
     finally:
         progress.finish()
     for suffix, grid_map in maps.items():
-        map_file.save(grid_map, arguments.out.with_suffix(suffix), ".png")
-    files = [arguments.out, *(arguments.out.with_suffix(suffix) for suffix in maps)]
+        map_file.save(grid_map, out.with_suffix(suffix), ".png")
+    files = [out, *(out.with_suffix(suffix) for suffix in maps)]
     print(f"{tally.line()}; written to {', '.join(map(str, files[:-1]))} and {files[-1]}")
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glass_nav.params import number
 from glass_nav.sensing import bearing_model
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.world.landmark_map import LandmarkMap
@@ -20,8 +21,9 @@ from glass_nav.world.landmark_map import LandmarkMap
 class BearingMixture:
     """How a bearing spreads around the expected one."""
 
-    bearing_wrong_share: float = 0.02  # of bearings that are wrong
-    bearing_sigma_floor: float = 0.01  # [rad] smallest deviation of a bearing: particles have gaps between them
+    bearing_wrong_share: float = number(0.02, 0.0, 1.0)  # of bearings that are wrong
+    # [rad] smallest deviation of a bearing: particles have gaps between them
+    bearing_sigma_floor: float = number(0.01, 0.0, 3.2)
 
     def __post_init__(self) -> None:
         if not 0.0 < self.bearing_wrong_share < 1.0:

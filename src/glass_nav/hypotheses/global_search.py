@@ -24,6 +24,7 @@ from glass_nav.hypotheses import bearing_weights, pose_tracker, scan_alignment
 from glass_nav.hypotheses.bearing_weights import BearingMixture
 from glass_nav.hypotheses.pose_tracker import PoseTracker
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
+from glass_nav.params import number
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.scan import Scan, spread_evenly
@@ -57,8 +58,8 @@ _BEARINGS = BearingMixture(bearing_wrong_share=0.1, bearing_sigma_floor=0.1)
 class SearchParams:
     """When a place is accepted as found."""
 
-    search_margin: float = 8.0  # log likelihood ratio of the place to all others
-    search_least_fit: float = 0.5  # scan fit at the place, mean since it is followed, 0..1
+    search_margin: float = number(8.0, 0.0, 1000.0)  # log likelihood ratio of the place to all others
+    search_least_fit: float = number(0.5, 0.0, 1.0)  # scan fit at the place, mean since it is followed, 0..1
     recover_when_lost: bool = True  # search everywhere when the scans contradict the pose
 
     def __post_init__(self) -> None:

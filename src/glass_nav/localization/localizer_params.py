@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from glass_nav import machine
 from glass_nav.hypotheses.bearing_weights import BearingMixture
 from glass_nav.hypotheses.global_search import SearchParams
 from glass_nav.localization.beam_classification.beam_classifier import BeamClassifierParams
@@ -18,19 +19,25 @@ from glass_nav.localization.particle_filter.motion import OdometryNoise
 from glass_nav.localization.particle_filter.particle_filter import ParticleFilterParams
 from glass_nav.localization.particle_filter.proposal import Proposal
 from glass_nav.localization.particle_filter.resampling import ParticleCount
+from glass_nav.params import choice, number
 from glass_nav.sensing.raycast import BACKENDS
+
+BYTES_PER_PARTICLE_BEAM = 50  # measured: 36 kB a particle with 720 beams, weight_mode field
+_MAX_BEAMS = 2000  # of a scan
+_MEMORY_SHARE = 0.5  # of the computer's, for the particles
+_ALWAYS_BYTES = 5000 * 720 * BYTES_PER_PARTICLE_BEAM  # the defaults start on any computer
 
 
 @dataclass(frozen=True)
 class Schedule:
     """When a scan moves the particles; the names and meanings are AMCL's."""
 
-    update_min_d: float = 0.1  # distance since the last update [m]
-    update_min_a: float = 0.1  # turn since the last update [rad]
-    resample_interval: int = 1  # updates between resamplings
+    update_min_d: float = number(0.1, 0.0, 1000.0)  # distance since the last update [m]
+    update_min_a: float = number(0.1, 0.0, 1000.0)  # turn since the last update [rad]
+    resample_interval: int = number(1, 1, 1000)  # updates between resamplings
     selective_resampling: bool = False  # only when the effective count is below half
-    raycast_threads: int = 1
-    raycast_backend: str = "exact"  # or "mrpt": simulateScanRay, for comparison
+    raycast_threads: int = number(1, 1, 256)
+    raycast_backend: str = choice("exact", BACKENDS)  # or "mrpt": simulateScanRay, for comparison
 
     def __post_init__(self) -> None:
         for name in ("update_min_d", "update_min_a"):
@@ -47,8 +54,8 @@ class Schedule:
 class LaserLimits:
     """Ranges that are used; the names and meanings are AMCL's."""
 
-    laser_min_range: float = -1.0  # [m] nearer ranges are ignored; < 0: the limit of the scan
-    laser_max_range: float = -1.0  # [m] farther ranges are ignored; < 0: the limit of the scan
+    laser_min_range: float = number(-1.0, -1.0, 1000.0)  # [m] nearer ranges are ignored; < 0: the limit of the scan
+    laser_max_range: float = number(-1.0, -1.0, 1000.0)  # [m] farther ranges are ignored; < 0: the limit of the scan
 
     def __post_init__(self) -> None:
         for name in ("laser_min_range", "laser_max_range"):
@@ -77,6 +84,16 @@ class LocalizerParams:
     quality: QualityLimits = field(default_factory=QualityLimits)
     search: SearchParams = field(default_factory=SearchParams)
     bearings: BearingMixture = field(default_factory=BearingMixture)
+
+    def __post_init__(self) -> None:
+        beams = min(self.mixture.laser_max_beams, _MAX_BEAMS)
+        needed = self.count.max_particles * beams * BYTES_PER_PARTICLE_BEAM
+        allowed = max(_MEMORY_SHARE * machine.memory_bytes(), _ALWAYS_BYTES)
+        if needed > allowed:
+            raise ValueError(
+                f"~max_particles must be <= {allowed / (beams * BYTES_PER_PARTICLE_BEAM):.0f} on this computer: with "
+                f"{beams} beams more take over {allowed * 1e-9:.1f} GB of memory, got {self.count.max_particles}"
+            )
 
     @property
     def classifier(self) -> BeamClassifierParams:

@@ -64,6 +64,11 @@ class Bag:
     def count(self, topic: str) -> int:
         return int(sum(connection.msgcount for connection in self._reader.connections if connection.topic == topic))
 
+    @property
+    def duration_s(self) -> float:
+        """From the first to the last message, by the time of recording."""
+        return max(float(self._reader.duration) * 1e-9, 0.0)
+
     def topics_of(self, *kinds: str) -> List[str]:
         return [topic for topic, kind in self.topics.items() if kind in kinds]
 
@@ -180,7 +185,7 @@ def _why_unreadable(paths: Sequence[Path], err: Exception) -> str:
         return (
             f"{path}: cut short or never closed (its index is missing); `rosbag reindex {path}` may save what it holds"
         )
-    return f"{path}: cannot be read: {_first_line(err)}"
+    return f"{path}: is not a bag ({_first_line(err)})"
 
 
 def _first_line(err: Exception) -> str:

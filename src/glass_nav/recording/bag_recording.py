@@ -34,6 +34,7 @@ def open_log(paths: Sequence[Path], options: LogOptions) -> Recording:
             truth = bag_truth.ground_truth(bag, choices, options, notes)
             truth_topic = bag_truth.true_beams_topic(bag, options.true_beams, notes)
             scan_count = bag.count(choices.scan_topic)
+            duration_s = bag.duration_s
         except RecordingError as err:  # it may be missing because of the damage
             raise (RecordingError(f"{err}; {bag.damage}") if bag.damage else err) from err
         if bag.damage:
@@ -42,7 +43,7 @@ def open_log(paths: Sequence[Path], options: LogOptions) -> Recording:
     beam_truth = None if truth_topic is None else bag_truth.TrueBeams(paths, truth_topic)
     name = paths[0].name if len(paths) == 1 else f"{paths[0].name} and {len(paths) - 1} more"
     odom_frame = choices.odometry.frame or "odom"
-    return Recording(name, scan_count, entries, truth, notes, beam_truth, odom_frame, choices.base_frame)
+    return Recording(name, scan_count, entries, truth, notes, beam_truth, odom_frame, choices.base_frame, duration_s)
 
 
 class _Entries:

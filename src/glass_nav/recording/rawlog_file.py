@@ -56,7 +56,10 @@ def open_log(path: Path, options: LogOptions) -> Recording:
         log["stamps_ns"][scans] = FRAME_PERIOD_NS * np.arange(len(scans))
     odometry = None if log["paired"] else _odometry(path, log)
     truth = _ground_truth(path, options, log["stamps_ns"][scans], notes)
-    return Recording(path.name, len(scans), _Entries(log, scans, odometry, options), truth, notes)
+    stamps_ns = log["stamps_ns"][scans]
+    duration_s = float(stamps_ns.max() - stamps_ns.min()) * 1e-9
+    entries = _Entries(log, scans, odometry, options)
+    return Recording(path.name, len(scans), entries, truth, notes, duration_s=duration_s)
 
 
 def _scans(path: Path, log: Rawlog, options: LogOptions, holds: str, notes: List[str]) -> np.ndarray:

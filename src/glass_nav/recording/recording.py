@@ -57,6 +57,7 @@ class Recording:
     beam_truth: Optional[Iterable[BeamTruth]] = None  # by ascending stamps; read as it is iterated, like the entries
     odom_frame: str = "odom"
     base_frame: str = "base_link"
+    duration_s: Optional[float] = None  # of all of it, about; None: not known
 
     def __len__(self) -> int:
         return self.scan_count

@@ -38,7 +38,7 @@ class PreparedReplay:
     @property
     def expected_scans(self) -> int:
         """About how many will be used: for a progress bar."""
-        return self.options.use.window.expected(len(self.recording))
+        return self.options.use.window.expected(len(self.recording), self.recording.duration_s)
 
     def run(
         self, step_done: Callable[[], None] = lambda: None, listen: Listener = lambda step, estimate: None

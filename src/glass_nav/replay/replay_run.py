@@ -50,8 +50,8 @@ def run(
     window = Window() if window is None else window
     rows: List[_Row] = []
     refusals: "Counter[str]" = Counter()
-    scores = _Scores(recording, window.expected(len(recording)))
-    worst = _WorstScans(recording, window.expected(len(recording)))
+    scores = _Scores(recording, window.expected(len(recording), recording.duration_s))
+    worst = _WorstScans(recording, window.expected(len(recording), recording.duration_s))
     for entry in window.of(recording):
         if isinstance(entry, Refusal):
             refusals[entry.reason] += 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Iterable, Iterator, Optional
 
@@ -27,8 +28,11 @@ class Window:
         if self.max_scans is not None and self.max_scans < 1:
             raise ValueError(f"--max-scans must be >= 1, got {self.max_scans}")
 
-    def expected(self, scan_count: int) -> int:
-        """About how many of `scan_count` scans: for a progress bar."""
+    def expected(self, scan_count: int, log_s: Optional[float] = None) -> int:
+        """About how many of `scan_count` scans in `log_s`: for a progress bar."""
+        if log_s and (self.start_s > 0.0 or self.duration_s is not None):
+            end_s = log_s if self.duration_s is None else min(self.start_s + self.duration_s, log_s)
+            scan_count = math.ceil(scan_count * min(max(end_s - self.start_s, 0.0) / log_s, 1.0))
         count = -(-scan_count // self.every)
         return count if self.max_scans is None else min(count, self.max_scans)
 

@@ -17,6 +17,7 @@ from typing import Callable, List, Optional, Tuple, Union
 import numpy as np
 
 from glass_nav.log_line import LogLine
+from glass_nav.params import number
 from glass_nav.topology.atlas import atlas_file
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
@@ -39,8 +40,9 @@ class SessionParams:
     judge_by_scans: bool = True  # judge candidates by the scan at a meetpoint, where there are scans and a map
     search_at_start: bool = True  # with the first meetpoint; else when asked
     publish_initial_pose: bool = True
-    listed_candidates: int = 1000  # at most, with their poses
-    pairing_tolerance_s: float = 2.0  # [s] between the stamps of an edge traversal and its meetpoint
+    listed_candidates: int = number(1000, 1, 100_000)  # at most, with their poses
+    # [s] between the stamps of an edge traversal and its meetpoint
+    pairing_tolerance_s: float = number(2.0, 0.0, 100.0)
     visits_file: str = ""  # the atlas with its statistics is saved there; empty: nowhere
 
     def __post_init__(self) -> None:

@@ -37,3 +37,11 @@ def test_refused_scans_within_the_window_stay_in_it():
     entries = [entry(0), entry(1, "bad"), entry(2), entry(3, "worse"), entry(4)]
     assert [each.reason for each in Window(start_s=2.0).of(entries) if isinstance(each, Refusal)] == ["worse"]
     assert len(list(Window().of(entries))) == 5
+
+
+def test_a_part_of_the_time_has_that_part_of_the_scans():
+    assert Window(duration_s=10.0).expected(1000, 100.0) == 100
+    assert Window(start_s=90.0, duration_s=50.0).expected(1000, 100.0) == 100
+    assert Window(start_s=200.0).expected(1000, 100.0) == 0
+    assert Window(duration_s=10.0, every=3).expected(1000, 100.0) == 34
+    assert Window(duration_s=10.0).expected(1000, None) == 1000  # nobody knows how long the log is

@@ -22,6 +22,7 @@ import numpy as np
 from scipy import ndimage
 
 from glass_nav.geometry import angles, se2
+from glass_nav.params import number
 from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import UNKNOWN, GridMap
 
@@ -36,10 +37,10 @@ _LOOK_PER_ROOM = 1.9  # of a meetpoint r from its obstacles all ways show that a
 class LocalMapParams:
     """Lengths in metres."""
 
-    window_m: float = 20.0  # edge of the square around the robot
-    narrow_window_m: float = 12.0  # of it, so much is looked at in narrow places, more in wide ones
-    resolution_m: float = 0.05  # edge of a cell; that of the atlas' map
-    directions: int = 16  # of beams, told apart
+    window_m: float = number(20.0, 1.0, 100.0)  # edge of the square around the robot
+    narrow_window_m: float = number(12.0, 1.0, 100.0)  # of it, so much is looked at in narrow places, more in wide ones
+    resolution_m: float = number(0.05, 0.01, 1.0)  # edge of a cell; that of the atlas' map
+    directions: int = number(16, 1, 360)  # of beams, told apart
     least_ends: int = 2  # beams that must have ended in a cell from one direction ...
     least_share: float = 0.15  # ... and at least this share of those that came about that way
     unanswered_m: float = 4.0  # a beam that did not come back proves free space so far at most
@@ -240,8 +241,8 @@ class LocalMap:
             near = [(direction + off) % self._p.directions for off in (-1, 0, 1)]
             passed_there = self._passed[near].sum(axis=0, dtype=np.int64) > 1
             label, count = ndimage.label(ended[direction] & glass, beside)
-            for number, window in enumerate(ndimage.find_objects(label), start=1):
-                rows, columns = np.nonzero(label[window] == number)
+            for piece, window in enumerate(ndimage.find_objects(label), start=1):
+                rows, columns = np.nonzero(label[window] == piece)
                 if len(rows) < _MIN_PIECE:
                     continue
                 points = np.column_stack([columns + window[1].start, rows + window[0].start]).astype(float)

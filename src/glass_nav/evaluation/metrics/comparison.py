@@ -38,12 +38,12 @@ class Figure:
 
 
 FIGURES = (
-    Figure("position_mean_m", "position error, mean", "m", 1.0, 3, -1),
-    Figure("position_rmse_m", "position error, rms", "m", 1.0, 3, -1),
-    Figure("position_p95_m", "position error, 95 %", "m", 1.0, 3, -1),
-    Figure("yaw_mean_deg", "yaw error, mean", "deg", 1.0, 2, -1),
-    Figure("lost_share", "more than 0.5 m off", "%", 100.0, 2, -1),
-    Figure("localized_share", "reports LOCALIZED", "%", 100.0, 1, 1),
+    Figure("position_mean_m", "position error, mean", "m", 1.0, 4, -1),
+    Figure("position_rmse_m", "position error, rms", "m", 1.0, 4, -1),
+    Figure("position_p95_m", "position error, 95 %", "m", 1.0, 4, -1),
+    Figure("yaw_mean_deg", "yaw error, mean", "deg", 1.0, 3, -1),
+    Figure("lost_share", "more than 0.5 m off", "%", 100.0, 3, -1),
+    Figure("localized_share", "reports LOCALIZED", "%", 100.0, 2, 1),
     Figure("misleading_share", "misleading", "%", 100.0, 2, -1),
     Figure("misleading_max_s", "misleading, longest", "s", 1.0, 1, -1),
     Figure("misleading_max_m", "misleading, longest", "m", 1.0, 2, -1),
@@ -52,8 +52,8 @@ FIGURES = (
     Figure("level_ratio", "99.9 % level over error", "-", 1.0, 1, 0),
     Figure("time_to_alarm_s", "time to alarm, longest", "s", 1.0, 1, -1),
     Figure("time_back_s", "time back, longest", "s", 1.0, 1, -1),
-    Figure("case_accuracy", "beam cases right", "%", 100.0, 2, 1),
-    Figure("apart_mean_m", "distance from the first", "m", 1.0, 3, 0),
+    Figure("case_accuracy", "beam cases right", "%", 100.0, 3, 1),
+    Figure("apart_mean_m", "distance from the first", "m", 1.0, 4, 0),
     Figure("cpu_ms_per_scan", "CPU per scan", "ms", 1.0, 1, -1, timing=True),
 )
 BY_NAME = {figure.name: figure for figure in FIGURES}

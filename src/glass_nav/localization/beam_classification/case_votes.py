@@ -19,6 +19,7 @@ from glass_nav import _beam_vote
 from glass_nav.localization.beam_classification import glass_return_model
 from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, ExpectedRanges
 from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
+from glass_nav.params import choice, number
 from glass_nav.vocabulary import BeamCase
 
 VOTE_MODES = ("soft", "paper")
@@ -54,15 +55,16 @@ class BeamCases:
 class CaseVote:
     """How beams are classified."""
 
-    vote_mode: str = "soft"
-    case_gate_m: float = 0.15  # an expected range farther from the measured one gets no vote
-    case_min_share: float = 0.5  # of the vote; a case with less is uncertain
-    glass_max_thickness_m: float = 0.2  # a thicker run of occupied cells ends the beam
-    normal_min_linearity: float = 0.9
-    prior_uncertain: float = 0.1  # probability to meet what is not on the map
-    prior_uncertain_behind: float = 0.2  # the same behind a pane: rooms that have changed since, and outdoors
-    mirror_gain: float = 2.0  # how much more light panes mirror than clear glass does
-    neighbour_pull: float = 1.5  # log odds that equal cases of all neighbouring beams add
+    vote_mode: str = choice("soft", VOTE_MODES)
+    case_gate_m: float = number(0.15, 0.0, 10.0)  # an expected range farther from the measured one gets no vote
+    case_min_share: float = number(0.5, 0.0, 1.0)  # of the vote; a case with less is uncertain
+    glass_max_thickness_m: float = number(0.2, 0.0, 10.0)  # a thicker run of occupied cells ends the beam
+    normal_min_linearity: float = number(0.9, 0.0, 1.0)
+    prior_uncertain: float = number(0.1, 0.0, 1.0)  # probability to meet what is not on the map
+    # the same behind a pane: rooms that have changed since, and outdoors
+    prior_uncertain_behind: float = number(0.2, 0.0, 1.0)
+    mirror_gain: float = number(2.0, 0.0, 100.0)  # how much more light panes mirror than clear glass does
+    neighbour_pull: float = number(1.5, 0.0, 100.0)  # log odds that equal cases of all neighbouring beams add
 
     def __post_init__(self) -> None:
         if self.vote_mode not in VOTE_MODES:

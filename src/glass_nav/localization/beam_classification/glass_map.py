@@ -16,6 +16,7 @@ import numpy as np
 from glass_nav.localization.beam_classification import glass_return_model
 from glass_nav.localization.beam_classification.expected_ranges import ExpectedRanges
 from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
+from glass_nav.params import number
 from glass_nav.world.grid_map import UNKNOWN, GridMap
 
 _MIN_COS = 0.3  # at more grazing incidence a wall is passed or met by chance
@@ -59,9 +60,9 @@ def reach_m(residuals: RangeResiduals) -> float:
 class GlassEvidence:
     """How strong the evidence of one crossing is."""
 
-    glass_prior: float = 0.15  # prior probability that a wall cell can be seen through
-    glass_wall_leak: float = 0.03  # share of the beams that pass a solid wall: errors of map and pose
-    glass_memory: float = 6.0  # limit of the log odds that beams add: a door may be opened
+    glass_prior: float = number(0.15, 0.0, 1.0)  # prior probability that a wall cell can be seen through
+    glass_wall_leak: float = number(0.03, 0.0, 1.0)  # share of the beams that pass a solid wall: errors of map and pose
+    glass_memory: float = number(6.0, 0.0, 100.0)  # limit of the log odds that beams add: a door may be opened
 
     def __post_init__(self) -> None:
         for name in ("glass_prior", "glass_wall_leak"):

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from glass_nav.geometry import angles
+from glass_nav.params import number
 
 _RINGS = (1.0, 2.0)  # of the standard deviation
 _WIDEST = 2.0  # headings reach as far, in standard deviations
@@ -22,23 +23,23 @@ _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)  # multiples of it fill an interval evenly,
 class PreliminarySamples:
     """How many samples vote, and the limits of their distance from the predicted pose."""
 
-    sample_count: int = 37
-    sample_min_radius_m: float = 0.02
-    sample_min_heading_rad: float = 0.005
-    sample_max_radius_m: float = 0.5
-    sample_max_heading_rad: float = 0.35
+    sample_count: int = number(37, 1, 1000)
+    sample_min_radius_m: float = number(0.02, 0.0, 10.0)
+    sample_min_heading_rad: float = number(0.005, 0.0, 3.2)
+    sample_max_radius_m: float = number(0.5, 0.0, 10.0)
+    sample_max_heading_rad: float = number(0.35, 0.0, 3.2)
 
     def __post_init__(self) -> None:
         if not self.sample_count >= 1:
             raise ValueError(f"~sample_count must be >= 1, got {self.sample_count}")
         if not 0.0 < self.sample_min_radius_m <= self.sample_max_radius_m:
             raise ValueError(
-                f"~sample_min_radius_m must be in (0, sample_max_radius_m = "
+                f"~sample_min_radius_m must be in (0, ~sample_max_radius_m = "
                 f"{self.sample_max_radius_m}] m, got {self.sample_min_radius_m}"
             )
         if not 0.0 < self.sample_min_heading_rad <= self.sample_max_heading_rad:
             raise ValueError(
-                f"~sample_min_heading_rad must be in (0, sample_max_heading_rad = "
+                f"~sample_min_heading_rad must be in (0, ~sample_max_heading_rad = "
                 f"{self.sample_max_heading_rad}] rad, got {self.sample_min_heading_rad}"
             )
 

@@ -10,11 +10,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from glass_nav.geometry import angles
 from glass_nav.localization.bearings import inscribed_circles
 from glass_nav.sensing import bearing_model, bearings
 from glass_nav.world.landmark_map import LandmarkMap
 
 STEPS = (-1.0, -0.5, 0.0, 0.5, 1.0)  # of the document's tables
+MAX_STEP_DEG = 45.0
+_LEAST_STEP_RAD = 1e-6  # no emitter has such steps
 
 
 def step_sigma(step_rad: float) -> float:
@@ -32,14 +35,49 @@ def limits_of_error(landmarks_m: np.ndarray, point_m: np.ndarray, step_rad: floa
 
     Returns:
         (5, 5) [m]: by rows the angle between the first two is off by STEPS of step_rad, by columns the one between the
-        last two.
+        last two; inf where these angles fix no position.
+
+    Raises:
+        ValueError: two of the landmarks, or one and the robot, are at one place.
     """
     landmarks_m = np.asarray(landmarks_m, float)
+    places = np.vstack([landmarks_m, point_m])
+    if len(np.unique(places, axis=0)) < len(places):
+        raise ValueError(f"the three landmarks and the robot must be at four places, got {places.tolist()}")
     sight_m = landmarks_m - point_m
     first, second = np.meshgrid(np.array(STEPS) * step_rad, np.array(STEPS) * step_rad, indexing="ij")
     direction = np.arctan2(sight_m[:, 1], sight_m[:, 0]) + np.stack([-first, np.zeros_like(first), second], axis=-1)
     poses, _ = inscribed_circles.intersect(np.broadcast_to(landmarks_m, (25, 3, 2)), direction.reshape(25, 3))
-    return np.hypot(*(poses[:, :2] - point_m).T).reshape(5, 5)
+    error_m = np.hypot(*(poses[:, :2] - point_m).T).reshape(5, 5)
+    return np.where(np.isfinite(error_m), error_m, np.inf)
+
+
+def angles_between(landmarks_m: np.ndarray, point_m: np.ndarray) -> np.ndarray:
+    """(2,) angles from each of three landmarks (3, 2) to the next, as seen from a point (2,), in (-pi, pi]."""
+    sight_m = np.asarray(landmarks_m, float) - point_m
+    return angles.wrap(np.diff(np.arctan2(sight_m[:, 1], sight_m[:, 0])))
+
+
+def largest_step(landmarks_m: np.ndarray, point_m: np.ndarray, within_m: float) -> float:
+    """The largest step [rad] whose limits_of_error() stay within a limit; by bisection, at most MAX_STEP_DEG.
+
+    Raises:
+        ValueError: as limits_of_error(), or no step keeps the limit: the robot is on the circle through the landmarks.
+    """
+    low, high = 0.0, float(np.radians(MAX_STEP_DEG))
+    if limits_of_error(landmarks_m, point_m, high).max() <= within_m:
+        return high
+    while high - low > 1e-3 * high:
+        middle = 0.5 * (low + high)
+        if limits_of_error(landmarks_m, point_m, middle).max() <= within_m:
+            low = middle
+        else:
+            high = middle
+        if high < _LEAST_STEP_RAD:
+            raise ValueError(
+                f"no step keeps the error within {within_m:g} m: the robot is on the circle through the landmarks"
+            )
+    return low
 
 
 def covariance(landmarks: LandmarkMap, map_from_base: np.ndarray, sigma_rad: float) -> np.ndarray:

@@ -15,6 +15,7 @@ import numpy as np
 from glass_nav.hypotheses.global_search import Candidates
 from glass_nav.localization.integrity.kidnap_detector import Verdict
 from glass_nav.localization.particle_filter.pose_estimate import PoseEstimate
+from glass_nav.params import number
 from glass_nav.vocabulary import LocalizationState
 
 _POSSIBLE = 8.0  # log likelihood ratio of the best place to one that is still counted as possible
@@ -25,12 +26,12 @@ _LOST = 3.0  # log likelihood ratio of another place to the tracked pose
 class QualityLimits:
     """When a pose is trusted."""
 
-    localized_max_position_sigma_m: float = 0.3
-    localized_max_heading_sigma_rad: float = 0.2
-    localized_min_cluster_share: float = 0.8
-    uncertain_used_share: float = 0.4  # of the beams that say something explained, mean of the last updates
-    lost_used_share: float = 0.2
-    localized_min_reliability: float = 0.7  # chance that the pose is right
+    localized_max_position_sigma_m: float = number(0.3, 0.0, 1000.0)
+    localized_max_heading_sigma_rad: float = number(0.2, 0.0, 10.0)
+    localized_min_cluster_share: float = number(0.8, 0.0, 1.0)
+    uncertain_used_share: float = number(0.4, 0.0, 1.0)  # of the beams that say something explained
+    lost_used_share: float = number(0.2, 0.0, 1.0)
+    localized_min_reliability: float = number(0.7, 0.0, 1.0)  # chance that the pose is right
 
     def __post_init__(self) -> None:
         for name in ("localized_max_position_sigma_m", "localized_max_heading_sigma_rad"):

@@ -19,6 +19,7 @@ import numpy as np
 from glass_nav.geometry import angles
 from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, cos_incidence
 from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
+from glass_nav.params import choice, number
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.vocabulary import BeamCase
@@ -30,13 +31,13 @@ WEIGHT_MODES = ("field", "ranges")
 class BeamMixture:
     """How often a beam ends where its case says, and how sharply; AMCL's names where it has them."""
 
-    weight_mode: str = "field"
-    laser_max_beams: int = 720
-    laser_z_hit: float = 0.95
-    laser_z_rand: float = 0.05
-    laser_sigma_hit: float = 0.04  # [m] across the surface, lidar and map together; at least
-    laser_sigma_hit_max: float = 0.2  # [m] at most: the filter learns how well map and lidar agree
-    laser_independent_beams: float = 80.0
+    weight_mode: str = choice("field", WEIGHT_MODES)
+    laser_max_beams: int = number(720, 2, 10_000)
+    laser_z_hit: float = number(0.95, 0.0, 100.0)
+    laser_z_rand: float = number(0.05, 0.0, 100.0)
+    laser_sigma_hit: float = number(0.04, 0.0, 10.0)  # [m] across the surface, lidar and map together; at least
+    laser_sigma_hit_max: float = number(0.2, 0.0, 10.0)  # [m] at most: the filter learns how well map and lidar agree
+    laser_independent_beams: float = number(80.0, 0.0, 1e4)
 
     def __post_init__(self) -> None:
         if self.weight_mode not in WEIGHT_MODES:

@@ -14,6 +14,7 @@ from typing import Tuple
 import numpy as np
 
 from glass_nav.geometry import angles, se2
+from glass_nav.params import choice, number
 
 MODELS = ("diff", "omni", "diff-corrected", "omni-corrected")
 _ON_THE_SPOT_M = 0.01  # below this distance the direction of travel is noise
@@ -23,12 +24,12 @@ _ON_THE_SPOT_M = 0.01  # below this distance the direction of travel is noise
 class OdometryNoise:
     """How wrong odometry is; the names and meanings are AMCL's."""
 
-    odom_model_type: str = "diff-corrected"
-    odom_alpha1: float = 0.02  # turn from turn (variance [rad2/rad2] in the corrected models)
-    odom_alpha2: float = 0.01  # turn from distance [rad2/m2]
-    odom_alpha3: float = 0.02  # distance from distance [m2/m2]
-    odom_alpha4: float = 0.01  # distance from turn [m2/rad2]
-    odom_alpha5: float = 0.02  # sideways from distance, omni only [m2/m2]
+    odom_model_type: str = choice("diff-corrected", MODELS)
+    odom_alpha1: float = number(0.02, 0.0, 100.0)  # turn from turn (variance [rad2/rad2] in the corrected models)
+    odom_alpha2: float = number(0.01, 0.0, 100.0)  # turn from distance [rad2/m2]
+    odom_alpha3: float = number(0.02, 0.0, 100.0)  # distance from distance [m2/m2]
+    odom_alpha4: float = number(0.01, 0.0, 100.0)  # distance from turn [m2/rad2]
+    odom_alpha5: float = number(0.02, 0.0, 100.0)  # sideways from distance, omni only [m2/m2]
 
     def __post_init__(self) -> None:
         if self.odom_model_type not in MODELS:

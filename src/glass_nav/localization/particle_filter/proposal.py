@@ -18,6 +18,7 @@ from glass_nav.geometry import angles
 from glass_nav.hypotheses.scan_alignment import Alignment
 from glass_nav.localization.particle_filter import resampling
 from glass_nav.localization.particle_filter.pose_estimate import PoseEstimate
+from glass_nav.params import number
 
 _MIN_DEVIATION = np.array([0.01, 0.01, np.radians(0.2)])  # of odometry: m, m, rad
 _SLIP_DEVIATION = np.array([0.3, 0.3, np.radians(30.0)])  # a wheel that slipped, a robot that was pushed
@@ -27,10 +28,10 @@ _SLIP_DEVIATION = np.array([0.3, 0.3, np.radians(30.0)])  # a wheel that slipped
 class Proposal:
     """How particles are shared between odometry and scan."""
 
-    proposal_scan_share: float = 0.5  # of the particles drawn around aligned poses; 0 turns it off
-    proposal_max_beams: int = 90
-    proposal_min_cluster_share: float = 0.5  # below it the cloud has no single place to align from
-    odom_slip_probability: float = 0.001  # that a step of odometry is useless
+    proposal_scan_share: float = number(0.5, 0.0, 1.0)  # of the particles drawn around aligned poses; 0 turns it off
+    proposal_max_beams: int = number(90, 2, 10_000)
+    proposal_min_cluster_share: float = number(0.5, 0.0, 1.0)  # below it the cloud has no single place to align from
+    odom_slip_probability: float = number(0.001, 0.0, 1.0)  # that a step of odometry is useless
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.proposal_scan_share < 1.0:

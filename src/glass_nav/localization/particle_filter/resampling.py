@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glass_nav.params import number
+
 _BIN = np.array([0.5, 0.5, np.radians(10.0)])  # AMCL's: m, m, rad
 
 
@@ -17,15 +19,17 @@ _BIN = np.array([0.5, 0.5, np.radians(10.0)])  # AMCL's: m, m, rad
 class ParticleCount:
     """How many particles; the names and meanings are AMCL's."""
 
-    min_particles: int = 300
-    max_particles: int = 5000
-    kld_err: float = 0.01  # largest error between the true and the estimated distribution
-    kld_z: float = 0.99  # upper normal quantile of the probability that the error is below kld_err
+    min_particles: int = number(300, 1, 100_000)
+    max_particles: int = number(5000, 1, 100_000)
+    kld_err: float = number(0.01, 1e-6, 1.0)  # largest error between the true and the estimated distribution
+    kld_z: float = number(0.99, 0.0, 10.0)  # upper normal quantile of the probability that the error is below kld_err
 
     def __post_init__(self) -> None:
+        if not self.max_particles >= 1:
+            raise ValueError(f"~max_particles must be >= 1, got {self.max_particles}")
         if not 1 <= self.min_particles <= self.max_particles:
             raise ValueError(
-                f"~min_particles must be in [1, max_particles = {self.max_particles}], got {self.min_particles}"
+                f"~min_particles must be in [1, ~max_particles = {self.max_particles}], got {self.min_particles}"
             )
         if not self.kld_err > 0.0:
             raise ValueError(f"~kld_err must be > 0, got {self.kld_err}")

@@ -51,7 +51,7 @@ from glass_nav.msg import (
     TurnChoice,
 )
 from glass_nav.rate_limiter import RateLimiter
-from glass_nav.ros import action_status, conversions, shutdown
+from glass_nav.ros import action_status, command_line, conversions, shutdown
 from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.driver import driver_displays, driver_messages
 from glass_nav.ros.driver.driver_params import MOVE_BASE, DriverParams
@@ -333,6 +333,8 @@ def _call_restart_search() -> None:
 
 def main() -> None:
     """Start the node; exit code 2 if a parameter cannot be used, 3 if the atlas cannot."""
+    if command_line.answers_help(__doc__):
+        return
     shutdown.run_node(
         "driver", lambda given: DriverNode(params.load(DriverParams, given, rospy.get_name())), (AtlasError, OSError)
     )

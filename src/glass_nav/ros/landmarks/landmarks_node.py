@@ -36,7 +36,7 @@ from glass_nav.localization.bearings.landmark_fixes import FixParams, LandmarkFi
 from glass_nav.localization.bearings.triangulation import TriangulationLimits
 from glass_nav.msg import LandmarkBearings as LandmarkBearingsMsg
 from glass_nav.msg import LocalizationStatus
-from glass_nav.ros import conversions, mailbox, shutdown
+from glass_nav.ros import command_line, conversions, mailbox, shutdown
 from glass_nav.ros.landmarks import bearing_messages, landmark_display
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
@@ -253,6 +253,8 @@ class LandmarksNode:
 
 def main() -> None:
     """Start the node; exit code 2 if a parameter or the landmark file cannot be used."""
+    if command_line.answers_help(__doc__):
+        return
     shutdown.run_node(
         "landmarks", lambda given: LandmarksNode(params.load(LandmarksNodeParams, given, rospy.get_name()))
     )

@@ -44,7 +44,7 @@ from glass_nav.localization.health import LocalizationHealth, Situation
 from glass_nav.localization.pose_memory import PoseMemory
 from glass_nav.localization.saved_pose import SavedPose
 from glass_nav.localization.session import Inputs, LocalizationSession
-from glass_nav.ros import conversions, mailbox, shutdown
+from glass_nav.ros import command_line, conversions, mailbox, shutdown
 from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.landmarks.bearing_messages import LONGEST_TURN_S
 from glass_nav.ros.localization import params, reconfigure
@@ -327,6 +327,8 @@ def _parameter_file() -> Optional[Path]:
 
 def main(name: str = "glass_localization") -> None:
     """Start the node; exit code 2 if a parameter or the landmark file is unusable."""
+    if command_line.answers_help(__doc__):
+        return
     rospy.init_node(name, disable_signals=True)
     if "--run-from-bag" in rospy.myargv():
         rospy.logfatal(
@@ -337,9 +339,11 @@ def main(name: str = "glass_localization") -> None:
     ending = shutdown.event_on_signals()
     shutdown.core_logs_to_rosout()
     given: Dict[str, Any] = rospy.get_param("~", {})
-    unknown: List[str] = []
+    ignored: List[str] = []
     if name == "amcl":
         given, unknown = params.without_unknown(given, rospy.get_name())
+        given, wrong = params.as_amcl_reads(given, rospy.get_name())
+        ignored = unknown + wrong
     try:
         p, unused = params.localization_params(given, rospy.get_name())
     except params.ParamError as err:
@@ -348,7 +352,7 @@ def main(name: str = "glass_localization") -> None:
         node = LocalizationNode(p)
     except landmark_file.LandmarkError as err:
         shutdown.refuse_to_start(err)
-    for line in unknown:
+    for line in ignored:
         rospy.logwarn(line)
     if unused:
         rospy.loginfo(f"parameters of amcl that this filter does not use: ~{', ~'.join(unused)}")

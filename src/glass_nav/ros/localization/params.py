@@ -17,9 +17,10 @@ import numpy as np
 from glass_nav import amcl_parameters, params
 from glass_nav.localization.initial_pose import StartPose, StartRules
 from glass_nav.localization.localizer_params import LocalizerParams
+from glass_nav.localization.particle_filter.motion import MODELS
 from glass_nav.localization.saved_pose import PoseFile
 from glass_nav.localization.session import SessionParams
-from glass_nav.params import ParamError
+from glass_nav.params import ParamError, number
 from glass_nav.sensing.deskew import Deskew
 
 __all__ = ["LocalizationNodeParams", "LocalizationParams", "ParamError", "localization_params"]
@@ -35,16 +36,17 @@ class LocalizationNodeParams:
     scan_topics: Tuple[str, ...] = ()  # of several lidars; empty: scan
     tf_broadcast: bool = True
     publish_tf_before_localized: bool = True  # False: map -> odom is published once the state has been LOCALIZED
-    transform_tolerance: float = 0.1  # [s] how far ahead of the scan map -> odom is stamped
-    transform_wait_s: float = 1.0  # [s] how long a scan waits for odom <- base <- laser
+    transform_tolerance: float = number(0.1, 0.0, 100.0)  # [s] how far ahead of the scan map -> odom is stamped
+    transform_wait_s: float = number(1.0, 0.0, 100.0)  # [s] how long a scan waits for odom <- base <- laser
     use_map_topic: bool = False
     first_map_only: bool = False
-    gui_publish_rate: float = -1.0  # [Hz] of particlecloud, ~beam_cloud, ~beam_markers; <= 0: no limit
-    glass_map_period_s: float = 2.0  # [s] shortest time between messages of ~glass_map
-    save_pose_rate: float = 0.5  # [Hz]; <= 0: only at shutdown
-    std_warn_level_x: float = 0.2  # [m]
-    std_warn_level_y: float = 0.2  # [m]
-    std_warn_level_yaw: float = 0.1  # [rad]
+    # [Hz] of particlecloud, ~beam_cloud, ~beam_markers; <= 0: no limit
+    gui_publish_rate: float = number(-1.0, -1.0, 1000.0)
+    glass_map_period_s: float = number(2.0, 0.0, 3600.0)  # [s] shortest time between messages of ~glass_map
+    save_pose_rate: float = number(0.5, -1.0, 1000.0)  # [Hz]; <= 0: only at shutdown
+    std_warn_level_x: float = number(0.2, 0.0, 1e6)  # [m]
+    std_warn_level_y: float = number(0.2, 0.0, 1e6)  # [m]
+    std_warn_level_yaw: float = number(0.1, 0.0, 1e6)  # [rad]
     landmark_file: str = ""  # landmarks.yaml; "": bearings are not used
 
     def __post_init__(self) -> None:
@@ -142,6 +144,34 @@ def localization_params(mapping: Mapping[str, Any], owner: str) -> Tuple[Localiz
     """
     ours, unused = amcl_parameters.without_unused(mapping, LocalizationParams)
     return params.load(LocalizationParams, amcl_parameters.adapted(ours, LocalizationParams), owner), unused
+
+
+def as_amcl_reads(mapping: Mapping[str, Any], owner: str) -> Tuple[Dict[str, Any], List[str]]:
+    """The mapping without the values that amcl ignores, and a line on each of them.
+
+    As roscpp reads parameters: one of another type counts as not set, a number for a count is rounded. AMCL also ignores
+    an initial pose of NaN, and takes an odometry model that it does not know for diff.
+    """
+    defaults = params.as_mapping(LocalizationParams())
+    kept: Dict[str, Any] = {}
+    lines: List[str] = []
+    for name, value in mapping.items():
+        fault = params.type_fault(LocalizationParams, name, value)
+        if type(value) is float and math.isnan(value) and name.startswith("initial_"):
+            fault = f"~{name} must be finite, got {value}"
+        elif type(value) is float and math.isfinite(value) and type(defaults.get(name)) is int:
+            kept[name] = math.floor(value + 0.5)
+            lines += [f"{owner}: {fault}; rounded to {kept[name]}, as by amcl"] if fault else []
+            continue
+        elif name == "odom_model_type" and not fault and value not in MODELS:
+            kept[name] = MODELS[0]
+            lines.append(f"{owner}: ~{name} must be one of {', '.join(MODELS)}, got {value!r}; {MODELS[0]}, as by amcl")
+            continue
+        if fault:
+            lines.append(f"{owner}: {fault}; not used, as by amcl: the default is {defaults[name]!r}")
+        else:
+            kept[name] = value
+    return kept, lines
 
 
 def without_unknown(mapping: Mapping[str, Any], owner: str) -> Tuple[Dict[str, Any], List[str]]:

@@ -11,7 +11,7 @@ import re
 import threading
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Callable, Dict, List, Mapping, Optional
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence
 
 import rospy
 from dynamic_reconfigure.encoding import encode_config, encode_description
@@ -19,37 +19,43 @@ from dynamic_reconfigure.msg import Config, ConfigDescription
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest, ReconfigureResponse
 
 from glass_nav import amcl_parameters, params
-from glass_nav.localization.beam_classification.case_votes import VOTE_MODES
-from glass_nav.localization.particle_filter.importance_weights import WEIGHT_MODES
-from glass_nav.localization.particle_filter.motion import MODELS
 from glass_nav.params import ParamError
+from glass_nav.ros.localization.params import LocalizationParams
 
 RESTORE = "restore_defaults"  # AMCL's: back to the values at the start
-CHOICES = {"vote_mode": VOTE_MODES, "weight_mode": WEIGHT_MODES, "odom_model_type": MODELS}
 _TYPES = {bool: "bool", int: "int", float: "double", str: "str"}
 _UNBOUNDED = {bool: (False, True), int: (-(2**31), 2**31 - 1), float: (float("-inf"), float("inf")), str: ("", "")}
 _EXPLAINED = re.compile(r"(\w+):.*?\s#\s*(.*)")
+_SECTION = re.compile(r"# -- (.+)")
 
 Apply = Callable[[Dict[str, Any]], None]
+
+
+class Explained(NamedTuple):
+    """What a parameter file of ours says of a parameter."""
+
+    section: str
+    comment: str
 
 
 class ReconfigureServer:
     """The parameters by name, and the service that changes them."""
 
-    def __init__(self, values: Mapping[str, Any], descriptions: Mapping[str, str], apply: Apply) -> None:
+    def __init__(self, values: Mapping[str, Any], explained: Mapping[str, Explained], apply: Apply) -> None:
         """
         Args:
             values: name -> value of those that can be changed: bool, int, float or str.
-            descriptions: their meanings, as far as known.
+            explained: their groups and meanings, as far as known.
             apply: called by other threads with all values; raises ValueError for invalid ones.
         """
         self._lock = threading.Lock()
         self._values = dict(values)
         self._started_with = dict(values)
         self._apply = apply
+        self._groups = _groups(self._values, explained)
         self._descriptions = rospy.Publisher("~parameter_descriptions", ConfigDescription, queue_size=1, latch=True)
         self._updates = rospy.Publisher("~parameter_updates", Config, queue_size=1, latch=True)
-        self._descriptions.publish(description_msg({**values, RESTORE: False}, descriptions))
+        self._descriptions.publish(description_msg({**values, RESTORE: False}, explained))
         self._publish()
         rospy.Service("~set_parameters", Reconfigure, self._serve)
 
@@ -85,43 +91,37 @@ class ReconfigureServer:
 
     def _publish(self) -> Config:
         """Publish the values in effect."""
-        msg = encode_config({**self._values, RESTORE: False, "groups": _GROUP})
+        msg = config_msg({**self._values, RESTORE: False}, self._groups)
         self._updates.publish(msg)
         return msg
 
 
-_GROUP: Dict[str, Any] = {
-    "name": "Default",
-    "type": "",
-    "state": True,
-    "cstate": "true",
-    "id": 0,
-    "parent": 0,
-    "parameters": [],
-    "groups": {},
-}
-
-
-def description_msg(values: Mapping[str, Any], descriptions: Mapping[str, str]) -> ConfigDescription:
-    """What can be changed, for the clients. No bounds: clients would clamp a value that the node should reject."""
-    group: Dict[str, Any] = dict(
-        _GROUP,
-        groups=[],
-        parameters=[
+def description_msg(values: Mapping[str, Any], explained: Mapping[str, Explained]) -> ConfigDescription:
+    """What can be changed, for the clients: types, limits, choices, groups."""
+    limits, choices = params.limits(LocalizationParams), params.choices(LocalizationParams)
+    bounds = {
+        name: tuple(type(value)(limit) for limit in limits.get(name, _UNBOUNDED[type(value)]))
+        for name, value in values.items()
+    }
+    of_group: Dict[str, List[Dict[str, Any]]] = {}
+    for name, value in values.items():
+        section, comment = explained.get(name, Explained("", ""))
+        of_group.setdefault(section, []).append(
             {
                 "name": name,
                 "type": _TYPES[type(value)],
                 "level": 0,
-                "description": descriptions.get(name, ""),
-                "edit_method": _edit_method(name),
+                "description": comment,
+                "edit_method": _edit_method(name, choices[name]) if name in choices else "",
             }
-            for name, value in values.items()
-        ],
-    )
-    bounds = {name: _UNBOUNDED[type(value)] for name, value in values.items()}
+        )
+    groups = [
+        {**_group(section, number), "parameters": of_group[section], "groups": []}
+        for number, section in enumerate(_groups(values, explained), start=1)
+    ]
     return encode_description(
         SimpleNamespace(
-            config_description=group,
+            config_description={**_group("Default", 0), "parameters": of_group.get("", []), "groups": groups},
             defaults=dict(values),
             min={name: low for name, (low, _) in bounds.items()},
             max={name: high for name, (_, high) in bounds.items()},
@@ -129,13 +129,26 @@ def description_msg(values: Mapping[str, Any], descriptions: Mapping[str, str]) 
     )
 
 
-def _edit_method(name: str) -> str:
+def config_msg(values: Mapping[str, Any], groups: List[str]) -> Config:
+    """The values in effect, and the groups, all of which are open."""
+    tree = {section: {**_group(section, number), "groups": {}} for number, section in enumerate(groups, start=1)}
+    return encode_config({**values, "groups": {**_group("Default", 0), "groups": tree}})
+
+
+def _groups(values: Mapping[str, Any], explained: Mapping[str, Explained]) -> List[str]:
+    """The sections of the parameter file that these values are of, in its order."""
+    return list(dict.fromkeys(each.section for name, each in explained.items() if each.section and name in values))
+
+
+def _group(name: str, number: int) -> Dict[str, Any]:
+    return {"name": name, "type": "", "state": True, "cstate": "true", "id": number, "parent": 0}
+
+
+def _edit_method(name: str, choices: Sequence[str]) -> str:
     """For rqt_reconfigure: the possible values, as the Python text that it evaluates."""
-    if name not in CHOICES:
-        return ""
     return str(
         {
-            "enum": [{"name": choice, "value": choice, "type": "str", "description": ""} for choice in CHOICES[name]],
+            "enum": [{"name": choice, "value": choice, "type": "str", "description": ""} for choice in choices],
             "enum_description": name,
         }
     )
@@ -150,18 +163,23 @@ def _values_from_msg(msg: Config) -> Dict[str, Any]:
     }
 
 
-def explanations(path: Optional[Path]) -> Dict[str, str]:
-    """Name -> comment in a parameter file of ours, `name: value  # comment`, continued in lines with only a comment."""
+def explanations(path: Optional[Path]) -> Dict[str, Explained]:
+    """Name -> what a parameter file of ours says: `name: value  # comment`, continued in lines with only a comment, below
+    the line `# -- section`.
+    """
     if path is None or not path.is_file():
         return {}
-    found: Dict[str, List[str]] = {}
-    last: List[str] = []
+    found: Dict[str, Explained] = {}
+    section = last = ""
     for line in path.read_text(encoding="utf-8").splitlines():
-        match = _EXPLAINED.match(line)
-        if match:
-            last = found.setdefault(match.group(1), [match.group(2).strip()])
-        elif line.startswith("    ") and line.strip().startswith("#"):
-            last.append(line.strip("# "))
+        heading, match = _SECTION.match(line), _EXPLAINED.match(line)
+        if heading:
+            section, last = heading.group(1).strip(), ""
+        elif match:
+            last = match.group(1)
+            found[last] = Explained(section, match.group(2).strip())
+        elif last and line.startswith("    ") and line.strip().startswith("#"):
+            found[last] = Explained(section, f"{found[last].comment} {line.strip('# ')}")
         else:
-            last = []
-    return {name: " ".join(lines) for name, lines in found.items()}
+            last = ""
+    return found

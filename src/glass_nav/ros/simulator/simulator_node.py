@@ -33,7 +33,7 @@ from tf2_msgs.msg import TFMessage
 
 from glass_nav import params
 from glass_nav.msg import LandmarkBearings, TrueBeams
-from glass_nav.ros import conversions, shutdown
+from glass_nav.ros import command_line, conversions, shutdown
 from glass_nav.ros.landmarks import bearing_messages
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.mailbox import Mailbox
@@ -312,6 +312,8 @@ def _drive(p: SimulatorNodeParams) -> _Drive:
 
 def main() -> None:
     """Start the node; exit code 2 if a parameter cannot be used."""
+    if command_line.answers_help(__doc__):
+        return
     shutdown.run_node(
         "simulator", lambda given: SimulatorNode(params.load(SimulatorNodeParams, given, rospy.get_name()))
     )

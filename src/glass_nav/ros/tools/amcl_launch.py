@@ -14,14 +14,19 @@ from pathlib import Path
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import roslaunch.core
-import roslaunch.loader
+import roslaunch.substitution_args
 import roslaunch.xmlloader
 import rospkg
 import yaml
 from roslaunch.config import ROSLaunchConfig
 
 from glass_nav import amcl_parameters, params
-from glass_nav.ros.localization.params import LocalizationParams, localization_params, without_unknown
+from glass_nav.ros.localization.params import (
+    LocalizationParams,
+    as_amcl_reads,
+    localization_params,
+    without_unknown,
+)
 
 DONE, BAD_INPUT = 0, 3
 KINDS = ("amcl", "localization_node")  # programs whose parameters these are
@@ -63,6 +68,42 @@ class AmclNode:
     remaps: "List[Tuple[str, str]]"
 
 
+class _Loader(roslaunch.xmlloader.XmlLoader):  # type: ignore[misc]
+    """roslaunch's own, which says of every fault in which file it is, also below includes."""
+
+    ignore_unset_args = False  # some versions read it without setting it
+
+    def _parse_launch(self, filename: str, verbose: bool) -> Any:
+        if not Path(filename).is_file():
+            raise LaunchError(f"{filename}: does not exist")
+        try:
+            return super()._parse_launch(filename, verbose)
+        except roslaunch.xmlloader.XmlParseException as err:
+            cause = err.__context__ if isinstance(err.__context__, RecursionError) else err
+            raise LaunchError(f"{filename}: {_reason(cause)}") from err
+
+    def _recurse_load(self, ros_config: Any, tags: Any, context: Any, *others: Any) -> Any:
+        try:
+            return super()._recurse_load(ros_config, tags, context, *others)
+        except LaunchError:
+            raise
+        except roslaunch.substitution_args.ArgException as err:
+            raise LaunchError(f"{context.filename}: needs the arg {str(err)!r}, give {err}:=VALUE") from err
+        except Exception as err:
+            raise LaunchError(f"{context.filename}: {_reason(err)}") from err
+
+
+def _reason(err: Exception) -> str:
+    """What an error of roslaunch says, in one line."""
+    if isinstance(err, rospkg.ResourceNotFound):
+        return f"$(find {err.args[0]}): there is no such package"
+    if isinstance(err, KeyError):
+        return f"a tag lacks the attribute {err}"
+    if isinstance(err, RecursionError):
+        return "is included by itself"
+    return " ".join(str(err).split()) or type(err).__name__
+
+
 def nodes(path: Path, arguments: Sequence[str] = ()) -> List[AmclNode]:
     """The amcl nodes that a launch file starts.
 
@@ -77,14 +118,9 @@ def nodes(path: Path, arguments: Sequence[str] = ()) -> List[AmclNode]:
         raise LaunchError(f"{path}: does not exist")
     config = ROSLaunchConfig()
     try:
-        roslaunch.xmlloader.XmlLoader(resolve_anon=True).load(str(path), config, argv=list(arguments), verbose=False)
-    except (
-        roslaunch.core.RLException,
-        roslaunch.loader.LoadException,
-        roslaunch.xmlloader.XmlParseException,
-        rospkg.ResourceNotFound,
-    ) as err:
-        raise LaunchError(f"{path}: {' '.join(str(err).split())}") from err
+        _Loader(resolve_anon=True).load(str(path), config, argv=list(arguments), verbose=False)
+    except roslaunch.core.RLException as err:  # of the arguments
+        raise LaunchError(f"{path}: {_reason(err)}") from err
     found = []
     for node in config.nodes:
         if node.type in KINDS:
@@ -122,6 +158,9 @@ def explained(node: AmclNode, source: str) -> str:
         ParamError: a value that the node would reject.
     """
     known, unknown = without_unknown(node.values, source)
+    ignored: List[str] = []
+    if node.program.endswith("/amcl"):
+        known, ignored = as_amcl_reads(known, source)
     localization_params(known, source)  # the node would reject it, too
     taken, unused = amcl_parameters.without_unused(known, LocalizationParams)
     adapted = amcl_parameters.adapted(taken, LocalizationParams)
@@ -142,6 +181,9 @@ def explained(node: AmclNode, source: str) -> str:
     if unknown:
         lines += ["# names that neither amcl nor this node knows; amcl takes no notice of them either:"]
         lines += [f"# {line.partition(': ')[2].partition(';')[0]}" for line in unknown]
+    if ignored:
+        lines += ["# values that amcl does not read:"]
+        lines += [f"# {line.partition(': ')[2]}" for line in ignored]
     if node.remaps:
         lines += ["# remaps stay in the launch file: " + ", ".join(f"{old} -> {new}" for old, new in node.remaps)]
     return "\n".join(lines)

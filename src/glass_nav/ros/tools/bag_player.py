@@ -13,13 +13,15 @@ import time
 import rospy
 from std_srvs.srv import Empty
 
-from glass_nav.ros import shutdown
+from glass_nav.ros import command_line, shutdown
 
 ASK_PERIOD_S = 0.2
 
 
 def main() -> None:
     """Wait, then play; exit code 2 for an invalid ~wait_s."""
+    if command_line.answers_help(__doc__):
+        return
     rospy.init_node("player", disable_signals=True)
     wait_s = rospy.get_param("~wait_s", 60.0)
     if isinstance(wait_s, bool) or not isinstance(wait_s, (int, float)) or not wait_s >= 0.0:

@@ -12,7 +12,7 @@ from typing import Any, List
 
 import rospy
 
-from glass_nav.ros import conversions
+from glass_nav.ros import command_line, conversions
 from glass_nav.ros.tools.served_map import ServedMap
 from glass_nav.world import map_file
 
@@ -50,6 +50,8 @@ class MapNode:
 
 def main() -> None:
     """Start the node; exit code 2 without a file name, 3 if the file is not a map."""
+    if command_line.answers_help(__doc__):
+        return
     rospy.init_node("map_node")
     arguments: List[str] = rospy.myargv()[1:]
     path = rospy.get_param("~map_file", arguments[0] if len(arguments) == 1 else "")

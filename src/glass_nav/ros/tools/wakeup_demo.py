@@ -37,7 +37,7 @@ from glass_nav.msg import (
     TopologyCandidates,
     TopologyStatus,
 )
-from glass_nav.ros import conversions, shutdown
+from glass_nav.ros import command_line, conversions, shutdown
 from glass_nav.ros.mailbox import Mailbox
 from glass_nav.ros.topology import topology_messages
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
@@ -154,6 +154,8 @@ def _stamp_ns(msg: Any) -> int:
 
 def main() -> None:
     """Start; see the exit codes above."""
+    if command_line.answers_help(__doc__):
+        return
     rospy.init_node("wakeup_demo", disable_signals=True)
     ending = shutdown.event_on_signals()
     given: Dict[str, Any] = rospy.get_param("~", {})

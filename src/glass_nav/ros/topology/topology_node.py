@@ -44,7 +44,7 @@ from glass_nav.msg import (
     TopologyStatus,
     TurnChoice,
 )
-from glass_nav.ros import action_status, conversions, legend, mailbox, shutdown
+from glass_nav.ros import action_status, command_line, conversions, legend, mailbox, shutdown
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
@@ -265,6 +265,8 @@ class TopologyNode:
 
 def main() -> None:
     """Start the node; exit code 2 if a parameter cannot be used, 3 if the atlas cannot, see ~end_without_atlas too."""
+    if command_line.answers_help(__doc__):
+        return
     shutdown.run_node(
         "topology",
         lambda given: TopologyNode(params.load(TopologyParams, given, rospy.get_name())),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from glass_nav.hypotheses.followed_poses import MAX_LEAD
+from glass_nav.params import choice, number
 from glass_nav.topology.search.edge_segments import SegmentTest
 from glass_nav.topology.search.matching import Tolerances
 
@@ -15,15 +16,16 @@ VOTE_MODES = ("best", "seed")
 class SearchParams:
     """How the search is done."""
 
-    vote_mode: str = "best"  # best: fewest expected survivors; seed: the document's procedure
+    vote_mode: str = choice("best", VOTE_MODES)  # best: fewest expected survivors; seed: the document's procedure
     confirm_edges: int = 2  # edges that must match after one candidate is left
     max_detection_errors: int = 2  # missed or spurious meetpoints; not with vote_mode seed
     use_edge_angles: bool = True  # as evidence; not with vote_mode seed
     tolerances: Tolerances = field(default_factory=Tolerances)
     segments: SegmentTest = field(default_factory=SegmentTest)
     least_explained: float = 0.6  # share of a scan that the map must explain from a candidate; where scans are judged
-    searches: int = 6  # before LOST: another one begins where nothing matches any more; where scans are judged
-    follow_places: int = 4  # places whose scans a followed pose must explain; 0: no pose is followed
+    # before LOST: another one begins where nothing matches any more; where scans are judged
+    searches: int = number(6, 1, 1000)
+    follow_places: int = number(4, 0, 1000)  # places whose scans a followed pose must explain; 0: no pose is followed
     follow_lead: float = 0.15  # by which the best followed pose must lead, in the mean share of the scans
 
     def __post_init__(self) -> None:

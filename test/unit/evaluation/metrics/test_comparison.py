@@ -112,12 +112,12 @@ def test_a_filter_that_diverged_is_infinitely_far_off_and_no_interval_is_told():
 @pytest.mark.parametrize(
     "interval, text",
     [
-        (Interval(0.1234, 0.0456), "0.123 ± 0.046"),
-        (Interval(0.1234, None), "0.123"),
+        (Interval(0.1234, 0.0456), "0.1234 ± 0.0456"),
+        (Interval(0.1234, None), "0.1234"),
         (None, "–"),
-        (Interval(-0.00001, 0.01), "0.000 ± 0.010"),
-        (Interval(0.12345, 0.00012), "0.1235 ± 0.0001"),
-        (Interval(0.5, 1e-9), "0.500 ± 0.000"),
+        (Interval(-0.00001, 0.01), "0.0000 ± 0.0100"),
+        (Interval(0.123456, 0.000012), "0.12346 ± 0.00001"),
+        (Interval(0.5, 1e-9), "0.5000 ± 0.0000"),
     ],
 )
 def test_digits_go_as_far_as_the_interval(interval, text):

@@ -38,9 +38,7 @@ def around_origin(ranges_m, first_deg, second_deg):
     "ranges_m, first_deg, second_deg, table_cm, within_cm",
     [
         pytest.param((8.563, 7.937, 7.573), 46.0, 54.0, TABLE_1, 0.1, id="table 1"),
-        pytest.param(
-            (8.6214, 8.7215, 10.2165), 35.0, 29.0, TABLE_2, 0.11, id="table 2, ranges fitted: not in the document"
-        ),
+        pytest.param((8.592, 8.711, 10.210), 35.0, 29.0, TABLE_2, 0.15, id="table 2"),
     ],
 )
 def test_the_tables_of_the_document_are_met_in_every_cell(ranges_m, first_deg, second_deg, table_cm, within_cm):
@@ -63,6 +61,29 @@ def test_a_table_of_another_geometry_is_what_solving_the_two_angles_gives():
             solved = fsolve(lambda point, wanted=wanted: between(point) - wanted, point_m + 1e-3, xtol=1e-12)
             assert found[row, column] == pytest.approx(np.hypot(*(solved - point_m)), abs=1e-8)
     assert found[2, 2] < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("ranges_m", "between_deg"), [((8.563, 7.937, 7.573), (46.0, 54.0)), ((3.0, 9.0, 4.0), (80.0, 20.0))]
+)
+def test_the_largest_step_keeps_the_error_just_within_the_limit(ranges_m, between_deg):
+    landmarks_m = around_origin(ranges_m, *between_deg)
+    step_rad = bearing_errors.largest_step(landmarks_m, np.zeros(2), 0.3)
+    assert bearing_errors.limits_of_error(landmarks_m, np.zeros(2), step_rad).max() == pytest.approx(0.3, rel=3e-3)
+    np.testing.assert_allclose(np.degrees(bearing_errors.angles_between(landmarks_m, np.zeros(2))), between_deg)
+
+
+def test_with_landmarks_near_enough_any_step_will_do():
+    landmarks_m = around_origin((0.01, 0.02, 0.01), 120.0, 120.0)
+    assert bearing_errors.largest_step(landmarks_m, np.zeros(2), 5.0) == np.radians(45.0)
+
+
+def test_on_the_circle_through_the_landmarks_no_step_is_small_enough():
+    landmarks_m = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    with pytest.raises(ValueError, match="no step keeps the error within 0.3 m: the robot is on the circle"):
+        bearing_errors.largest_step(landmarks_m, np.array([1.0, 1.0]), 0.3)
+    with pytest.raises(ValueError, match="must be at four places"):
+        bearing_errors.limits_of_error(landmarks_m, np.array([1.0, 0.0]), 0.01)
 
 
 def test_a_step_of_one_degree_is_a_uniform_error_of_half_a_degree():

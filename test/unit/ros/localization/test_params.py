@@ -14,6 +14,7 @@ from glass_nav.params import as_mapping
 from glass_nav.ros.localization.params import (
     LocalizationParams,
     ParamError,
+    as_amcl_reads,
     changeable,
     changed,
     localization_params,
@@ -72,6 +73,53 @@ def test_parameters_of_amcl_that_mean_nothing_here_are_taken_and_named():
     assert isinstance(p.start.initial_pose_x, float)
 
 
+WRONG = {
+    bool: (1, 0, "true", 1.0, []),
+    int: ("100", True, [1], {}),
+    float: ("0.5*0.5", "0.5", True, [1.0]),
+    str: (1, 2.0),
+}
+
+
+@pytest.mark.parametrize("name", sorted(set(as_mapping(LocalizationParams())) - {"scan_topics"}))
+def test_a_value_of_another_type_is_ignored_as_amcl_and_refused_otherwise(name):
+    default = as_mapping(LocalizationParams())[name]
+    for value in WRONG[type(default)]:
+        kept, lines = as_amcl_reads({name: value}, "/amcl")
+        assert kept == {}
+        assert lines == [
+            f"/amcl: ~{name} must be {type(default).__name__}, got {value!r}; not used, as by amcl: the default is "
+            f"{default!r}"
+        ]
+        with pytest.raises(ParamError, match=f"^/node: ~{name} must be "):
+            localization_params({name: value}, "/node")
+
+
+def test_what_amcl_reads_is_left_as_it_is():
+    given = {
+        "update_min_d": 1,
+        "max_particles": 300.0,
+        "odom_frame_id": "/odom",
+        "laser_z_short": "?",
+        "tf_broadcast": False,
+    }
+    assert as_amcl_reads(given, "/amcl") == (given, [])
+
+
+@pytest.mark.parametrize(
+    "given, taken, said",
+    [
+        ({"max_particles": 1500.6}, {"max_particles": 1501}, "rounded to 1501, as by amcl"),
+        ({"initial_pose_x": math.nan}, {}, "not used, as by amcl: the default is 0.0"),
+        ({"odom_model_type": "ackermann"}, {"odom_model_type": "diff"}, "got 'ackermann'; diff, as by amcl"),
+    ],
+)
+def test_amcls_answers_to_other_odd_values(given, taken, said):
+    kept, (line,) = as_amcl_reads(given, "/amcl")
+    assert kept == taken and line.endswith(said)
+    assert localization_params(kept, "/amcl")
+
+
 def test_all_of_amcls_parameters_are_known_at_once():
     p, unused = localization_params(
         {name: None for name in amcl_parameters.NAMES if name not in as_mapping(LocalizationParams())}, "/amcl"
@@ -91,7 +139,7 @@ def test_all_of_amcls_parameters_are_known_at_once():
         ({"random_seed": 1.5}, "/n: ~random_seed must be int, got 1.5"),
         ({"initial_pose_x": math.nan}, "/n: ~initial_pose_x must be finite, got nan"),
         ({"initial_cov_aa": -0.1}, "/n: ~initial_cov_aa must be finite and >= 0, got -0.1"),
-        ({"transform_tolerance": -1}, "/n: ~transform_tolerance must be >= 0, got -1.0"),
+        ({"transform_tolerance": -1}, "/n: ~transform_tolerance must be in [0, 100], got -1.0"),
         ({"laser_max_range": 0}, "/n: ~laser_max_range must be above 0 and ~laser_min_range"),
         ({"laser_max_range": 2.0, "laser_min_range": 2.0}, "or < 0 for the scan's own, got 2.0"),
         ({"base_frame_id": ""}, "/n: ~base_frame_id must name a frame, got ''"),

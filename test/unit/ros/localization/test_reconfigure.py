@@ -20,7 +20,8 @@ EXPLAINED = reconfigure.explanations(REPO / "config" / "localization.yaml")
 def described():
     """Name -> what a client makes of the message."""
     tree = decode_description(reconfigure.description_msg(VALUES, EXPLAINED))
-    return {each["name"]: each for each in tree["parameters"]}
+    groups = [tree, *tree["groups"].values()]
+    return {each["name"]: each for group in groups for each in group["parameters"]}
 
 
 def test_a_client_sees_every_parameter_with_its_type_and_value(described):
@@ -37,8 +38,28 @@ def test_every_parameter_is_explained(described):
     )
 
 
-def test_no_value_is_out_of_bounds_for_a_client(described):
-    assert described["kld_err"]["min"] == float("-inf") and described["kld_err"]["max"] == float("inf")
+def test_every_number_has_limits_and_its_default_lies_between_them(described):
+    for name, each in described.items():
+        if each["type"] in ("int", "double"):
+            assert -1e7 < each["min"] <= each["default"] <= each["max"] < 1e7, name
+            assert type(each["min"]) is type(each["max"]) is type(each["default"]), name
+    assert (described["max_particles"]["min"], described["max_particles"]["max"]) == (1, 100_000)
+
+
+def test_the_groups_are_the_sections_of_the_parameter_file():
+    tree = decode_description(reconfigure.description_msg({**VALUES, reconfigure.RESTORE: False}, EXPLAINED))
+    assert [each["name"] for each in tree["parameters"]] == [reconfigure.RESTORE]
+    groups = tree["groups"]
+    assert list(groups)[:2] == ["frames and tf", "laser"]
+    assert [each["name"] for each in groups["particles"]["parameters"]] == [
+        "min_particles",
+        "max_particles",
+        "kld_err",
+        "kld_z",
+    ]
+    values = decode_config(reconfigure.config_msg(VALUES, list(groups)), tree)
+    assert list(values["groups"]["groups"]) == list(groups)
+    assert [group["id"] for group in values["groups"]["groups"].values()] == [group["id"] for group in groups.values()]
 
 
 @pytest.mark.parametrize(

@@ -124,6 +124,67 @@ def test_a_file_that_cannot_be_used_is_one_line(tmp_path, capsys, text, argument
         assert err == f"glass_nav params: {line.replace('FILE', str(path))}\n"
 
 
+AMCL = "<node pkg='amcl' type='amcl' name='amcl'><param name='max_particles' value='%s'/></node>"
+
+
+@pytest.mark.parametrize(
+    "tags, reason",
+    [
+        pytest.param(
+            "<arg name='count'/>" + AMCL % "$(arg count)", "needs the arg 'count', give count:=VALUE", id="arg"
+        ),
+        pytest.param(AMCL % "$(arg count)", "needs the arg 'count', give count:=VALUE", id="an arg never declared"),
+        pytest.param(
+            AMCL % "$(eval arg(&quot;count&quot;) + 1)", "needs the arg 'count', give count:=VALUE", id="arg in eval"
+        ),
+        pytest.param(
+            "<group ns='a'>" + AMCL % "$(arg count)" + "</group>", "needs the arg 'count', give", id="in a group"
+        ),
+        pytest.param(AMCL % "$(env NO_SUCH_VARIABLE)", "environment variable 'NO_SUCH_VARIABLE' is not set", id="env"),
+        pytest.param(AMCL % "$(find no_such_package)", "$(find no_such_package): there is no such package", id="find"),
+        pytest.param(AMCL % "$(eval no_such_name)", "name 'no_such_name' is not defined", id="eval"),
+        pytest.param("<node pkg='amcl' type='amcl' if='perhaps' name='a'/>", "perhaps is not a 'bool' type", id="if"),
+        pytest.param("<group unless='$(arg sim)'/>", "needs the arg 'sim', give sim:=VALUE", id="unless"),
+        pytest.param("<include/>", "a tag lacks the attribute 'file'", id="an include of nothing"),
+        pytest.param(
+            "<rosparam command='load' file='no.yaml'/>",
+            "error loading <rosparam> tag: file does not exist [no.yaml]",
+            id="no such yaml",
+        ),
+        pytest.param("<node pkg='amcl'>", "Invalid roslaunch XML syntax: mismatched tag", id="bad XML"),
+    ],
+)
+@pytest.mark.parametrize("included", [False, True])
+def test_each_fault_of_a_launch_file_names_the_file_that_it_is_in(tmp_path, capsys, tags, reason, included):
+    faulty = tmp_path / "faulty.launch"
+    faulty.write_text(f"<launch>{tags}</launch>")
+    (tmp_path / "middle.launch").write_text("<launch><include file='$(dirname)/faulty.launch'/></launch>")
+    (tmp_path / "top.launch").write_text("<launch><include file='$(dirname)/middle.launch'/></launch>")
+    code = amcl_launch.main([str(tmp_path / "top.launch" if included else faulty)])
+    out, err = capsys.readouterr()
+    assert (code, out) == (3, "")
+    assert err.startswith(f"glass_nav params: {faulty}: {reason}") and err.count("\n") == 1
+
+
+def test_an_included_file_that_is_missing_or_includes_itself_is_named(tmp_path, capsys):
+    top, itself = tmp_path / "top.launch", tmp_path / "itself.launch"
+    top.write_text("<launch><include file='$(dirname)/no.launch'/></launch>")
+    itself.write_text("<launch><include file='$(dirname)/itself.launch'/></launch>")
+    amcl_launch.main([str(top)])
+    assert capsys.readouterr().err == f"glass_nav params: {tmp_path / 'no.launch'}: does not exist\n"
+    amcl_launch.main([str(itself)])
+    assert capsys.readouterr().err == f"glass_nav params: {itself}: is included by itself\n"
+
+
+def test_values_that_amcl_ignores_are_left_out_with_a_comment():
+    values = {"initial_cov_xx": "0.5*0.5", "max_particles": 1500.6, "tf_broadcast": 1, "update_min_d": 0.3}
+    text = amcl_launch.explained(amcl_launch.AmclNode("/amcl", "amcl/amcl", values, []), "x.launch")
+    assert yaml.safe_load(text) == {"max_particles": 1501, "update_min_d": 0.3}
+    assert "# ~initial_cov_xx must be float, got '0.5*0.5'; not used, as by amcl: the default is 0.25" in text
+    with pytest.raises(params.ParamError, match="~initial_cov_xx must be float"):
+        amcl_launch.explained(amcl_launch.AmclNode("/a", "glass_nav/localization_node", values, []), "x.launch")
+
+
 def test_a_file_that_is_not_there_and_an_arg_that_is_none(tmp_path, capsys):
     assert printed(capsys, "--from-amcl", tmp_path / "no.launch") == (
         3,

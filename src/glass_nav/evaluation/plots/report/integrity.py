@@ -12,7 +12,7 @@ from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.evaluation.metrics.run_story import percent
 from glass_nav.evaluation.plots.canvas import Picture, new_figure, save
 from glass_nav.evaluation.plots.report.ground import Ground
-from glass_nav.vocabulary import state_colour, states_in_order
+from glass_nav.vocabulary import LocalizationState, state_colour, state_mark, states_in_order
 
 _AXES = (("along the heading", "m", 1.0), ("across the heading", "m", 1.0), ("of the heading", "deg", 180.0 / np.pi))
 _LEAST, _MOST = (1e-3, 1e-3, 1e-2), (100.0, 100.0, 180.0)  # values beyond are drawn there, on logarithmic axes
@@ -32,7 +32,16 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
         )
         for state in states_in_order(used.states.tolist()):
             here = used.states == state
-            axes.scatter(level[here], error[here], s=7, alpha=0.5, linewidths=0, color=state_colour(state), label=state)
+            axes.scatter(
+                level[here],
+                error[here],
+                s=12,
+                alpha=0.5,
+                linewidths=0,
+                marker=state_mark(state) or ".",
+                color=state_colour(state),
+                label=state,
+            )
         over = used.localized & (np.abs(used.error[:, column]) > used.level_999[:, column])
         if over.any():
             axes.scatter(
@@ -40,7 +49,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
             )
         ends = [low, high]
         axes.plot(ends, ends, color="#555555", linewidth=0.8, linestyle="--")
-        axes.fill_between(ends, ends, [high, high], color="#d62728", alpha=0.08, linewidth=0)
+        axes.fill_between(ends, ends, [high, high], color=LocalizationState.LOST.colour, alpha=0.08, linewidth=0)
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_xlim(0.8 * low, 1.2 * max(error.max(), level.max()))

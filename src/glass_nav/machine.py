@@ -1,0 +1,24 @@
+"""What the computer has."""
+
+from __future__ import annotations
+
+import os
+import resource
+from pathlib import Path
+from typing import List
+
+_CGROUPS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")  # of a container, v2 and v1
+
+
+def memory_bytes() -> int:
+    """Main memory that this process may use at most: the computer's, or what a container or ulimit leaves of it."""
+    limits: List[int] = [os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")]
+    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if soft != resource.RLIM_INFINITY:
+        limits.append(soft)
+    for path in _CGROUPS:
+        try:
+            limits.append(int(Path(path).read_text()))
+        except (OSError, ValueError):  # no such file, or "max"
+            continue
+    return min(limits)
