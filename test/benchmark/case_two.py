@@ -187,7 +187,8 @@ def main() -> int:
     args = parser.parse_args()
     settings = params.load(LocalizerParams, {}, "case_two")
     print(
-        "| world | called | true | precision | recall | macro F1 | accuracy | mean m | max m | yaw deg |\n|" + "---|" * 10
+        "| world | called | true | precision | recall | macro F1 | accuracy | mean m | max m | yaw deg |\n|"
+        + "---|" * 10
     )
     results = []
     for world, seed, model_name in [

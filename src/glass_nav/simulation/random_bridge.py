@@ -65,7 +65,13 @@ def build(seed: int) -> Building:
             beside = side * (0.5 * width + rng.uniform(9.0, 18.0))
             facade = box(0.5 * length, beside, 1.2 * length, 0.6, float(rng.uniform(-0.15, 0.15)))
             things.append((facade, "plaster", False))
-    way = [[-2.5, 0.0], [1.0, 0.1 * width], [0.5 * length, -0.1 * width], [length - 1.0, 0.1 * width], [length + 2.5, 0.0]]
+    way = [
+        [-2.5, 0.0],
+        [1.0, 0.1 * width],
+        [0.5 * length, -0.1 * width],
+        [length - 1.0, 0.1 * width],
+        [length + 2.5, 0.0],
+    ]
     across_m = se2.transform_points(placed, np.array(way))
     return Building(
         tuple(Wall(se2.transform_points(placed, line), THICK_M) for line in walls),
