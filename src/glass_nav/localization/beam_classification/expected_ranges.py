@@ -74,7 +74,9 @@ def of(
     range_m[:, 0] = np.concatenate([hits.first_m, hits.mirrored_m, hits.second_m, hits.third_m])
     cell[:, 0] = np.concatenate([hits.first_cell, hits.mirrored_cell, hits.second_cell, hits.third_cell])
     cos[:, 0] = cos_incidence(caster, np.stack([beam_rad, mirrored_rad, beam_rad, beam_rad]), cell[:, 0], min_linearity)
-    range_m[1] = _mirrored_by_line(caster, thickness_m, from_laser, scan.angles_rad, range_m[1], cell[:2], min_linearity)
+    range_m[1] = _mirrored_by_line(
+        caster, thickness_m, from_laser, scan.angles_rad, range_m[1], cell[:2], min_linearity
+    )
     has_normal = hits.linearity >= min_linearity
     incidence = np.where(has_normal, np.arccos(np.clip(cos[0, :1], 0.0, 1.0)), np.nan)
     normal_rad, linearity = caster.normals()
