@@ -43,9 +43,9 @@ def build(seed: int) -> Building:
         walls.append(np.array(corners))
         for _ in range(int(rng.integers(3, 8))):
             across = rng.choice([rng.uniform(below + 0.8, -0.9), rng.uniform(0.9, above - 0.8)])
-            at = end + side * rng.uniform(1.0, deep - 0.9)
+            along = end + side * rng.uniform(1.0, deep - 0.9)
             size = rng.uniform(0.4, 1.2), rng.uniform(0.4, 0.7)
-            outline = box(float(at), float(across), *size, float(rng.uniform(0.0, math.pi)))
+            outline = box(float(along), float(across), *size, float(rng.uniform(0.0, math.pi)))
             things.append((outline, str(rng.choice(["wood", "metal", "cloth", "plant", "black"])), True))
     for across in (-0.5 * width, 0.5 * width):
         posts = max(2, int(round(length / rng.uniform(*POSTS_M))))
@@ -58,12 +58,12 @@ def build(seed: int) -> Building:
         beside = rng.choice([-1.0, 1.0]) * (0.5 * width + rng.uniform(*OUTDOORS_M))
         kind, size = ("plant", (0.4, 0.4)) if rng.random() < 0.6 else ("metal", (4.2, 1.8))
         beside += np.sign(beside) * 0.5 * max(size)
-        at, yaw = float(rng.uniform(0.0, length)), float(rng.uniform(0.0, math.pi))
-        things.append((box(at, float(beside), *size, yaw), kind, False))
+        middle, yaw = float(rng.uniform(0.0, length)), float(rng.uniform(0.0, math.pi))
+        things.append((box(middle, float(beside), *size, yaw), kind, False))
     for side in (-1.0, 1.0):
         if rng.random() < 0.6:
-            beside = side * (0.5 * width + rng.uniform(9.0, 18.0))
-            facade = box(0.5 * length, beside, 1.2 * length, 0.6, float(rng.uniform(-0.15, 0.15)))
+            away = side * (0.5 * width + rng.uniform(9.0, 18.0))
+            facade = box(0.5 * length, float(away), 1.2 * length, 0.6, float(rng.uniform(-0.15, 0.15)))
             things.append((facade, "plaster", False))
     way = [
         [-2.5, 0.0],
