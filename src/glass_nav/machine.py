@@ -10,6 +10,16 @@ from typing import List
 _CGROUPS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")  # of a container, v2 and v1
 
 
+def free_bytes() -> int:
+    """Main memory that is free now, or could be."""
+    try:
+        lines = Path("/proc/meminfo").read_text().splitlines()
+    except OSError:
+        return memory_bytes()
+    available = [int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:")]
+    return min([*available, memory_bytes()])
+
+
 def memory_bytes() -> int:
     """Main memory that this process may use at most: the computer's, or what a container or ulimit leaves of it."""
     limits: List[int] = [os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")]

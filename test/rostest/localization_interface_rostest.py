@@ -82,11 +82,7 @@ class LocalizationInterface(RoomTest):
             (changed(fresh(), info__resolution=0.0), pose_message(here), "resolution > 0"),
             (changed(fresh(), info__resolution=math.nan), pose_message(here), "resolution > 0"),
             (changed(fresh(), info__origin__position__x=math.nan), pose_message(here), "origin"),
-            (
-                changed(fresh(), info__origin__orientation__w=0.0, info__origin__orientation__z=0.0),
-                pose_message(here),
-                "origin",
-            ),
+            (changed(fresh(), info__origin__orientation__w=math.nan), pose_message(here), "origin"),
             (fresh(), changed(pose_message(here), header__frame_id="odom"), "frame 'map'"),
             (fresh(), pose_message(outside), "outside the map"),
         ):
@@ -135,7 +131,9 @@ class LocalizationInterface(RoomTest):
             maps.publish(bad)
             return bool(self.lines.having("the map of topic /other_map is refused", "got 1"))
 
+        status = Heard("/by_topic/status", LocalizationStatus)
         refused = wait_until(refused_is_heard, 30.0)
+        said = wait_until(lambda: len(status) and "/other_map is refused: a map of" in status.last.reason, 30.0)
         maps.publish(self.map_msg)
         heard = wait_until(lambda: len(poses), 30.0)
         maps.publish(self.map_msg)
@@ -143,7 +141,8 @@ class LocalizationInterface(RoomTest):
         kept = self.stays_right_on(maps, poses, self.graded_map())
         code, printed = node.end()
         self.assertTrue(
-            connected and refused and heard and same and kept, (connected, refused, heard, same, kept, printed)
+            connected and refused and said and heard and same and kept,
+            (connected, refused, said, heard, same, kept, printed),
         )
         self.assertEqual(code, 0, printed)
 

@@ -13,6 +13,7 @@ from glass_nav.localization.initial_pose import PoseGuess, StartPose, StartRules
 from glass_nav.localization.initial_poses import InitialPoses, OdometryAt
 from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.localization.localizer_params import LocalizerParams
+from glass_nav.localization.panes_memory import PanesFilePath, PanesMemory
 from glass_nav.localization.saved_pose import PoseFile
 from glass_nav.sensing.scan import Scan
 from glass_nav.vocabulary import LocalizationState
@@ -31,6 +32,7 @@ class SessionParams:
     start: StartPose
     rules: StartRules
     pose_file: PoseFile
+    panes_file: PanesFilePath = PanesFilePath()
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,7 @@ class LocalizationSession:
         self._params, self._time_is_simulated, self._on_start_over = params, time_is_simulated, on_start_over
         self._rng = params.rules.rng
         self._starts = InitialPoses(params.start, params.rules.start_without_guess, params.pose_file, odometry_at)
+        self._panes = PanesMemory(params.panes_file)
         self.localizer: Optional[Localizer] = None
         self.grid_map: Optional[GridMap] = None
         self.map_origin = ""  # where it came from, in words
@@ -82,9 +85,11 @@ class LocalizationSession:
         if self.localizer is not None and self.grid_map is not None and grid_map.digest == self.grid_map.digest:
             _log.info(f"the map from {origin} is the one that is in use: nothing changes")
             return False
+        self.keep_panes()
         self.grid_map = grid_map
         if self.localizer is not None:
             self.localizer.set_map(grid_map)
+            self._panes.recall(self.localizer, grid_map)
         elif not self.waits_for_pose:
             self._begin()
         self.map_origin = origin
@@ -150,7 +155,26 @@ class LocalizationSession:
         if not is_finite(estimate):
             return None
         self.estimate, self.scan, self.last_estimate_s = estimate, scan, now_s
+        self._panes.tell(self._running())
         return estimate
+
+    # -- panes that the map lacks
+
+    @property
+    def lacking_glass(self) -> Optional[str]:
+        """How much glass the map lacks, and the command that draws it in; None: none was found."""
+        return None if self.localizer is None else self._panes.summary(self.localizer)
+
+    def save_panes(self) -> str:
+        """Write ~panes_file; what was written, in words. ValueError if it cannot be."""
+        localizer = self._running()
+        assert self.grid_map is not None
+        return self._panes.save(localizer, self.grid_map)
+
+    def keep_panes(self) -> None:
+        """Write ~panes_file, if there is one, before this localizer ends."""
+        if self.localizer is not None and self.grid_map is not None:
+            self._panes.keep(self.localizer, self.grid_map)
 
     # -- time, and what is missing
 
@@ -195,6 +219,7 @@ class LocalizationSession:
         """A new localizer, at the start that there is; where, in words."""
         assert self.grid_map is not None
         self.localizer = Localizer(self._params.localizer, self.grid_map, self._rng)
+        self._panes.recall(self.localizer, self.grid_map)
         self._start_over()
         return self._starts.begin(self.localizer)
 

@@ -46,6 +46,7 @@ class Bag:
         try:
             self._reader = AnyReader(self.paths, default_typestore=messages.ros2_store())
             self._reader.open()
+            self._define()
         except Exception as err:  # rosbags lets errors of struct, asserts and codecs through
             raise RecordingError(_why_unreadable(self.paths, err)) from err
         return self
@@ -56,13 +57,11 @@ class Bag:
     @property
     def topics(self) -> Dict[str, str]:
         """Topic -> message type as ROS 1 writes it, sorted by topic."""
-        return {
-            connection.topic: connection.msgtype.replace("/msg/", "/")
-            for connection in sorted(self._reader.connections, key=lambda each: str(each.topic))
-        }
+        kinds = {absolute(each.topic): each.msgtype.replace("/msg/", "/") for each in self._reader.connections}
+        return dict(sorted(kinds.items()))
 
     def count(self, topic: str) -> int:
-        return int(sum(connection.msgcount for connection in self._reader.connections if connection.topic == topic))
+        return int(sum(each.msgcount for each in self._reader.connections if absolute(each.topic) == topic))
 
     @property
     def duration_s(self) -> float:
@@ -75,11 +74,17 @@ class Bag:
     def messages(self, *topics: str) -> "Iterator[Tuple[str, Any]]":
         """Topic and message in the order they were recorded; ends where the bag is damaged, see `damage`."""
         for connection, _, message in self.recorded(*topics):
-            yield connection.topic, message
+            yield absolute(connection.topic), message
 
     def recorded(self, *topics: str) -> "Iterator[Tuple[Any, int, Any]]":
-        """Connection of rosbags, time of recording [ns] and message, as messages()."""
-        connections = [connection for connection in self._reader.connections if connection.topic in topics]
+        """Connection of rosbags, time of recording [ns] and message, as messages().
+
+        Raises:
+            RecordingError: the bag does not define their type.
+        """
+        connections = [connection for connection in self._reader.connections if absolute(connection.topic) in topics]
+        for connection in connections:
+            self._check_defined(connection)
         if not connections:
             return
         count = 0
@@ -101,12 +106,45 @@ class Bag:
 
     def check_topic(self, topic: str, *kinds: str) -> str:
         """The topic as the bag spells it, if it is there with one of these types."""
-        name = topic if topic in self.topics else "/" + topic
+        name = absolute(topic)
         if name not in self.topics:
             raise RecordingError(f"{self.path}: no topic {topic}; it has {self.listing()}")
         if self.topics[name] not in kinds:
             raise RecordingError(f"{self.path}: {name} is {self.topics[name]}, expected {' or '.join(kinds)}")
         return name
+
+    def _define(self) -> None:
+        """Standard types that the bag names without defining them get the definitions that we have."""
+        reader = self._reader
+        if reader.is2:
+            ours = messages.ros2_store()
+        elif all(messages.text_of(connection) for connection in reader.connections):
+            return
+        else:
+            from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+            ours = messages.noetic_store()
+            reader.typestore = get_typestore(Stores.EMPTY)  # without the empty definitions
+            for connection in reader.connections:
+                if messages.text_of(connection):
+                    reader.typestore.register(get_types_from_msg(messages.text_of(connection), connection.msgtype))
+        known = reader.typestore.fielddefs
+        if any(connection.msgtype not in known for connection in reader.connections):
+            reader.typestore.register({name: each for name, each in ours.fielddefs.items() if name not in known})
+
+    def _check_defined(self, connection: Any) -> None:
+        kind = connection.msgtype.replace("/msg/", "/")
+        if self._reader.is2:
+            if connection.msgtype not in self._reader.typestore.fielddefs:
+                raise RecordingError(
+                    f"{self.path}: {absolute(connection.topic)} is {kind}, which the bag does not define; "
+                    "`ros2 bag record --storage mcap` writes definitions"
+                )
+        elif not messages.text_of(connection) and messages.noetic_md5(connection.msgtype) != connection.digest:
+            raise RecordingError(
+                f"{self.path}: {absolute(connection.topic)} is {kind} of md5 {connection.digest}, which the bag does not "
+                "define and ROS Noetic does not have; `rosbag record` writes definitions"
+            )
 
     def only_or_usual(self, found: List[str], usual: str, what: str, option: str) -> str:
         """Of the topics found, at least one: the only one, or the one with the usual name."""
@@ -118,6 +156,11 @@ class Bag:
 
     def listing(self) -> str:
         return ", ".join(f"{topic} ({kind})" for topic, kind in self.topics.items()) or "no topics"
+
+
+def absolute(topic: str) -> str:
+    """The topic with the "/" in front, which some recorders leave out."""
+    return "/" + topic.strip("/")
 
 
 def raw_scan(message: Any) -> RawScan:
@@ -182,10 +225,23 @@ def _why_unreadable(paths: Sequence[Path], err: Exception) -> str:
     if path.suffix == ".bag" or head.startswith(b"#ROSBAG"):
         if head != b"#ROSBAG V2.0\n":
             return f"{path}: is no ROS 1 bag"
+        if _is_whole(path):
+            return f"{path}: a message definition in it cannot be read: {_first_line(err)}"
         return (
             f"{path}: cut short or never closed (its index is missing); `rosbag reindex {path}` may save what it holds"
         )
     return f"{path}: is not a bag ({_first_line(err)})"
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether the index of a bag of ROS 1 can be read."""
+    from rosbags.rosbag1 import Reader
+
+    try:
+        with Reader(path):
+            return True
+    except Exception:  # noqa: BLE001  as above
+        return False
 
 
 def _first_line(err: Exception) -> str:

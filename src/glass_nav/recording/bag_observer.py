@@ -7,7 +7,7 @@ from typing import Any, Callable, Optional, Sequence
 
 import numpy as np
 
-from glass_nav.recording.bag_messages import ODOMETRY, SCAN, TF, Bag, ns_from_header
+from glass_nav.recording.bag_messages import ODOMETRY, SCAN, TF, Bag, absolute, ns_from_header
 from glass_nav.recording.observed import HeardOdometry, HeardScan, HeardTransform, Observed
 
 
@@ -26,7 +26,7 @@ def observe(paths: Sequence[Path], step_done: Optional[Callable[[], None]] = Non
         seen.scans = {topic: [] for topic in bag.topics_of(SCAN)}
         seen.odometry = {topic: [] for topic in bag.topics_of(ODOMETRY)}
         for connection, heard_ns, message in bag.recorded(*bag.topics_of(SCAN, ODOMETRY, *TF)):
-            topic = connection.topic
+            topic = absolute(connection.topic)
             if topic in seen.scans:
                 seen.scans[topic].append(heard_scan(message, ns_from_header(message.header), heard_ns))
             elif topic in seen.odometry:

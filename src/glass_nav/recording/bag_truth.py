@@ -71,10 +71,10 @@ def _by_topic_or_file(bag: Bag, source: Optional[str], notes: List[str]) -> Opti
         if bag.topics.get("/ground_truth") not in POSES:
             return None
         source = "/ground_truth"
-    if source not in bag.topics and Path(source).is_file():
+    if bag_messages.absolute(source) not in bag.topics and Path(source).is_file():
         notes.append(f"ground truth from {source}")
         return trajectory_file.load(Path(source))
-    if source not in bag.topics and "/" + source not in bag.topics and "." in Path(source).name:
+    if bag_messages.absolute(source) not in bag.topics and "." in Path(source).name:
         raise RecordingError(f"{source}: no such file of poses, and no topic of {bag.path}")
     topic = bag.check_topic(source, *POSES)
     notes.append(f"ground truth from {topic}")

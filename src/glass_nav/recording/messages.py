@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+import functools
+from typing import Any, Optional
+
+from glass_nav.recording.message_writer import TF_MESSAGE, TF_TYPE
 
 TRUE_BEAMS = "Header header\nuint8[] cases\nfloat32[] exact\nfloat32[] crossing\n"  # msg/*.msg, bare
 BEAM_CASES = "Header header\nuint8[] cases\nfloat32[] expected\nfloat32[] residual\nfloat32[] weight\n"
@@ -12,6 +15,33 @@ STATUS = (
     "float32 level_95_along_m\nfloat32 level_95_across_m\nfloat32 level_95_heading_deg\n"
     "float32 level_999_along_m\nfloat32 level_999_across_m\nfloat32 level_999_heading_deg\n"
 )
+
+
+@functools.lru_cache(maxsize=1)
+def noetic_store() -> Any:
+    """Types of ROS Noetic and ours: some bags name standard types without defining them."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    for name, definition in (
+        (TF_TYPE, TF_MESSAGE),
+        ("tf/msg/tfMessage", TF_MESSAGE),
+        ("glass_nav/msg/TrueBeams", TRUE_BEAMS),
+        ("glass_nav/msg/BeamCases", BEAM_CASES),
+    ):
+        store.register(get_types_from_msg(definition, name))
+    return store
+
+
+def text_of(connection: Any) -> str:
+    """The message definition that a bag brings along for a connection of rosbags; "" if it brings none."""
+    return str(getattr(connection.msgdef, "data", connection.msgdef) or "").strip()
+
+
+def noetic_md5(kind: str) -> Optional[str]:
+    """Of a type as rosbags writes it; None if Noetic does not have it."""
+    store = noetic_store()
+    return str(store.generate_msgdef(kind)[1]) if kind in store.fielddefs else None
 
 
 def ros2_store() -> Any:

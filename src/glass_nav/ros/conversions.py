@@ -228,7 +228,10 @@ def surface_scan_msg(placed: PlacedScan, surface: SurfaceScan) -> LaserScan:
 
 
 def map_from_msg(msg: OccupancyGrid) -> GridMap:
-    """OccupancyGrid -> GridMap, with the yaw of its origin. ValueError if it is no valid map."""
+    """OccupancyGrid -> GridMap, with the yaw of its origin; a quaternion 0 0 0 0 is no rotation.
+
+    ValueError if it is no valid map.
+    """
     info = msg.info
     if info.width == 0 or info.height == 0:
         raise ValueError(f"a map needs at least one cell, got {info.width} x {info.height}")
@@ -240,8 +243,12 @@ def map_from_msg(msg: OccupancyGrid) -> GridMap:
     if occupancy.min() < -1 or occupancy.max() > 100:
         wrong = occupancy[(occupancy < -1) | (occupancy > 100)]
         raise ValueError(f"cells of a map must be 0 to 100 or -1 for unknown, got {wrong[0]} in {len(wrong)} cell(s)")
+    origin, turn = info.origin, info.origin.orientation
+    if (turn.x, turn.y, turn.z, turn.w) == (0.0, 0.0, 0.0, 0.0):  # of a node that does not set it
+        rospy.logwarn("the quaternion of the map's origin is 0 0 0 0: taken as no rotation")
+        origin = Pose(origin.position, Quaternion(w=1.0))
     try:
-        map_from_grid = planar_from_pose(info.origin)
+        map_from_grid = planar_from_pose(origin)
     except ValueError as err:
         raise ValueError(f"the origin of the map: {err}") from err
     return GridMap(occupancy, float(np.round(info.resolution, 7)), map_from_grid)  # float32 in the message

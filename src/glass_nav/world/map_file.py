@@ -1,7 +1,7 @@
 """Files -> GridMap and back: map_server's yaml with its image, MRPT's .gridmap and .gridmap.gz.
 
-The yaml means here what it means to map_server of ROS 1, including its habit of averaging an alpha
-channel with the colours in mode trinary. Values that map_server silently accepts but that make no sense
+The yaml means here what it means to map_server of ROS 1: numbers as yaml-cpp reads them, an alpha channel averaged with
+the colours in mode trinary. Values that map_server silently accepts but that make no sense
 (thresholds out of order, a resolution of 0, an unknown mode) are refused.
 """
 
@@ -9,15 +9,20 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
+import re
 from pathlib import Path
-from typing import Any, Dict, Union
+from typing import Any, Dict, Optional, Union
 
 import numpy as np
 
+from glass_nav.world import image_file
 from glass_nav.world.grid_map import UNKNOWN, GridMap
 
 MODES = ("trinary", "scale", "raw")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_INTEGER = re.compile(r"[+-]?(?:(0x[0-9a-f]+)|(0[0-7]+)|0|[1-9]\d*)")
+_TRUE, _FALSE, _NULL = ("true", "yes", "on"), ("false", "no", "off"), ("", "~", "null", "Null", "NULL")
+_BLOCK = 2**22  # cells
 REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 
 
@@ -62,7 +67,9 @@ def save(grid_map: GridMap, path_yaml: "Union[str, os.PathLike[str]]", image_suf
         image = np.stack([grey, grey, grey, alpha], axis=-1).astype(np.uint8)
     else:
         image = np.select([occupancy == 100, occupancy == 0], [0, 254], 205).astype(np.uint8)
-    _image_module().fromarray(np.ascontiguousarray(image[::-1])).save(path_image)
+    from PIL import Image  # slow to import, and only map files need it
+
+    Image.fromarray(np.ascontiguousarray(image[::-1])).save(path_image)
     x, y, yaw = (float(value) for value in grid_map.map_from_grid)
     path_yaml.write_text(
         f"image: {path_image.name}\nmode: {'scale' if graded else 'trinary'}\n"
@@ -77,12 +84,14 @@ def _load_yaml(path: Path) -> GridMap:
     if not resolution > 0.0:
         raise MapError(f"{path}: resolution must be > 0 m, got {resolution}")
     origin = fields["origin"]
-    if not (isinstance(origin, list) and len(origin) == 3 and all(_is_number(value) for value in origin)):
+    if not (isinstance(origin, list) and len(origin) == 3 and all(math.isfinite(_float(value)) for value in origin)):
         raise MapError(f"{path}: origin must be [x, y, yaw] in m, m, rad, got {origin!r}")
-    negate = fields["negate"]
-    if negate not in (0, 1):  # True == 1: yaml's true and false are accepted as well
-        raise MapError(f"{path}: negate must be 0 or 1, got {negate!r}")
-    mode = fields.get("mode", "trinary")
+    negate = _flag(fields["negate"])
+    if negate is None:
+        raise MapError(f"{path}: negate must be 0 or 1, got {fields['negate']!r}")
+    mode = fields.get("mode", "")
+    if mode in _NULL:
+        mode = "trinary"
     if mode not in MODES:
         raise MapError(f"{path}: mode must be trinary, scale or raw, got {mode!r}")
     occupied, free = _number(path, fields, "occupied_thresh"), _number(path, fields, "free_thresh")
@@ -92,23 +101,28 @@ def _load_yaml(path: Path) -> GridMap:
             f"got free_thresh {free} and occupied_thresh {occupied}"
         )
     image = fields["image"]
-    if not (isinstance(image, str) and image):
+    if not isinstance(image, str) or image in _NULL or "\0" in image:
         raise MapError(f"{path}: image must be the name of a file, got {image!r}")
-    channels = _channels(path, path.parent / image)  # an absolute name stays absolute
-    occupancy = _occupancy(channels, str(mode), bool(negate), occupied, free)
-    return GridMap(np.ascontiguousarray(occupancy[::-1]), resolution, np.array(origin, float))
+    try:
+        channels = image_file.channels(path.parent / image)  # an absolute name stays absolute
+    except image_file.ImageError as err:
+        raise MapError(f"{path}: {err}") from err
+    occupancy = _occupancy(channels, str(mode), negate, occupied, free)
+    return GridMap(occupancy, resolution, np.array([_float(value) for value in origin]))
 
 
 def _fields(path: Path) -> Dict[str, Any]:
+    """Name -> text, or list of texts, of all fields: yaml-cpp, too, makes numbers of them when they are asked for."""
     import yaml  # here, because the rest of the package reads no yaml
 
     try:
-        text = path.read_text()
+        text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as err:
         raise MapError(f"{path}: cannot be read: {_reason(err)}") from err
     try:
-        fields = yaml.safe_load(text)
-    except yaml.YAMLError as err:
+        # The first document, as map_server; and tabs between a name and its value, which yaml-cpp takes for spaces.
+        fields = next(iter(yaml.load_all(text.replace("\t", " "), Loader=yaml.BaseLoader)), None)
+    except (yaml.YAMLError, RecursionError) as err:
         raise MapError(f"{path}: is no yaml: {' '.join(str(err).split())}") from err
     if not isinstance(fields, dict):
         raise MapError(f"{path}: is no map: expected the keys {', '.join(REQUIRED)}")
@@ -118,73 +132,59 @@ def _fields(path: Path) -> Dict[str, Any]:
     return fields
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+def _float(value: Any) -> float:
+    """The number that yaml-cpp reads there, NaN for none: 5e-2, .05, 0.05 with or without quotes, but not 0x1 or 1_000."""
+    return float(value) if isinstance(value, str) and _NUMBER.fullmatch(value.strip()) else math.nan
+
+
+def _flag(value: Any) -> Optional[bool]:
+    """negate, an integer of any base to yaml-cpp; the words of yaml 1.1 for it, which other tools write, count as well."""
+    if not isinstance(value, str):
+        return None
+    word = value.strip().lower()
+    if word in _TRUE or word in _FALSE:
+        return word in _TRUE
+    match = _INTEGER.fullmatch(word)
+    number = -1 if match is None else int(word.lstrip("+"), 16 if match[1] else 8 if match[2] else 10)
+    return bool(number) if number in (0, 1) else None
 
 
 def _number(path: Path, fields: Dict[str, Any], key: str) -> float:
-    if not _is_number(fields[key]):
+    value = _float(fields[key])
+    if not math.isfinite(value):
         raise MapError(f"{path}: {key} must be a finite number, got {fields[key]!r}")
-    return float(fields[key])
-
-
-def _image_module() -> Any:
-    from PIL import Image  # slow to import, and only map files need it
-
-    return Image
-
-
-def _channels(path: Path, path_image: Path) -> np.ndarray:
-    """The image as (H, W, C) of 0..255, top row first; C is 1 grey, 3 colour or 4 with alpha."""
-    if not path_image.is_file():
-        raise MapError(f"{path}: its image {path_image} does not exist")
-    Image = _image_module()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large floors are legitimate
-        try:
-            image = Image.open(path_image)
-        except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as err:
-            raise MapError(f"{path}: its image {path_image} cannot be read: {_reason(err)}") from err
-        try:
-            image.load()
-        except (OSError, ValueError, SyntaxError, IndexError) as err:
-            raise MapError(
-                f"{path}: the data of its image {path_image} do not fit its {image.width} x "
-                f"{image.height} pixels: the file is cut short or damaged"
-            ) from err
-    if image.mode.startswith("I"):  # 16 bit: the high byte, as SDL shows it to map_server
-        grey = np.asarray(image).astype(np.int64) >> 8
-        return np.clip(grey, 0, 255).astype(np.uint8)[..., None]
-    if image.mode == "P":  # map_server would read the palette index as the colour
-        image = image.convert("RGBA" if "transparency" in image.info else "RGB")
-    elif image.mode == "LA":
-        image = image.convert("RGBA")
-    elif image.mode not in ("L", "RGB", "RGBA"):
-        image = image.convert("L" if image.mode == "1" else "RGB")
-    pixels = np.asarray(image)
-    return pixels[..., None] if pixels.ndim == 2 else pixels
+    return value
 
 
 def _occupancy(channels: np.ndarray, mode: str, negate: bool, occupied: float, free: float) -> np.ndarray:
-    """(H, W) int8 by map_server's rules from channels (H, W, C), rows in the same order."""
+    """(H, W) int8 by map_server's rules from channels (H, W, C); the lowest row of the image is the first one."""
     has_alpha = channels.shape[-1] == 4
-    averaged = channels[..., :3] if has_alpha and mode != "trinary" else channels
-    count = averaged.shape[-1]
-    total = averaged[..., 0] if count == 1 else averaged.sum(axis=-1, dtype=np.uint16)  # (H, W)
-    grey = np.arange(255 * count + 1) / count  # for every possible total: maps have millions of cells
+    count = 3 if has_alpha and mode != "trinary" else channels.shape[-1]
+    by_total = _by_total(count, mode, negate, occupied, free)
+    height, width = channels.shape[:2]
+    occupancy = np.empty((height, width), np.int8)
+    step = max(1, _BLOCK // width)
+    for top in range(0, height, step):  # in blocks: numpy's indices take eight times the memory of the cells
+        block = channels[top : top + step]
+        cells = by_total[block[..., 0] if count == 1 else block[..., :count].sum(axis=-1, dtype=np.uint16)]
+        if mode == "scale" and has_alpha:  # a transparent cell is unknown unless its colour is beyond doubt
+            cells[(block[..., 3] == 0) & (cells > 0) & (cells < 100)] = UNKNOWN
+        occupancy[height - top - len(block) : height - top] = cells[::-1]
+    return occupancy
+
+
+def _by_total(count: int, mode: str, negate: bool, occupied: float, free: float) -> np.ndarray:
+    """int8 for every sum of so many channels: maps have millions of cells."""
+    grey = np.arange(255 * count + 1) / count
     if negate:
         grey = 255.0 - grey
     if mode == "raw":  # -1 is 255 in a byte; above 100 there is no percentage
-        return np.where(grey <= 100.0, np.floor(grey), UNKNOWN).astype(np.int8)[total]
+        return np.where(grey <= 100.0, np.floor(grey), UNKNOWN).astype(np.int8)
     probability = (255.0 - grey) / 255.0
     between = np.full(grey.shape, float(UNKNOWN))
     if mode == "scale":
         between = np.floor(1.0 + 98.0 * (probability - free) / (occupied - free))
-    by_total = np.select([probability > occupied, probability < free], [100.0, 0.0], between).astype(np.int8)
-    occupancy = by_total[total]
-    if mode == "scale" and has_alpha:  # a transparent cell is unknown unless its colour is beyond doubt
-        occupancy[(channels[..., 3] == 0) & (occupancy > 0) & (occupancy < 100)] = UNKNOWN
-    return occupancy
+    return np.select([probability > occupied, probability < free], [100.0, 0.0], between).astype(np.int8)
 
 
 def _load_mrpt(path: Path) -> GridMap:

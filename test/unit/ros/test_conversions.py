@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import rospy
 from geometry_msgs.msg import (
+    Point,
     Point32,
     PolygonStamped,
     Pose,
@@ -384,6 +385,23 @@ def test_maps_survive_the_way_there_and_back():
 
 
 @pytest.mark.parametrize(
+    "quaternion, yaw_rad, warned",
+    [
+        ((0.0, 0.0, 0.0, 0.0), 0.0, True),
+        ((0.0, 0.0, 0.0, 1.0), 0.0, False),
+        ((0.0, 0.0, 3.0, 3.0), np.pi / 2, False),  # not of length 1
+        ((0.0, 0.0, -0.0, -0.0), 0.0, True),
+    ],
+)
+def test_an_origin_without_a_rotation_is_not_rotated(caplog, quaternion, yaw_rad, warned):
+    origin = Pose(Point(1.0, 2.0, 0.0), Quaternion(*quaternion))
+    with caplog.at_level("WARNING", "rosout"):
+        grid_map = conversions.map_from_msg(grid_message(origin=origin))
+    np.testing.assert_allclose(grid_map.map_from_grid, [1.0, 2.0, yaw_rad])
+    assert ("the quaternion of the map's origin is 0 0 0 0: taken as no rotation" in caplog.text) is warned
+
+
+@pytest.mark.parametrize(
     "fields, text",
     [
         ({"data": [0] * 5}, "3 x 2 cells needs 6 values, got 5"),
@@ -393,7 +411,8 @@ def test_maps_survive_the_way_there_and_back():
         ({"data": [0, -2, -3, 0, 0, 0]}, "got -2 in 2 cell"),
         ({"resolution": 0.0}, "resolution > 0"),
         ({"resolution": np.nan}, "resolution > 0"),
-        ({"origin": Pose()}, "the origin of the map: a quaternion"),
+        ({"origin": Pose(orientation=Quaternion(0.0, 0.0, 0.0, np.nan))}, "the origin of the map: a quaternion"),
+        ({"origin": Pose(Point(np.inf, 0.0, 0.0), Quaternion())}, "the origin of the map: a position"),
     ],
 )
 def test_what_is_no_map_is_refused(fields, text):

@@ -135,14 +135,14 @@ NEEDS = "a map needs image, resolution, origin, negate, occupied_thresh, free_th
         ({"mode": "trinery"}, "map.yaml: mode must be trinary, scale or raw, got 'trinery'"),
         ({"resolution": "0"}, "map.yaml: resolution must be > 0 m, got 0.0"),
         ({"resolution": "-0.05"}, "map.yaml: resolution must be > 0 m, got -0.05"),
-        ({"resolution": ".nan"}, "map.yaml: resolution must be a finite number, got nan"),
+        ({"resolution": ".nan"}, "map.yaml: resolution must be a finite number, got '.nan'"),
         ({"resolution": "fine"}, "map.yaml: resolution must be a finite number, got 'fine'"),
         ({"resolution": None}, f"map.yaml: missing resolution; {NEEDS}"),
         ({"negate": None, "free_thresh": None}, f"map.yaml: missing negate, free_thresh; {NEEDS}"),
-        ({"negate": "2"}, "map.yaml: negate must be 0 or 1, got 2"),
-        ({"negate": "'no'"}, "map.yaml: negate must be 0 or 1, got 'no'"),
-        ({"origin": "[0, 0]"}, "map.yaml: origin must be [x, y, yaw] in m, m, rad, got [0, 0]"),
-        ({"origin": "[0, .inf, 0]"}, "map.yaml: origin must be [x, y, yaw] in m, m, rad, got [0, inf, 0]"),
+        ({"negate": "2"}, "map.yaml: negate must be 0 or 1, got '2'"),
+        ({"negate": "none"}, "map.yaml: negate must be 0 or 1, got 'none'"),
+        ({"origin": "[0, 0]"}, "map.yaml: origin must be [x, y, yaw] in m, m, rad, got ['0', '0']"),
+        ({"origin": "[0, .inf, 0]"}, "map.yaml: origin must be [x, y, yaw] in m, m, rad, got ['0', '.inf', '0']"),
         ({"origin": "corner"}, "map.yaml: origin must be [x, y, yaw] in m, m, rad, got 'corner'"),
         (
             {"free_thresh": "0.7"},
@@ -155,7 +155,7 @@ NEEDS = "a map needs image, resolution, origin, negate, occupied_thresh, free_th
             "got free_thresh 0.2 and occupied_thresh 65.0",
         ),
         ({"image": "''"}, "map.yaml: image must be the name of a file, got ''"),
-        ({"image": "7"}, "map.yaml: image must be the name of a file, got 7"),
+        ({"image": "7"}, "map.yaml: its image 7 does not exist"),
     ],
 )
 def test_a_value_that_cannot_be_meant_is_refused_in_one_line(write, fields, text):
@@ -168,6 +168,63 @@ def test_a_missing_image_is_refused(write, tmp_path):
     path = write([0])
     (tmp_path / "map.png").unlink()
     assert error(path) == "map.yaml: its image map.png does not exist"
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        "5e-2",
+        ".05",
+        "0.05",
+        "'0.05'",
+        '"0.05"',
+        "+0.05",
+        "5.E-2",
+        "0.5e-1",
+        "!!float 0.05",
+        "\t0.05",
+        "0.05 # m",
+        "&a 0.05",
+    ],
+)
+def test_numbers_are_read_as_yaml_cpp_reads_them(write, written):
+    assert map_file.load(write([0], resolution=written)).resolution_m == 0.05
+
+
+def test_the_numbers_of_an_origin_are_read_so_too(write):
+    grid_map = map_file.load(write([0], origin="[-5.e-2, '1e0', .05]"))
+    assert grid_map.map_from_grid.tolist() == [-0.05, 1.0, 0.05]
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"resolution": "010", "negate": "00"},  # octal for an integer only
+        {"resolution": "10.", "negate": "0x0"},
+        {"resolution": "10", "negate": "FALSE"},
+        {"resolution": "10", "negate": "off"},
+        {"resolution": "10", "mode": "~"},
+        {"resolution": "10", "mode": "'trinary'"},
+        {"resolution": "&r 10", "free_thresh": "2e-1", "occupied_thresh": "'.65'"},
+        {"resolution": "10", "origin": "\n  - '0'\n  - 0.0\n  - 0  # yaw"},
+    ],
+)
+def test_every_field_is_read_as_yaml_cpp_reads_it(write, fields):
+    grid_map = map_file.load(write([0, 100, 254], **fields))
+    assert grid_map.resolution_m == 10.0 and grid_map.occupancy.tolist() == [[100, -1, 0]]
+
+
+@pytest.mark.parametrize(
+    "written", ["1_000", "0x1", "1:30", "+.inf", ".inf", "1e400", "0,05", "0.05 m", "true", "", "~", "[0.05]", "- 1"]
+)
+def test_what_yaml_cpp_reads_as_no_number_is_none(write, written):
+    assert error(write([0], resolution=written)).startswith(("map.yaml: resolution must be", "map.yaml: is no yaml"))
+
+
+def test_windows_lines_a_byte_order_mark_and_a_second_document_do_no_harm(write):
+    path = write([0])
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n") + b"---\r\nresolution: 7\r\n")
+    assert map_file.load(path).resolution_m == 0.1
 
 
 @pytest.mark.parametrize("suffix", ["pgm", "png", "bmp"])

@@ -1,6 +1,6 @@
 """localization_node: where is the robot in a map of walls and glass? Also startable as `amcl`.
 
-Wiring only; the Localizer computes the answer. Callbacks only store; one loop alone touches the filter.
+Wiring only; the Localizer computes the answer. Callbacks only store, and send tf again; one loop alone touches the filter.
 
 Subscribes: scan (LaserScan; or each of ~scan_topics), initialpose (PoseWithCovarianceStamped), map (OccupancyGrid, if
     ~use_map_topic), global_localization_area (PolygonStamped in the map's frame: where to search for the robot),
@@ -11,12 +11,13 @@ Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseAr
     passed or was mirrored at. Stamp, frame and beams are the scan's; its `intensities` are 0 as measured, 1 cut,
     and -1 for all beams while the pose is not trusted: the scan is then passed on raw. One for every scan that is
     used; none for a scan that is rejected or has no transforms, because it is unknown where to cut it;
-    ~glass_map (OccupancyGrid, latched): probability of glass by wall cell [percent], -1 where unknown;
+    ~glass_map (OccupancyGrid, latched): probability of glass by wall cell [percent], -1 where unknown, with the cells
+    of panes that were found and that the map lacks;
     ~segment_quality (SegmentQuality), while somebody listens: how well the scan lies on the wall segments of the map;
     for rviz, while somebody listens: ~beam_cloud (PointCloud2), ~beam_markers (MarkerArray, a namespace per case
-    and one for the status), ~wall_markers (MarkerArray, latched: the known cells of the glass map), legend and ~legend
-    (Image, latched).
-Services: global_localization, request_nomotion_update (Empty), set_map (SetMap), ~locate (Locate: a rough pose
+    and one for the status), ~wall_markers (MarkerArray, latched: the known cells of the glass map, and
+    the panes that the map lacks), legend and ~legend (Image, latched).
+Services: ~save_panes (Trigger: writes ~panes_file), global_localization, request_nomotion_update (Empty), set_map (SetMap), ~locate (Locate: a rough pose
     corrected by wall segments), ~set_parameters (Reconfigure, with
     its topics ~parameter_descriptions and ~parameter_updates). Calls static_map (GetMap).
 Parameters: LocalizationNodeParams and LocalizerParams; explained in config/localization.yaml.
@@ -37,7 +38,8 @@ import tf2_ros
 from geometry_msgs.msg import PolygonStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import SetMap, SetMapRequest, SetMapResponse
-from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
+from sensor_msgs.msg import LaserScan
+from std_srvs.srv import Empty, EmptyRequest, EmptyResponse, Trigger, TriggerRequest, TriggerResponse
 
 from glass_nav.localization import health, initial_pose
 from glass_nav.localization.health import LocalizationHealth, Situation
@@ -99,6 +101,7 @@ class LocalizationNode:
 
         rospy.Service("global_localization", Empty, self._serve_global_localization)
         rospy.Service("request_nomotion_update", Empty, self._serve_nomotion_update)
+        rospy.Service("~save_panes", Trigger, self._serve_save_panes)
         rospy.Service("set_map", SetMap, self._serve_set_map)
         self._segments = SegmentService(p.node.global_frame_id, self._scan_and_map)
         self._reconfigure = ReconfigureServer(
@@ -108,7 +111,7 @@ class LocalizationNode:
         )
         # Subscribers last: they may fire at once.
         self._listener = tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
-        self._scans.subscribe(lambda msg: self._inbox.put("scans", msg))
+        self._scans.subscribe(self._take_scan)
         self._bearings.subscribe(self._command(self._bearings.receive))
         rospy.Subscriber("initialpose", PoseWithCovarianceStamped, self._command(self._take_guess), queue_size=2)
         rospy.Subscriber("global_localization_area", PolygonStamped, self._command(self._take_area), queue_size=2)
@@ -137,11 +140,16 @@ class LocalizationNode:
             self._send_glass_map()
             self._report()
 
-    def save_pose(self) -> None:
-        """For the next start."""
+    def save(self) -> None:
+        """The pose and the panes, for the next start."""
         self._memory.save()
+        self._session.keep_panes()
 
     # -- callbacks of other threads: they store, services also wait for the outcome
+
+    def _take_scan(self, msg: LaserScan) -> None:
+        self._inbox.put("scans", msg)
+        self._outputs.send_transform_again(conversions.ns_from_stamp(msg.header.stamp), rospy.Time.now().to_nsec())
 
     def _command(self, handle: Callable[[Any], None]) -> Callable[[Any], None]:
         return lambda msg: self._inbox.put("commands", lambda: handle(msg))
@@ -163,6 +171,15 @@ class LocalizationNode:
         except (ValueError, TimeoutError) as err:
             raise rospy.ServiceException(str(err)) from err
         return EmptyResponse()
+
+    def _serve_save_panes(self, _request: TriggerRequest) -> TriggerResponse:
+        written: List[str] = []
+        try:
+            self._in_run_loop(lambda: written.append(self._session.save_panes()))
+        except (ValueError, TimeoutError) as err:
+            rospy.logwarn(f"save_panes refused: {err}")
+            return TriggerResponse(success=False, message=str(err))
+        return TriggerResponse(success=True, message=written[0])
 
     def _serve_set_map(self, request: SetMapRequest) -> SetMapResponse:
         try:
@@ -305,6 +322,7 @@ class LocalizationNode:
             session.map_origin if session.grid_map else self._maps.trouble or "no map yet",
             self._scans.period_s,
             self._scans.lidars,
+            session.lacking_glass,
         )
         self._diagnostics.publish(self._health.report(situation))
 
@@ -359,5 +377,5 @@ def main(name: str = "glass_localization") -> None:
     try:
         node.run(ending)
     finally:
-        node.save_pose()
+        node.save()
         rospy.signal_shutdown("ended")

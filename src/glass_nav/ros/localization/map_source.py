@@ -67,6 +67,8 @@ class MapSource:
             self.take(conversions.map_from_msg(msg), msg.header.frame_id, origin)
         except ValueError as err:
             rospy.logerr(f"the map of {origin} is refused: {err}")
+            if not self._taken:
+                self.trouble = f"no map: the one of {origin} is refused: {err}"
 
     def take(self, grid_map: GridMap, frame: str, origin: str) -> None:
         """Pass a map on; after that none is requested."""
