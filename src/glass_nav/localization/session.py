@@ -15,6 +15,7 @@ from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.panes_memory import PanesFilePath, PanesMemory
 from glass_nav.localization.saved_pose import PoseFile
+from glass_nav.localization.state_log import StateLog
 from glass_nav.sensing.scan import Scan
 from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
@@ -76,6 +77,7 @@ class LocalizationSession:
         self.estimate: Optional[Estimate] = None
         self.scan: Optional[Scan] = None  # that the estimate was made of
         self.last_estimate_s = now_s
+        self._state_log = StateLog()
         self.pose_is_news = True  # until the next estimate is out, even if that scan does not move the particles
 
     # -- maps, poses and parameters from outside
@@ -155,6 +157,9 @@ class LocalizationSession:
         if not is_finite(estimate):
             return None
         self.estimate, self.scan, self.last_estimate_s = estimate, scan, now_s
+        line = self._state_log.take(estimate)
+        if line is not None:
+            _log.log(line.level, line.text)
         self._panes.tell(self._running())
         return estimate
 
@@ -184,7 +189,7 @@ class LocalizationSession:
         self.last_estimate_s = now_s
         if not self._time_is_simulated and self.estimate is not None:
             self._starts.begin_at(self.estimate.map_from_base, self.estimate.covariance)
-        self.estimate = None
+        self.estimate, self._state_log = None, StateLog()
         self._rng = self._params.rules.rng  # a bag that starts over gives the same poses again
         if self._time_is_simulated and self._params.rules.wait_for_initialpose:
             self.waits_for_pose, self.localizer = True, None

@@ -74,6 +74,7 @@ def same(one, other):
 # -- it tracks
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(3))
 def test_a_robot_in_an_opaque_room_is_tracked_within_centimetres(seed):
     drive = Drive(seed=seed, steps=40)
@@ -85,6 +86,7 @@ def test_a_robot_in_an_opaque_room_is_tracked_within_centimetres(seed):
     assert all(estimate.updated for estimate in estimates)
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("glass_share", [0.3, 0.9])
 def test_a_robot_beside_glass_is_tracked_within_centimetres(seed, glass_share):
@@ -94,6 +96,7 @@ def test_a_robot_beside_glass_is_tracked_within_centimetres(seed, glass_share):
     assert turn_rad.max() < np.radians(1.5)
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("weight_mode", ["field", "ranges"])
 @pytest.mark.parametrize("seed", range(2))
 def test_either_way_to_weigh_particles_tracks_a_robot_beside_glass(seed, weight_mode):
@@ -166,6 +169,7 @@ def test_a_pane_becomes_glass_over_a_drive_and_a_wall_does_not(seed):
     assert (picture[~MAPS[GLASS_ROOM].occupied] == -1).all()
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(2))
 def test_in_an_opaque_room_no_wall_becomes_glass(seed):
     drive = Drive(seed=seed, steps=40)
@@ -186,6 +190,7 @@ def test_a_lidar_that_sees_no_glass_at_all_is_localized(seed):
     assert estimates[-1].state == "LOCALIZED"
 
 
+@pytest.mark.long_run
 def test_another_map_has_other_glass():
     drive = GlassDrive()
     localizer = started(GLASS_ROOM, drive.true[0])
@@ -279,6 +284,7 @@ def test_a_scan_between_updates_is_cut_too():
     assert np.mean(again.surface_scan.cut == last.surface_scan.cut) > 0.97 and again.surface_scan.cut.any()
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("vote_mode", ["soft", "paper"])
 def test_between_updates_beams_are_told_apart_as_in_one(vote_mode):
     """The same scans from where the robot stands, once with an update and once between updates."""
@@ -310,6 +316,7 @@ def test_few_beams_are_used_as_far_as_they_go(beams):
     assert len(drive.scans[0]) == beams
 
 
+@pytest.mark.long_run
 def test_it_tracks_with_fewer_resamplings_and_more_threads():
     drive = Drive(seed=7, steps=20)
     way_m, _ = drive.errors(drive.through(started(resample_interval=3, raycast_threads=2))).T
@@ -372,6 +379,7 @@ def test_in_an_area_only_what_lies_in_it_is_a_candidate():
     assert off(told.map_from_base, true)[0] < 0.1
 
 
+@pytest.mark.long_run
 def test_a_pose_given_too_vaguely_to_track_is_looked_for_within_its_reach():
     drive = Drive(seed=1, steps=40)
     localizer = Localizer(parameters(), MAPS[L_ROOM], np.random.default_rng(1))
@@ -438,6 +446,7 @@ def test_a_robot_that_stands_for_five_minutes_stays_where_it_is(forced):
 # -- what happens between and beside good scans
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(3))
 def test_a_wheel_that_slips_is_made_up_for_by_the_scan(seed):
     drive = Drive(seed=seed)
@@ -753,6 +762,7 @@ def test_mrpts_ray_casts_give_nearly_the_same_answer(drive):
     assert np.mean(same_case) > 0.98
 
 
+@pytest.mark.long_run
 def test_another_seed_gives_nearly_the_same_answer(drive):
     one, other = drive.through(started(seed=5)), drive.through(started(seed=6))
     assert not np.array_equal(one[-1].particles, other[-1].particles)
@@ -950,6 +960,7 @@ def test_a_filter_that_is_given_up_leaves_the_memory_at_once(drive):
         gc.enable()
 
 
+@pytest.mark.long_run
 def test_a_search_goes_on_in_another_map():
     drive = Drive(GLASS_ROOM, seed=2, centre=(3.0, 1.6), glass_share=0.3)
     localizer = started(L_ROOM, drive.true[0])

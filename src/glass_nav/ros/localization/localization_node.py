@@ -46,6 +46,7 @@ from glass_nav.localization.health import LocalizationHealth, Situation
 from glass_nav.localization.pose_memory import PoseMemory
 from glass_nav.localization.saved_pose import SavedPose
 from glass_nav.localization.session import Inputs, LocalizationSession
+from glass_nav.localization.start_hints import what_to_start
 from glass_nav.ros import command_line, conversions, mailbox, shutdown
 from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.landmarks.bearing_messages import LONGEST_TURN_S
@@ -55,6 +56,7 @@ from glass_nav.ros.localization.map_source import MapSource
 from glass_nav.ros.localization.publishers import Publishers
 from glass_nav.ros.localization.reconfigure import ReconfigureServer
 from glass_nav.ros.localization.segment_service import SegmentService
+from glass_nav.ros.localization.shown_parameters import ShownParameters
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
@@ -89,9 +91,10 @@ class LocalizationNode:
         self._maps = MapSource(p.node, self._log, self._use_map)
         self._memory = PoseMemory(p.pose_file, _keep_on_server, lambda line: self._log.warn(line, period_s=60.0))
         self._outputs = Publishers(p.node)
+        self._transforms = TfTransforms(self._tf, p.node.odom_frame_id, p.node.base_frame_id)
         self._session = LocalizationSession(
             p.session,
-            TfTransforms(self._tf, p.node.odom_frame_id, p.node.base_frame_id).odom_from_base,
+            self._transforms.odom_from_base,
             bool(rospy.get_param("/use_sim_time", False)),
             self._clock.now_s,
             self._outputs.start_over,
@@ -312,6 +315,7 @@ class LocalizationNode:
                 self._log.warn(trouble, NO_SCAN_WARNING_S)
         elif self._clock.now_s - self._scans.last_arrival_s > NO_SCAN_WARNING_S:
             self._log.warn(silence, NO_SCAN_WARNING_S)
+        self._say_what_to_start()
         if trouble is not None:
             self._outputs.send_trouble(session.estimate, session.state_without_scans, trouble)
         situation = Situation(
@@ -325,6 +329,18 @@ class LocalizationNode:
             session.lacking_glass,
         )
         self._diagnostics.publish(self._health.report(situation))
+
+    def _say_what_to_start(self) -> None:
+        """While nothing was localized: what is missing, for those who started this node alone."""
+        if self._session.estimate is not None or time.monotonic() - self._started_s < SETTLING_S:
+            return
+        hint = what_to_start(
+            self._maps.is_missing,
+            self._scans.unpublished,
+            "" if self._transforms.has_odometry() else self._transforms.odometry_name,
+        )
+        if hint is not None:
+            self._log.warn(hint, NO_SCAN_WARNING_S)
 
 
 def _keep_on_server(saved: SavedPose) -> None:
@@ -370,6 +386,7 @@ def main(name: str = "glass_localization") -> None:
         node = LocalizationNode(p)
     except landmark_file.LandmarkError as err:
         shutdown.refuse_to_start(err)
+    shown = ShownParameters(params.on_server(p), given)
     for line in ignored:
         rospy.logwarn(line)
     if unused:
@@ -378,4 +395,5 @@ def main(name: str = "glass_localization") -> None:
         node.run(ending)
     finally:
         node.save()
+        shown.hide()
         rospy.signal_shutdown("ended")

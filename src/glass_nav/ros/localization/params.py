@@ -187,3 +187,9 @@ def without_unknown(mapping: Mapping[str, Any], owner: str) -> Tuple[Dict[str, A
         {name: value for name, value in mapping.items() if name in known},
         [f"{params.unknown(name, known, owner)}; not used, as by amcl" for name in unknown],
     )
+
+
+def on_server(p: LocalizationParams) -> Dict[str, Any]:
+    """Name -> value of all parameters that the parameter server can hold."""
+    held = {name: list(value) if isinstance(value, tuple) else value for name, value in params.as_mapping(p).items()}
+    return {name: value for name, value in held.items() if isinstance(value, (bool, int, float, str, list))}
