@@ -183,4 +183,5 @@ class BeamClassifier:
             self.max_glass_thickness_m,
             self.min_linearity,
             behind_m,
+            mirrored_by_line=self._params.vote.vote_mode != "paper",  # the document casts on the cells
         )

@@ -49,6 +49,7 @@ def of(
     max_thickness_m: float,
     min_linearity: float,
     behind_m: float = np.inf,
+    mirrored_by_line: bool = True,
 ) -> ExpectedRanges:
     """Expected ranges of every beam of the scan from every sample.
 
@@ -61,6 +62,7 @@ def of(
         min_linearity: below it a surface has no normal: no mirrored range.
         behind_m: all samples but the first look no farther behind the end of a beam than that, and nowhere where a beam
             did not return; inf: everywhere.
+        mirrored_by_line: the mirrored ranges are those by the lines of the walls; else by their cells.
     """
     from_laser = se2.compose(samples, scan.base_from_laser)
     paths = caster.cast_paths(from_laser, scan.angles_rad, _reach_m(scan, behind_m), max_thickness_m, min_linearity)
@@ -74,9 +76,10 @@ def of(
     range_m[:, 0] = np.concatenate([hits.first_m, hits.mirrored_m, hits.second_m, hits.third_m])
     cell[:, 0] = np.concatenate([hits.first_cell, hits.mirrored_cell, hits.second_cell, hits.third_cell])
     cos[:, 0] = cos_incidence(caster, np.stack([beam_rad, mirrored_rad, beam_rad, beam_rad]), cell[:, 0], min_linearity)
-    range_m[1] = _mirrored_by_line(
-        caster, thickness_m, from_laser, scan.angles_rad, range_m[1], cell[:2], min_linearity
-    )
+    if mirrored_by_line:
+        range_m[1] = _mirrored_by_line(
+            caster, thickness_m, from_laser, scan.angles_rad, range_m[1], cell[:2], min_linearity
+        )
     has_normal = hits.linearity >= min_linearity
     incidence = np.where(has_normal, np.arccos(np.clip(cos[0, :1], 0.0, 1.0)), np.nan)
     normal_rad, linearity = caster.normals()
