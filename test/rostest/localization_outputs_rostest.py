@@ -24,6 +24,7 @@ from room_robot import BEAMS, Robot, changed, pose_message, room
 from rostest_support import Heard, LogLines, wait_until
 from sensor_msgs.msg import Image, LaserScan
 from std_srvs.srv import Empty
+from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from glass_nav.geometry import angles, se2
@@ -40,6 +41,7 @@ NODE = "/glass_localization"
 HEAD_ON_RAD = 0.15  # up to this angle to its normal the pane answers
 MOUNTING = np.array([0.2, 0.0, 0.3])  # of the robot's lidar
 PERIOD_S = 0.5  # ~glass_map_period_s
+TOLERANCE_NS = 100_000_000  # ~transform_tolerance
 
 
 def room_with_a_pane() -> GridMap:
@@ -48,6 +50,12 @@ def room_with_a_pane() -> GridMap:
     occupancy = empty.occupancy.copy()
     occupancy[20:170, PANE_COLUMN] = 100
     return GridMap(occupancy, empty.resolution_m, empty.map_from_grid)
+
+
+def stamp_of(msg: TFMessage) -> int:
+    """Of map -> odom [ns]; 0: another transform."""
+    (transform,) = msg.transforms
+    return transform.header.stamp.to_nsec() if transform.header.frame_id == "map" else 0
 
 
 class LidarAndPane:
@@ -271,6 +279,27 @@ class LocalizationOutputs(unittest.TestCase):
             self.assertTrue(wait_until(lambda legend=legend: len(legend), 30.0), "no ~legend within 30 s")
             self.assertEqual((legend.last.encoding, legend.last.step), ("rgb8", 3 * legend.last.width))
             self.assertEqual(len(legend.last.data), legend.last.height * legend.last.step)
+
+    # -- tf
+
+    def test_tf_goes_out_when_a_scan_comes_and_the_correction_follows(self) -> None:
+        """The last correction with the stamp of the scan and ~transform_tolerance, before the status of the scan."""
+        came: List[Any] = []  # (kind, stamp [ns]) in the order in which the node sent them, 20 ms and more apart
+        tf = rospy.Subscriber("/tf", TFMessage, lambda msg: came.append(("tf", stamp_of(msg))))
+        status = rospy.Subscriber(
+            f"{NODE}/status", LocalizationStatus, lambda msg: came.append(("status", msg.header.stamp.to_nsec()))
+        )
+        self.robot.make_steps(12)
+        tf.unregister()
+        status.unregister()
+        began = next(number for number, (kind, stamp) in enumerate(came) if kind == "tf" and stamp)
+        came = came[began:]  # both subscribers hear
+        scans = [stamp for kind, stamp in came if kind == "status"][1:]
+        self.assertGreater(len(scans), 5)
+        before = [("tf", stamp + TOLERANCE_NS) in came[: came.index(("status", stamp))] for stamp in scans]
+        self.assertGreater(np.mean(before), 0.7, came)
+        sent = [stamp for kind, stamp in came if kind == "tf" and stamp]
+        self.assertEqual(len(sent), len(set(sent)), "a stamp was sent twice")
 
     # -- ~locate and ~segment_quality
 

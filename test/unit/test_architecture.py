@@ -17,8 +17,9 @@ MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or les
     "geometry": "",
     "world": "geometry",
     "sensing": "geometry world",
+    "panes": "geometry world sensing",
     "hypotheses": "geometry world sensing",
-    "localization": "geometry world sensing hypotheses",
+    "localization": "geometry world sensing hypotheses panes",
     "localization/beam_classification": "geometry world sensing",
     "localization/particle_filter": "geometry world sensing hypotheses localization/beam_classification",
     "localization/integrity": "geometry world sensing hypotheses localization/particle_filter",
@@ -31,17 +32,17 @@ MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or les
     "driving": "geometry world sensing hypotheses localization topology",
     "recording": "geometry world sensing",
     "simulation": "geometry world sensing",
-    "checkup": "geometry world sensing hypotheses localization recording",
+    "checkup": "geometry world sensing panes hypotheses localization recording",
     "evaluation": "geometry world",
     "evaluation/metrics": "geometry",
     "evaluation/plots": "geometry world evaluation/metrics",
     "evaluation/pages": "geometry evaluation/metrics evaluation/plots",
-    "replay": "geometry world sensing hypotheses localization topology driving recording evaluation",
-    "compare": "geometry world sensing hypotheses localization topology driving recording evaluation replay",
+    "replay": "geometry world sensing panes hypotheses localization topology driving recording evaluation",
+    "compare": "geometry world sensing panes hypotheses localization topology driving recording evaluation replay",
     "demo": "geometry world topology evaluation",
-    "cli": "geometry world sensing hypotheses localization topology driving recording simulation evaluation checkup "
+    "cli": "geometry world sensing panes hypotheses localization topology driving recording simulation evaluation checkup "
     "replay compare",
-    "ros": "geometry world sensing hypotheses localization topology driving recording simulation evaluation checkup "
+    "ros": "geometry world sensing panes hypotheses localization topology driving recording simulation evaluation checkup "
     "demo",
 }
 # modules of no room

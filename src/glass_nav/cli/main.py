@@ -28,7 +28,7 @@ def main(argv: Optional[List[str]] = None) -> int:
         says what), 130 interrupted.
     """
     try:
-        from glass_nav.cli import atlas, compare, doctor, landmarks, locate, params, replay, report, simulate
+        from glass_nav.cli import atlas, compare, doctor, landmarks, locate, maps, params, replay, report, simulate
     except ImportError as err:
         if not str(err.name).startswith("glass_nav"):
             raise
@@ -42,6 +42,7 @@ def main(argv: Optional[List[str]] = None) -> int:
         "doctor": doctor,
         "landmarks": landmarks,
         "locate": locate,
+        "map": maps,
         "params": params,
         "replay": replay,
         "report": report,

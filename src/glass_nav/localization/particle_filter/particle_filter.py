@@ -5,7 +5,7 @@ Thrun, Burgard, Fox, Probabilistic Robotics (2005), ch. 8, with a proposal that 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Optional
 
 import numpy as np
@@ -58,6 +58,7 @@ class Registration:
     alignment: Optional[Alignment]  # None: nothing to draw particles from
     beams: int  # that were aligned
     fits: bool  # as scans usually do: what is seen from there may be learnt
+    contradicts_odometry: bool = False  # a wheel may have slipped
 
 
 class ParticleFilter:
@@ -157,14 +158,19 @@ class ParticleFilter:
             self._weights = resampling.normalised(np.log(self._weights) + _FULL_FIT * fit)
             best = pose_estimate.of(self.particles, self._weights)
             return Registration(best.map_from_base, best.covariance, best, None, 0, False)
-        found = self._registration.find(best.map_from_base, best.covariance, odom_from_base, points)
-        return Registration(found.poses[0], np.zeros((3, 3)), best, found, len(beams), self._registration.fits)
+        finder = self._registration
+        found = finder.find(best.map_from_base, best.covariance, odom_from_base, points)
+        return Registration(
+            found.poses[0], np.zeros((3, 3)), best, found, len(beams), finder.fits, finder.contradicts_odometry
+        )
 
     def weigh(self, scan: Scan, cases: BeamCases, registration: Registration, classifier: BeamClassifier) -> None:
         """Draw particles where the scan fits, and weigh all of them by the beams whose case is known."""
         if registration.alignment is None:
             return
-        residuals, mixture = classifier.residuals, self._params.mixture
+        residuals, mixture, shares = classifier.residuals, self._params.mixture, self._params.proposal
+        if not registration.contradicts_odometry:
+            shares = replace(shares, odom_slip_probability=0.0)
         aligned = self._refined(
             registration, scan.points_in_base()[importance_weights.known_ends(cases.case)], residuals
         )
@@ -176,7 +182,7 @@ class ParticleFilter:
             registration.best,
             aligned,
             beam_information,
-            self._params.proposal,
+            shares,
             self._rng,
         )
         self._weights = resampling.tempered(log_ratio + self._log_weights(scan, cases, classifier))

@@ -5,6 +5,9 @@ metre and 10 degrees between scans, a turn of 80 degrees goes unnoticed. So the 
 samples over the predicted spread. If it fits much worse there than recent scans did, wider spreads are tried. A place
 that odometry did not lead to is accepted only if the next scan fits there too, and still not where odometry leads: a
 crowd around the robot may look like another room once.
+
+Where the scan leaves a direction free, as in a hall whose ends are out of sight, odometry is the evidence along it. That
+a wheel slipped is considered only if the scan says so: it does not fit where odometry leads, and does nearby.
 """
 
 from __future__ import annotations
@@ -39,7 +42,8 @@ _LEVELS = (  # limits of the starts' spread: as predicted, a bad step of odometr
     ),
 )
 _POOR_FIT = 0.75  # of the usual fit: odometry is not trusted
-_REACH = 3.0  # deviations: farther away a poor fit is due to chance
+_REACH = 3.0  # deviations
+_MIN_DEVIATION = np.array([0.01, 0.01, np.radians(0.2)])  # of odometry: m, m, rad
 _CONVINCING_FIT = 0.9  # of the usual fit: a place that odometry did not lead to
 _MEMORY = 0.9
 _MIN_SCALE_M, _MAX_SCALE_M = 0.06, 0.3  # of the kernel; follows how well the map fits
@@ -51,6 +55,7 @@ class ScanRegistration:
 
     def __init__(self, field: DistanceField) -> None:
         self.fits = True  # the last scan fitted about as well as scans usually do
+        self.contradicts_odometry = False  # the last scan fitted beside the place that odometry led to, and not there
         self._field = field
         self._usual_fit = float("nan")
         self._scale_m = _MIN_SCALE_M
@@ -69,18 +74,25 @@ class ScanRegistration:
         found = self._align_around(mean, covariance, _LEVELS[0], points_m)
         suspect, self._suspect = self._suspect, None
         self.fits = not found.fit[0] < _POOR_FIT * self._usual_fit
+        self.contradicts_odometry = self._contradicts(found, mean, covariance, points_m)
         if not self.fits:
             farther = self._confirmed(suspect, odom_from_base, points_m)
             if farther is not None:
-                self.fits = True
+                self.fits = self.contradicts_odometry = True
                 return farther
             self._suspect = self._search(mean, covariance, odom_from_base, points_m)
-            near = _within_reach(found.poses, mean, covariance)
+            near = _within(found.poses, mean, _spread(covariance, _LEVELS[0]))
             if not near.any():  # the scan is no evidence about the place that odometry leads to
                 return Alignment(mean[None], np.zeros((1, 3, 3)), scan_alignment.fit(self._field, points_m, mean[None]))
             found = Alignment(found.poses[near], found.information[near], found.fit[near])
         self._remember(found, points_m)
         return found
+
+    def _contradicts(self, found: Alignment, mean: np.ndarray, covariance: np.ndarray, points_m: np.ndarray) -> bool:
+        """The scan fits at an aligned pose as scans usually do, but at none that odometry explains."""
+        near = found.poses[_within(found.poses, mean, np.sqrt(np.diag(covariance) + _MIN_DEVIATION**2))]
+        fit_near = scan_alignment.fit(self._field, points_m, np.vstack([mean, near])).max()
+        return bool(fit_near < _POOR_FIT * self._usual_fit and found.fit[0] > _CONVINCING_FIT * self._usual_fit)
 
     def _confirmed(
         self, suspect: Optional[np.ndarray], odom_from_base: np.ndarray, points_m: np.ndarray
@@ -119,11 +131,11 @@ class ScanRegistration:
         return scan_alignment.distinct(scan_alignment.align(self._field, points_m, starts, last_scale_m=self._scale_m))
 
 
-def _within_reach(poses: np.ndarray, mean: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """(K,) bool: poses (K, 3) that a poor fit may still lead to."""
+def _within(poses: np.ndarray, mean: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+    """(K,) bool: poses (K, 3) that are within reach of a mean with deviations (3,)."""
     off = np.abs(poses - mean)
     off[:, 2] = np.abs(angles.wrap(off[:, 2]))
-    return np.all(off < _REACH * _spread(covariance, _LEVELS[0]), axis=1)
+    return np.all(off < _REACH * deviations, axis=1)
 
 
 def _spread(covariance: np.ndarray, shape: PreliminarySamples) -> np.ndarray:

@@ -1,6 +1,6 @@
 """localization_node: where is the robot in a map of walls and glass? Also startable as `amcl`.
 
-Wiring only; the Localizer computes the answer. Callbacks only store; one loop alone touches the filter.
+Wiring only; the Localizer computes the answer. Callbacks only store, and send tf again; one loop alone touches the filter.
 
 Subscribes: scan (LaserScan; or each of ~scan_topics), initialpose (PoseWithCovarianceStamped), map (OccupancyGrid, if
     ~use_map_topic), global_localization_area (PolygonStamped in the map's frame: where to search for the robot),
@@ -37,6 +37,7 @@ import tf2_ros
 from geometry_msgs.msg import PolygonStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import SetMap, SetMapRequest, SetMapResponse
+from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from glass_nav.localization import health, initial_pose
@@ -110,7 +111,7 @@ class LocalizationNode:
         # Subscribers last: they may fire at once.
         self._listener = tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
         self._sender_watch = SenderWatch(p.node, self._log)
-        self._scans.subscribe(lambda msg: self._inbox.put("scans", msg))
+        self._scans.subscribe(self._take_scan)
         self._bearings.subscribe(self._command(self._bearings.receive))
         rospy.Subscriber("initialpose", PoseWithCovarianceStamped, self._command(self._take_guess), queue_size=2)
         rospy.Subscriber("global_localization_area", PolygonStamped, self._command(self._take_area), queue_size=2)
@@ -144,6 +145,10 @@ class LocalizationNode:
         self._memory.save()
 
     # -- callbacks of other threads: they store, services also wait for the outcome
+
+    def _take_scan(self, msg: LaserScan) -> None:
+        self._inbox.put("scans", msg)
+        self._outputs.send_transform_again(conversions.ns_from_stamp(msg.header.stamp), rospy.Time.now().to_nsec())
 
     def _command(self, handle: Callable[[Any], None]) -> Callable[[Any], None]:
         return lambda msg: self._inbox.put("commands", lambda: handle(msg))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Optional
 
 import numpy as np
@@ -13,6 +14,7 @@ from sensor_msgs.msg import LaserScan, PointCloud2
 from visualization_msgs.msg import MarkerArray
 
 from glass_nav.localization.localizer import Estimate, Localizer
+from glass_nav.localization.map_to_odom import MapToOdom, StampedTransform
 from glass_nav.msg import BeamCases, LocalizationStatus
 from glass_nav.rate_limiter import RateLimiter, period_s
 from glass_nav.ros import conversions, legend
@@ -32,7 +34,7 @@ class Publishers:
         self._p = p
         self._frame = p.global_frame_id
         self._was_localized = False
-        self._last_transform_ns = 0
+        self._map_to_odom, self._sending = MapToOdom(), threading.Lock()  # callbacks send too
         self._particles_pace, self._beams_pace, self._glass_pace = RateLimiter(), RateLimiter(), RateLimiter()
         self._glass_is_news = False  # changed since it was last sent
         self._broadcaster = tf2_ros.TransformBroadcaster()
@@ -53,8 +55,9 @@ class Publishers:
 
     def start_over(self) -> None:
         """The pose is no longer known: stamps may go back, and tf waits for LOCALIZED again if so configured."""
-        self._was_localized = False
-        self._last_transform_ns = 0
+        with self._sending:
+            self._was_localized = False
+            self._map_to_odom.start_over()
         self.glass_is_news()
 
     def glass_is_news(self) -> None:
@@ -94,15 +97,32 @@ class Publishers:
         self._show_beams(placed, estimate, now_s)
 
     def send_transform(self, stamp_ns: int, map_from_odom: np.ndarray) -> None:
-        """tf map -> odom, if wanted. Never two with one stamp: tf warns about each."""
-        if not self._p.tf_broadcast or not (self._was_localized or self._p.publish_tf_before_localized):
-            return
-        stamp_ns = max(stamp_ns, self._last_transform_ns + 1)  # another lidar's scan may be older
-        self._last_transform_ns = stamp_ns
-        valid_until_ns = stamp_ns + round(self._p.transform_tolerance * 1e9)
-        self._broadcaster.sendTransform(
-            conversions.transform_stamped(valid_until_ns, self._frame, self._p.odom_frame_id, map_from_odom)
-        )
+        """tf map -> odom after a scan, if wanted."""
+        with self._sending:
+            if self._transform_is_wanted:
+                self._send(self._map_to_odom.corrected(stamp_ns, map_from_odom, self._tolerance_ns))
+
+    def send_transform_again(self, scan_ns: int, now_ns: int) -> None:
+        """tf map -> odom as it was last, the moment a scan arrives. May be called by any thread."""
+        with self._sending:
+            if self._transform_is_wanted:
+                self._send(self._map_to_odom.arrived(scan_ns, now_ns, self._tolerance_ns))
+
+    @property
+    def _transform_is_wanted(self) -> bool:
+        return self._p.tf_broadcast and (self._was_localized or self._p.publish_tf_before_localized)
+
+    @property
+    def _tolerance_ns(self) -> int:
+        return round(self._p.transform_tolerance * 1e9)
+
+    def _send(self, transform: Optional[StampedTransform]) -> None:
+        if transform is not None:
+            self._broadcaster.sendTransform(
+                conversions.transform_stamped(
+                    transform.stamp_ns, self._frame, self._p.odom_frame_id, transform.map_from_odom
+                )
+            )
 
     def send_trouble(self, estimate: Optional[Estimate], state: LocalizationState, trouble: str) -> None:
         """~status, and its text in rviz, while no scan is being used.

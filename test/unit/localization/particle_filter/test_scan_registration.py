@@ -157,3 +157,40 @@ def test_the_same_scan_again_is_the_same_answer(l_room):
     first, second = (ScanRegistration(l_room).find(true, TIGHT, true, points) for _ in range(2))
     np.testing.assert_allclose(first.poses, second.poses, atol=1e-9)
     np.testing.assert_allclose(first.fit, second.fit, atol=1e-9)
+
+
+# -- when a wheel may have slipped
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_scan_contradicts_odometry_only_if_it_fits_beside_the_place_that_odometry_leads_to(l_room, seed):
+    true = np.array([2.0, 1.6, 0.7])
+    robot = Robot(l_room, true, seed)
+    assert not robot.anchor.contradicts_odometry
+    slipped = true + [0.25 * np.cos(seed), 0.25 * np.sin(seed), 0.1]
+    robot.find(odometry_at(true), robot.points(slipped))
+    assert robot.anchor.contradicts_odometry
+    robot.anchor.find(true, TIGHT, odometry_at(true), RING)  # fits nowhere
+    assert not robot.anchor.contradicts_odometry
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_scan_that_fits_all_along_a_corridor_contradicts_no_odometry(seed):
+    rng = np.random.default_rng(seed)
+    anchor = ScanRegistration(DistanceField(CORRIDOR.grid_map()))
+    for x_m in np.arange(25.0, 32.0, 0.3):
+        true = np.array([x_m, 0.9, 0.0])
+        prediction = true + [rng.normal(0.0, 0.3), 0.0, 0.0]
+        points = CORRIDOR.scan(true, rng=rng).points_in_base()
+        anchor.find(prediction, TIGHT, prediction, points[np.isfinite(points).all(axis=1)])
+        assert not anchor.contradicts_odometry
+
+
+def test_a_spin_that_is_believed_at_the_second_scan_contradicts_odometry(l_room):
+    true = np.array([2.0, 1.6, 0.7])
+    robot = Robot(l_room, true, 0)
+    spun = true + [0.0, 0.0, np.radians(80.0)]
+    robot.find(odometry_at(true), robot.points(spun))
+    assert not robot.anchor.contradicts_odometry
+    robot.find(odometry_at(true), robot.points(spun))
+    assert robot.anchor.contradicts_odometry

@@ -1,0 +1,55 @@
+"""Scans as they arrive, corrections as they are computed -> when tf map -> odom is sent, with which stamp.
+
+Navigation asks tf for "now" and does not wait. So the last correction is sent again the moment a scan arrives, before the
+filter has worked on it, and the new correction follows when it is computed. Each transform is stamped ahead of its scan
+by `transform_tolerance`, as AMCL's are. A stamp is never sent twice, so a correction holds from the time on up to which
+transforms were sent already, and never moves one that somebody may have used.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Optional
+
+import numpy as np
+
+_AHEAD_NS = 500_000_000  # a scan stamped further in the future has a wrong clock, and tf would keep its stamp
+
+
+@dataclass(frozen=True)
+class StampedTransform:
+    """To be sent on tf."""
+
+    stamp_ns: int
+    map_from_odom: np.ndarray  # (3,) x [m], y [m], yaw [rad]
+
+
+class MapToOdom:
+    """Remembers the last correction, and the last stamp."""
+
+    def __init__(self) -> None:
+        self._map_from_odom: Optional[np.ndarray] = None
+        self._last_scan_ns = 0
+        self._last_sent_ns = 0
+
+    def start_over(self) -> None:
+        """The pose is no longer known, and stamps may go back."""
+        self._map_from_odom = None
+        self._last_scan_ns = self._last_sent_ns = 0
+
+    def arrived(self, scan_ns: int, now_ns: int, tolerance_ns: int) -> Optional[StampedTransform]:
+        """A scan has come: the last correction again, if there is one. Not for a scan older than another."""
+        if self._map_from_odom is None or not self._last_scan_ns < scan_ns <= now_ns + _AHEAD_NS:
+            return None
+        return self._stamped(scan_ns, tolerance_ns, self._map_from_odom)
+
+    def corrected(self, scan_ns: int, map_from_odom: np.ndarray, tolerance_ns: int) -> Optional[StampedTransform]:
+        """The filter's answer to a scan (3,); None if it is what was sent when the scan came."""
+        is_sent = scan_ns <= self._last_scan_ns and np.array_equal(map_from_odom, self._map_from_odom)
+        self._map_from_odom = np.array(map_from_odom, float)
+        return None if is_sent else self._stamped(scan_ns, tolerance_ns, self._map_from_odom)
+
+    def _stamped(self, scan_ns: int, tolerance_ns: int, map_from_odom: np.ndarray) -> StampedTransform:
+        self._last_scan_ns = max(scan_ns, self._last_scan_ns)
+        self._last_sent_ns = max(scan_ns + tolerance_ns, self._last_sent_ns + 1)
+        return StampedTransform(self._last_sent_ns, map_from_odom)

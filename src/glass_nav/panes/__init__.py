@@ -1,0 +1,1 @@
+"""Which glass does the map lack? Scans at trusted poses -> panes."""

@@ -1,0 +1,66 @@
+"""When map -> odom goes out: at once, once, never back, and never changed after the fact."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from glass_nav.localization.map_to_odom import MapToOdom
+
+MS = 1_000_000
+ONE, OTHER = np.array([1.0, 2.0, 0.1]), np.array([1.1, 2.0, 0.1])
+
+
+def test_before_the_first_correction_nothing_is_sent():
+    assert MapToOdom().arrived(100 * MS, 100 * MS, 50 * MS) is None
+
+
+def test_a_scan_that_arrives_sends_the_last_correction_ahead_of_its_stamp():
+    sender = MapToOdom()
+    first = sender.corrected(100 * MS, ONE, 50 * MS)
+    assert first is not None and (first.stamp_ns, first.map_from_odom.tolist()) == (150 * MS, ONE.tolist())
+    again = sender.arrived(200 * MS, 201 * MS, 50 * MS)
+    assert again is not None and (again.stamp_ns, again.map_from_odom.tolist()) == (250 * MS, ONE.tolist())
+
+
+def test_the_correction_holds_from_the_time_up_to_which_tf_was_sent():
+    sender = MapToOdom()
+    sender.corrected(100 * MS, ONE, 50 * MS)
+    sent = sender.arrived(200 * MS, 201 * MS, 50 * MS)
+    corrected = sender.corrected(200 * MS, OTHER, 50 * MS)
+    assert corrected is not None and corrected.stamp_ns == sent.stamp_ns + 1
+    assert sender.arrived(300 * MS, 301 * MS, 50 * MS).map_from_odom.tolist() == OTHER.tolist()
+
+
+def test_what_was_sent_when_the_scan_came_is_not_sent_again():
+    sender = MapToOdom()
+    sender.corrected(100 * MS, ONE, 50 * MS)
+    sender.arrived(200 * MS, 201 * MS, 50 * MS)
+    assert sender.corrected(200 * MS, ONE, 50 * MS) is None
+
+
+def test_a_scan_of_a_wrong_clock_or_of_the_past_sends_nothing():
+    sender = MapToOdom()
+    sender.corrected(100 * MS, ONE, 50 * MS)
+    assert sender.arrived(100 * MS, 200 * MS, 50 * MS) is None
+    assert sender.arrived(90 * MS, 200 * MS, 50 * MS) is None
+    assert sender.arrived(900 * MS, 200 * MS, 50 * MS) is None
+    assert sender.arrived(0, 200 * MS, 50 * MS) is None
+
+
+def test_stamps_only_ascend_when_a_later_correction_is_of_an_older_scan_or_the_tolerance_shrinks():
+    sender = MapToOdom()
+    stamps = [
+        sender.corrected(100 * MS, ONE, 50 * MS),
+        sender.arrived(200 * MS, 200 * MS, 50 * MS),
+        sender.corrected(150 * MS, OTHER, 50 * MS),
+        sender.corrected(210 * MS, ONE, 0),
+    ]
+    assert np.all(np.diff([each.stamp_ns for each in stamps]) > 0)
+
+
+def test_starting_over_forgets_pose_and_stamps():
+    sender = MapToOdom()
+    sender.corrected(100 * MS, ONE, 50 * MS)
+    sender.start_over()
+    assert sender.arrived(200 * MS, 200 * MS, 50 * MS) is None
+    assert sender.corrected(50 * MS, OTHER, 50 * MS).stamp_ns == 100 * MS
