@@ -62,15 +62,23 @@ class Grid:
         self, occupancy: np.ndarray, first_row: int, first_column: int, rows: int, columns: int
     ) -> None: ...  # occupancy: (H, W) int8, as before but for a box
 
-class ScanMatcher:
+class MatchGrid:
     def __init__(
         self,
         scores: np.ndarray,  # (H, W) uint8
         allowed: np.ndarray,  # (H, W) uint8 or bool
     ) -> None: ...
-    def search(
+
+class ScanSearch:
+    def __init__(
         self,
+        grid: MatchGrid,
         points: np.ndarray,  # (B, 2) float64
         headings_rad: np.ndarray,  # (A,) float64
         keep: int,
+    ) -> None: ...
+    look_ups: int
+    def advance(self, look_ups: int) -> bool: ...
+    def places(
+        self,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]: ...  # row, column, heading int32, score float32

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
-from typing import Iterator, List, NamedTuple, Tuple
+from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -37,6 +37,7 @@ class Track(NamedTuple):
     name: str
     grid_map: GridMap
     moments: List[Moment]
+    copy_cells: Optional[Tuple[int, int]] = None  # rows and columns of one copy, if the map is repeated
 
 
 def names() -> List[str]:
@@ -65,6 +66,24 @@ def load(name: str, seed: int) -> Track:
             if not isinstance(entry, Refusal)
         ],
     )
+
+
+def repeated(track: Track, cells: Tuple[int, int]) -> Track:
+    """The same drive on a map that is repeated until it has so many rows and columns."""
+    occupancy = track.grid_map.occupancy
+    times = [-(-wanted // length) for wanted, length in zip(cells, occupancy.shape)]
+    large = np.ascontiguousarray(np.tile(occupancy, times)[: cells[0], : cells[1]])
+    return track._replace(grid_map=replace(track.grid_map, occupancy=large), copy_cells=occupancy.shape)
+
+
+def in_first_copy(track: Track, map_from_base: np.ndarray) -> np.ndarray:
+    """The pose (3,) in the first copy of a repeated map; else the same."""
+    if track.copy_cells is None:
+        return map_from_base
+    map_from_grid, resolution_m = track.grid_map.map_from_grid, track.grid_map.resolution_m
+    grid_from_base = se2.compose(se2.inverse(map_from_grid), map_from_base)
+    grid_from_base[:2] %= np.array(track.copy_cells[::-1]) * resolution_m
+    return se2.compose(map_from_grid, grid_from_base)
 
 
 def start_of(track: Track, rng: np.random.Generator, share: float = 1.0 / 3.0) -> int:
@@ -110,7 +129,7 @@ def carried_away(
     return track.moments[begin : lifted + 1] + after, lifted + 1 - begin
 
 
-def ways(moments: List[Moment]) -> np.ndarray:
+def ways(moments: Sequence[Moment]) -> np.ndarray:
     """(N,) distance driven [m] up to each moment."""
     points = np.array([moment.map_from_base[:2] for moment in moments])
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])

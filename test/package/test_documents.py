@@ -10,7 +10,6 @@ The info string of a fence says what becomes of its commands:
 
 from __future__ import annotations
 
-import argparse
 import re
 import shlex
 import shutil
@@ -23,7 +22,8 @@ import parameters_page
 import pytest
 import yaml
 
-from glass_nav.cli import atlas, compare, doctor, landmarks, locate, params, replay, report, simulate
+from glass_nav.cli import atlas, compare, doctor, landmarks, locate, maps, params, replay, report, simulate
+from glass_nav.cli.parser import CommandParser
 
 REPO = Path(__file__).parents[2]
 FIRST = [REPO / name for name in ("README.md", "doc/quickstart.md", "doc/replay.md")]  # their commands make the logs
@@ -46,6 +46,7 @@ SUBCOMMANDS = {
     "doctor": doctor,
     "landmarks": landmarks,
     "locate": locate,
+    "map": maps,
     "params": params,
     "replay": replay,
     "report": report,
@@ -179,7 +180,7 @@ _done: Dict[str, str] = {}  # command -> its output: two pages may begin with th
 def run(folder: Path, command: str) -> None:
     if command in _done:
         return
-    cut = f" --max-scans {MAX_SCANS}" if re.match(r"glass_nav (replay|compare .*--log)", command) else ""
+    cut = f" --max-scans {MAX_SCANS}" if re.match(r"glass_nav (replay|map panes|compare .*--log)", command) else ""
     done = subprocess.run(
         ["bash", "-c", command.replace(" > ", f"{cut} > ") if " > " in command else command + cut],
         cwd=folder,
@@ -244,7 +245,7 @@ def check_robot_command(words: List[str]) -> None:
 def check_options(words: List[str]) -> None:
     """The command line is one that the subcommand takes."""
     module = SUBCOMMANDS[words[0]]
-    parser = argparse.ArgumentParser(prog=f"glass_nav {words[0]}")
+    parser = CommandParser(prog=f"glass_nav {words[0]}")
     module.add_arguments(parser)
     assert module.usage_error(parser.parse_args(words[1:])) is None
 

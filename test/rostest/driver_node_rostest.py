@@ -8,6 +8,7 @@ move_base by a server of its action.
 from __future__ import annotations
 
 import signal
+import subprocess
 import sys
 import threading
 import unittest
@@ -21,7 +22,7 @@ import numpy as np
 import rospy
 import rostest
 import tf2_ros
-from actionlib_msgs.msg import GoalStatus
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 from geometry_msgs.msg import PoseStamped
 from move_base_msgs.msg import MoveBaseAction, MoveBaseResult
@@ -50,6 +51,17 @@ from glass_nav.topology.atlas import atlas_file, shipped_atlases
 NODE = "/glass_driver"
 STOPPED_S = 0.2  # a preempted action stands within it
 ATLAS = atlas_file.load(shipped_atlases.find("opaque_office"))
+
+
+MOVE_BASE_PROCESS = """
+import actionlib, rospy
+from move_base_msgs.msg import MoveBaseAction
+
+rospy.init_node("hanging_move_base", anonymous=True, disable_signals=True)
+server = actionlib.SimpleActionServer("/second/move_base", MoveBaseAction, lambda goal: rospy.sleep(1e6), False)
+server.start()
+rospy.spin()
+"""
 
 
 class MoveBasePlayer:
@@ -327,6 +339,30 @@ class Driver(unittest.TestCase):
         )
 
     # -- move_base
+
+    def test_8_a_move_base_that_hangs_or_is_killed_ends_the_goal(self) -> None:
+        status = Heard("/second/move_base/status", GoalStatusArray)
+        for how in (signal.SIGSTOP, signal.SIGKILL):
+            process = subprocess.Popen([sys.executable, "-c", MOVE_BASE_PROCESS])
+            try:
+                probe = actionlib.SimpleActionClient("/second/move_base", MoveBaseAction)
+                self.assertTrue(probe.wait_for_server(rospy.Duration(30.0)), "the process does not start")
+                status.clear()
+                self.second.send_goal(GotoNodeGoal(node=10))
+                self.assertTrue(
+                    wait_until(
+                        lambda: any(each.status == GoalStatus.ACTIVE for msg in status.all for each in msg.status_list),
+                        30.0,
+                    ),
+                    "move_base has no goal",
+                )
+                process.send_signal(how)
+                result = self.await_end(self.second)
+            finally:
+                process.kill()
+                process.wait()
+            self.assertEqual(result.code, GotoNodeResult.NO_MOVE_BASE, result.reason)
+            self.assertEqual(result.reason, "/second/move_base is silent for 2 s: move_base has ended or hangs")
 
     def test_9_move_base_drives_if_that_is_asked_for(self) -> None:
         self.second.send_goal(GotoNodeGoal(node=10))

@@ -33,7 +33,7 @@ from glass_nav.msg import LocalizationStatus, SegmentQuality
 from glass_nav.ros import conversions
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.srv import Locate
-from glass_nav.vocabulary import BeamCase, WallKind
+from glass_nav.vocabulary import UNMAPPED_GLASS, BeamCase, WallKind
 from glass_nav.world.grid_map import GridMap
 
 PANE_COLUMN = 160
@@ -261,7 +261,7 @@ class LocalizationOutputs(unittest.TestCase):
     def test_the_walls_are_shown_by_what_they_are(self) -> None:
         markers = Heard(f"{NODE}/wall_markers", MarkerArray)
         self.assertTrue(wait_until(lambda: len(markers), 30.0), "no ~wall_markers within 30 s")
-        self.assertEqual([marker.ns for marker in markers.last.markers], list(map(str, WallKind)))
+        self.assertEqual([marker.ns for marker in markers.last.markers], [*map(str, WallKind), UNMAPPED_GLASS])
 
     def test_silence_is_told_beside_the_robot(self) -> None:
         markers = Heard(f"{NODE}/beam_markers", MarkerArray)

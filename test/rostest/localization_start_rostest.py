@@ -226,7 +226,8 @@ class LocalizationStart(unittest.TestCase):
         self.wait_for("a right pose", lambda: self.is_right() and self.state == "LOCALIZED")
         client = Client("/under_test", timeout=20.0)
         self.assertEqual(client.get_configuration(timeout=10.0)["min_particles"], 250)
-        self.assertFalse(rospy.has_param("/under_test/min_particles"), "nobody asked for it")
+        self.assertEqual(rospy.get_param("/under_test/min_particles"), 250)  # what is in effect can be read back
+        self.assertIs(rospy.get_param("/under_test/tf_broadcast"), True)
         self.lines.clear()
         now = client.update_configuration(
             {"update_min_d": 0.05, "laser_z_hit": 1, "weight_mode": "ranges", "transform_tolerance": 0.3}
@@ -259,6 +260,7 @@ class LocalizationStart(unittest.TestCase):
         self.check_many_at_once(client)
         self.assertTrue(self.is_right())
         self.end()
+        self.assertFalse(rospy.has_param("/under_test/min_particles"), "the next start would take it as given")
 
     def check_many_at_once(self, client: Client) -> None:
         """Callers beside each other do not undo one another's values."""

@@ -81,9 +81,8 @@ def main(arguments: argparse.Namespace) -> None:
     candidates = [pane for pane in search.panes() if pane.probability >= _LISTED]
     drawn = _chosen(arguments, candidates)
     print("\n".join(pane_files.table(candidates, drawn)))
-    written = pane_files.write(
-        arguments.out, arguments.map, grid_map, [candidates[number - 1] for number in drawn], "panes that the map lacks"
-    )
+    chosen = [candidates[number - 1] for number in drawn]
+    written = pane_files.write(arguments.out, arguments.map, grid_map, chosen, "panes that the map lacks", candidates)
     print(f"written: {', '.join(str(path) for path in written)}")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 from pathlib import Path
-from typing import List, Sequence
+from typing import List, Optional, Sequence
 
 from glass_nav.evaluation.plots import panes_picture
 from glass_nav.world import drawn_panes, map_copy, map_file, panes_file
@@ -26,8 +26,26 @@ def check_folder(folder: Path) -> None:
         pass
 
 
-def write(folder: Path, path_map: Path, grid_map: GridMap, panes: Sequence[Pane], title: str) -> List[Path]:
+def write(
+    folder: Path,
+    path_map: Path,
+    grid_map: GridMap,
+    panes: Sequence[Pane],
+    title: str,
+    candidates: Optional[Sequence[Pane]] = None,
+) -> List[Path]:
     """The map with the panes, the panes and a picture; files that are there stay as they are until all is ready.
+
+    Args:
+        folder: for the files.
+        path_map: the map, which is not touched.
+        grid_map: the same, loaded.
+        panes: to be drawn and written.
+        title: of the picture.
+        candidates: in the picture, by number; default: the panes.
+
+    Returns:
+        what was written.
 
     Raises:
         MapError, PaneError, OSError: a pane outside the map, or a file that cannot be written or is the map itself.
@@ -39,7 +57,7 @@ def write(folder: Path, path_map: Path, grid_map: GridMap, panes: Sequence[Pane]
         unfinished = Path(temporary)
         written = map_copy.save(path_map, after, unfinished / MAP_NAME)
         panes_file.save(unfinished / PANES_NAME, grid_map, panes)
-        panes_picture.draw(unfinished / PICTURE_NAME, grid_map, panes, f"{name}: {title}", after)
+        panes_picture.draw(unfinished / PICTURE_NAME, grid_map, candidates or panes, f"{name}: {title}", after)
         written += [unfinished / PANES_NAME, unfinished / PICTURE_NAME]
         for path in written:
             map_copy.check_other(folder / path.name, path_map)

@@ -356,15 +356,15 @@ class Driver:
 
     def _halt(self, job: _Job, ending: Ending) -> None:
         """Stand until the trouble is over; somebody who waits gets a result when that takes too long."""
-        self._command(np.zeros(3))
+        job.task.hold()
+        if job.task.steers:
+            self._command(np.zeros(3))
         if math.isnan(job.halted_since_s):
             job.halted_since_s = self._now_s
             self._log(f"{job.name} halts: {ending.reason}", logging.WARNING, often=True)
         self._say(DriverPhase.HALTED, ending.reason, job.name)
         halted_s = self._now_s - job.halted_since_s
-        if not job.task.steers:  # another one drives, and does not know of the trouble
-            self._finish(job, ending)
-        elif job.action is not None and halted_s > self._rules.patience_s:
+        if job.action is not None and halted_s > self._rules.patience_s:
             self._finish(job, Ending(ending.outcome, f"{ending.reason}, for {halted_s:.0f} s"))
 
     def _finish(self, job: _Job, ending: Ending) -> None:

@@ -15,6 +15,7 @@ from glass_nav.driving.driver_params import DriverRules
 from glass_nav.geometry import se2
 from glass_nav.vocabulary import LocalizationState
 
+_LATE = 0.5  # of the time after which a scan is too old
 POSE_STATES = (LocalizationState.LOCALIZED, LocalizationState.UNCERTAIN)  # a pose of these is good enough to drive by
 
 
@@ -94,11 +95,14 @@ class InputWatch:
         return se2.compose(self._map_from_odom, self.odometry.odom_from_base)
 
     def prefers_surfaces(self, now_s: float) -> bool:
-        """Whether scan_surfaces is to be used in place of scan: only a robot that knows its pose sees glass in it."""
+        """Whether scan_surfaces is to be used in place of scan: only a robot that knows its pose sees glass in it.
+
+        If it is late, scan stands in, before the last one that was used is too old.
+        """
         return (
             self.localization == LocalizationState.LOCALIZED
             and now_s - self._localization_s < self._rules.status_timeout_s
-            and now_s - self._surfaces_s < self._rules.scan_timeout_s
+            and now_s - self._surfaces_s < _LATE * self._rules.scan_timeout_s
         )
 
     def no_input(self, now_s: float, no_scan: str) -> Optional[str]:

@@ -55,6 +55,9 @@ class Task(Protocol):
     def step(self, now: Moment) -> np.ndarray:
         """(3,) the command of this control step; zero once there is an outcome."""
 
+    def hold(self) -> None:
+        """There is no step now; whoever else drives is to stop until the next one."""
+
     def cancel(self) -> None:
         """Nobody wants it any more."""
 
@@ -121,6 +124,9 @@ class EdgeTask:
     @property
     def remaining_m(self) -> float:
         return math.nan
+
+    def hold(self) -> None:
+        """The driver's own commands stop the robot."""
 
     def cancel(self) -> None:
         self._recovery.cancel()
@@ -232,6 +238,9 @@ class GoTask:
     @property
     def remaining_m(self) -> float:
         return math.nan if self._follower is None else self._follower.remaining_m
+
+    def hold(self) -> None:
+        """The driver's own commands stop the robot."""
 
     def cancel(self) -> None:
         self._recovery.cancel()

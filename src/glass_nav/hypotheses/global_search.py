@@ -1,9 +1,10 @@
 """Scans, odometry -> the one place of the map where they fit, with no initial pose.
 
 Multi-hypothesis tracking over an exhaustive search. The first scan is matched against every pose of the map
-(scan_matcher.py); each place where it fits becomes a candidate. Odometry moves the candidates, every scan aligns them
-as far as odometry allows, and each gathers evidence. From time to time a scan is matched everywhere again, because the
-true place may have been missed (people, wheels that slipped). A place is found when all others are behind by a margin.
+(place_search.py, in slices); each place where it fits becomes a candidate. Odometry moves the candidates, every scan
+aligns them as far as odometry allows, and each gathers evidence. From time to time a scan is matched everywhere again,
+because the true place may have been missed (people, wheels that slipped). A place is found when all others are behind
+by a margin. Whoever knows something about the place beside the scans gives a prior.
 
 The formulation is ours. Evidence is the log likelihood of Thrun, Burgard, Fox, Probabilistic Robotics (2005), sec. 6.4,
 much flattened: scans taken close to each other have the same errors, and so has a map that has changed since.
@@ -15,27 +16,28 @@ and places that look alike remain candidates until a scan distinguishes them. K 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Dict, Optional, Sequence, Tuple
+from typing import Callable, Dict, Optional, Sequence, Tuple
 
 import numpy as np
 
 from glass_nav.geometry import angles, se2
 from glass_nav.hypotheses import bearing_weights, pose_tracker, scan_alignment
 from glass_nav.hypotheses.bearing_weights import BearingMixture
+from glass_nav.hypotheses.place_search import PlaceSearch
 from glass_nav.hypotheses.pose_tracker import PoseTracker
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.params import number
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.known_area import KnownArea
 from glass_nav.sensing.scan import Scan, spread_evenly
 from glass_nav.world.landmark_map import LandmarkMap
 
 _BEAMS = 60
-_MIN_BEAMS = 10  # with fewer a scan is no evidence
-_PLACES = 4000  # of an exhaustive search, before they are aligned
-_SLIDE_M = 0.6  # that an alignment may move a match
+MIN_BEAMS = 10  # with fewer a scan is no evidence
 _MAX_CANDIDATES = 1500  # that are followed
 _EVIDENCE_SCALE_M = 0.2  # a beam that ends this far from a wall fits by one half
+_UNKNOWN_FIT = 0.4  # of a beam that ends where the map knows nothing: likelier than in free space, less than at a wall
 _FULL_FIT = 20.0  # log likelihood ratio of a place where all beams end on walls to one where none does, in one view
 _VIEW_M = 2.0  # after this distance the surroundings are seen anew
 _MAX_BEHIND = 40.0  # log likelihood ratio of the best candidate to one that is dropped
@@ -90,21 +92,25 @@ class Candidates:
 class GlobalSearch:
     """Follows all candidates until one is far ahead."""
 
-    def __init__(self, matcher: ScanMatcher, field: DistanceField, params: SearchParams) -> None:
+    def __init__(
+        self, matcher: ScanMatcher, field: DistanceField, params: SearchParams, area: Optional[KnownArea] = None
+    ) -> None:
         """
         Args:
             matcher: of the whole map or a part.
             field: of the map.
             params: when a place is accepted.
+            area: where the map knows something; None: everywhere.
         """
-        self._matcher, self._field, self._params = matcher, field, params
+        self._matcher, self._field, self._params, self._area = matcher, field, params, area
         self._tracker = PoseTracker(_MAX_BEHIND, _MAX_CANDIDATES)
         self._evidence = np.zeros(0)  # (K,) log likelihoods
         self._fit_sum = np.zeros(0)  # (K,) of fit times the share of a view
         self._views = np.zeros(0)  # (K,) of these shares
-        self._noise = _STEP_NOISE[:, 0]  # (3,) deviations of the last step
-        self._searched = False
-        self._since_search_m = 0.0  # distance since the last search everywhere
+        self._since_judged = np.zeros(2)  # distance [m] and turn [rad] that odometry carried the candidates since
+        self._places: Optional[PlaceSearch] = None  # while a scan is matched everywhere
+        self._since_places = np.zeros(2)  # as above, since that scan; of the last one when it is complete
+        self._searched = False  # one is complete
         self._driven_m = 0.0  # since the first scan
         self._counted_at_m: Dict[str, float] = {}  # id of a landmark -> distance driven when its bearing last counted
 
@@ -113,7 +119,11 @@ class GlobalSearch:
         self._params = params
 
     def update(
-        self, scan: Scan, odom_from_base: np.ndarray, bearings: Sequence[Tuple[LandmarkBearings, LandmarkMap]] = ()
+        self,
+        scan: Scan,
+        odom_from_base: np.ndarray,
+        bearings: Sequence[Tuple[LandmarkBearings, LandmarkMap]] = (),
+        log_prior: Optional[Callable[[np.ndarray], np.ndarray]] = None,
     ) -> Candidates:
         """One more scan; a scan with too few returns only moves the candidates.
 
@@ -121,57 +131,72 @@ class GlobalSearch:
             scan: one revolution of a lidar.
             odom_from_base: (3,) odometry at its stamp.
             bearings: from the robot's pose at the scan, each with the landmarks that they are of.
+            log_prior: poses (K, 3) of the robot at this scan -> (K,) log likelihoods of what else is known of them.
         """
-        view = self._move(scan, odom_from_base)
+        self._move(odom_from_base)
         points = evidence_points(scan)
         if points is not None:
-            if not self._searched:
-                found = self._search_everywhere(points)
-                self._append(found, np.zeros(len(found)))
-                view = 1.0
-            self._judge(points, view)
-            if self._since_search_m >= _SEARCH_AGAIN_M or self._best_fits_poorly(points):
-                found = self._search_everywhere(points)
-                # Only this scan proposes them: they start behind the candidates so far, by how well each fits.
-                fits = fit(self._field, points, found)
-                start = self._evidence.max() - self._params.search_margin
-                self._append(found, start + _FULL_FIT * (fits - fits.max()))
-                self._keep_distinct()
-        if len(self._tracker):  # there are none before a scan proposes them
+            if self._searched:
+                self._judge(points, self._view(scan))
+            if self._places is None and (not self._searched or self._is_due(points)):
+                self._places = PlaceSearch(self._matcher, self._field, points, odom_from_base)
+                self._since_places = np.zeros(2)
+            if self._places is not None and self._places.advance():
+                self._take_in(self._places.places(odom_from_base), points)
+        if self._searched:
             for taken, landmarks in bearings:
                 self._weigh_by(taken, landmarks)
-        return self._candidates()
+        return self._candidates(log_prior)
 
     def add(self, map_from_base: np.ndarray, head_start: float) -> None:
         """Before the first scan: a candidate at the tracked pose, with a head start of log likelihood."""
         self._append(np.asarray(map_from_base, float)[None], np.array([head_start]))
 
-    def _move(self, scan: Scan, odom_from_base: np.ndarray) -> float:
-        """Move the candidates by odometry; the share of a new view that this step gave."""
+    def _move(self, odom_from_base: np.ndarray) -> None:
+        """Move the candidates by odometry."""
         step = self._tracker.carry(odom_from_base)
-        if step is None:
-            return 1.0
-        distance_m, turn_rad = se2.travelled(step)
-        self._since_search_m += distance_m
-        self._driven_m += distance_m
-        self._noise = _STEP_NOISE @ np.array([1.0, distance_m, turn_rad])
+        if step is not None:
+            travelled = np.array(se2.travelled(step))
+            self._since_judged = self._since_judged + travelled
+            self._since_places = self._since_places + travelled
+            self._driven_m += float(travelled[0])
+
+    def _view(self, scan: Scan) -> float:
+        """The share of the surroundings that came into view since the candidates were judged."""
+        distance_m, turn_rad = self._since_judged
         # What a turn brings into view is what the lidar does not see already.
         unseen = max(0.0, 2.0 - float(np.ptp(scan.angles_rad)) / np.pi)
         return min(1.0, (distance_m + unseen * turn_rad) / _VIEW_M)
 
     def _judge(self, points: np.ndarray, view: float) -> None:
         """Align the candidates with the scan, as far as odometry allows, and add its evidence to each."""
-        information = np.diag(_BEAM_VARIANCE * len(points) / _BEAMS / self._noise**2)
+        noise = _noise_of(self._since_judged)
         poses = self._tracker.poses
-        moved = scan_alignment.align_near(self._field, points, poses, information)
-        off = (moved - poses) / self._noise
-        off[:, 2] = angles.wrap(moved[:, 2] - poses[:, 2]) / self._noise[2]
+        moved = _aligned(self._field, points, poses, noise)
+        off = (moved - poses) / noise
+        off[:, 2] = angles.wrap(moved[:, 2] - poses[:, 2]) / noise[2]
         penalty = np.minimum(0.125 * np.sum(off**2, axis=1), _MAX_PENALTY)
         self._tracker.poses = moved
-        fits = fit(self._field, points, moved)
+        fits = fit(self._field, points, moved, self._area)
         self._evidence = self._evidence + view * _FULL_FIT * fits - penalty
         self._fit_sum = self._fit_sum + view * fits
         self._views = self._views + view
+        self._since_judged = np.zeros(2)
+        self._keep_distinct()
+
+    def _take_in(self, places: np.ndarray, points: np.ndarray) -> None:
+        """Follow the places (N, 3), carried to this scan, of a search that is complete."""
+        self._places = None
+        if not len(self._tracker) or not self._searched:
+            self._searched = True
+            self._append(places, np.zeros(len(places)))
+            self._judge(points, 1.0)
+            return
+        # Only one scan proposed them: they start behind the candidates so far, by how well each fits.
+        places = _aligned(self._field, points, places, _noise_of(self._since_places))
+        fits = fit(self._field, points, places, self._area)
+        start = self._evidence.max() - self._params.search_margin
+        self._append(places, start + _FULL_FIT * (fits - fits.max(initial=0.0)))
         self._keep_distinct()
 
     def _weigh_by(self, bearings: LandmarkBearings, landmarks: LandmarkMap) -> None:
@@ -186,19 +211,13 @@ class GlobalSearch:
         )
         self._keep_distinct()
 
-    def _best_fits_poorly(self, points: np.ndarray) -> bool:
+    def _is_due(self, points: np.ndarray) -> bool:
+        """The last search is far behind, or the best candidate fits this scan worse than it used to."""
+        if not len(self._tracker) or self._since_places[0] >= _SEARCH_AGAIN_M:
+            return True
         best = int(np.argmax(self._evidence))
-        fit_now = fit(self._field, points, self._tracker.poses[best : best + 1])[0]
+        fit_now = fit(self._field, points, self._tracker.poses[best : best + 1], self._area)[0]
         return bool(fit_now < _POOR_FIT * self._fit_sum[best] / max(self._views[best], 1e-9))
-
-    def _search_everywhere(self, points: np.ndarray) -> np.ndarray:
-        """(K, 3) poses where this scan fits, the best first, each place once."""
-        self._searched, self._since_search_m = True, 0.0
-        starts = self._matcher.search(points, _PLACES).poses
-        places = scan_alignment.align(self._field, points, starts)
-        near = np.hypot(*(places.poses[:, :2] - starts[:, :2]).T) < _SLIDE_M  # farther away it is another place
-        poses = places.poses[near][np.argsort(-places.fit[near], kind="stable")]
-        return poses[pose_tracker.first_of_each_cell(poses)]
 
     def _append(self, poses: np.ndarray, evidence: np.ndarray) -> None:
         nothing = np.zeros(len(poses))
@@ -212,23 +231,43 @@ class GlobalSearch:
         self._evidence = self._evidence[chosen]
         self._fit_sum, self._views = self._fit_sum[chosen], self._views[chosen]
 
-    def _candidates(self) -> Candidates:
-        poses = self._tracker.poses
+    def _candidates(self, log_prior: Optional[Callable[[np.ndarray], np.ndarray]]) -> Candidates:
+        poses, scores = self._tracker.poses, self._evidence
         if not len(poses):
-            return Candidates(poses, self._evidence, float("nan"), 0.0, False)
-        weights = np.exp(self._evidence - self._evidence[0])
-        lead = pose_tracker.lead(poses[0], self._evidence[0], poses, self._evidence)
-        fit = float(self._fit_sum[0] / self._views[0]) if self._views[0] > 0.0 else float("nan")
+            return Candidates(poses, scores, float("nan"), 0.0, False)
+        if log_prior is not None:
+            scores = scores + log_prior(poses)
+        order = np.argsort(-scores, kind="stable")
+        best, poses, scores = order[0], poses[order], scores[order]
+        weights = np.exp(scores - scores[0])
+        lead = pose_tracker.lead(poses[0], scores[0], poses, scores)
+        fit = float(self._fit_sum[best] / self._views[best]) if self._views[best] > 0.0 else float("nan")
         found = lead > self._params.search_margin and fit >= self._params.search_least_fit
         return Candidates(poses, weights / weights.sum(), fit, lead, bool(found))
+
+
+def _noise_of(travelled: np.ndarray) -> np.ndarray:
+    """(3,) deviations [m, m, rad] of odometry over a distance [m] and a turn [rad] (2,)."""
+    return _STEP_NOISE @ np.array([1.0, *travelled])
+
+
+def _aligned(field: DistanceField, points: np.ndarray, poses: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """Poses (K, 3), moved to where the scan fits as far as such deviations (3,) allow."""
+    information = np.diag(_BEAM_VARIANCE * len(points) / _BEAMS / noise**2)
+    return scan_alignment.align_near(field, points, poses, information)
 
 
 def evidence_points(scan: Scan) -> Optional[np.ndarray]:
     """(B, 2) end points [m], in the robot's frame, of the beams that are evidence; None: too few returned."""
     beams = spread_evenly(scan.answered, _BEAMS)
-    return scan.points_in_base()[beams] if len(beams) >= _MIN_BEAMS else None
+    return scan.points_in_base()[beams] if len(beams) >= MIN_BEAMS else None
 
 
-def fit(field: DistanceField, points_m: np.ndarray, poses: np.ndarray) -> np.ndarray:
-    """(K,) how well such points fit at poses (K, 3), 0..1."""
-    return scan_alignment.fit(field, points_m, poses, _EVIDENCE_SCALE_M)
+def fit(field: DistanceField, points_m: np.ndarray, poses: np.ndarray, area: Optional[KnownArea] = None) -> np.ndarray:
+    """(K,) how well such points fit at poses (K, 3), 0..1; those that end outside of the known area hardly count."""
+    if area is None:
+        return scan_alignment.fit(field, points_m, poses, _EVIDENCE_SCALE_M)
+    ends_m = se2.transform_points(poses[:, None], points_m)
+    distance_m = field.distance(ends_m[..., 0], ends_m[..., 1])
+    fits = _EVIDENCE_SCALE_M**2 / (_EVIDENCE_SCALE_M**2 + distance_m**2)
+    return np.mean(np.where(area.contains(ends_m), fits, _UNKNOWN_FIT), axis=1)

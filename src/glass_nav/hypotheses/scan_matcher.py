@@ -1,8 +1,10 @@
 """GridMap, scan -> all poses from which the scan may have been taken, with no initial pose.
 
 Correlative scan matching (Olson (2009)) of the beams' end points against a likelihood field, over every position
-and heading, by branch and bound (Hess, Kohler, Rapp, Andor (2016)): the face of ScanMatcher in the compiled module
-_mrpt_grid. It ignores what the beams passed and which wall they met, so it proposes poses and judges none.
+and heading, by branch and bound (Hess, Kohler, Rapp, Andor (2016)): the face of MatchGrid and ScanSearch in the compiled
+module _mrpt_grid. It ignores what the beams passed and which wall they met, so it proposes poses and judges none. On a
+large map that takes longer than a robot may wait for its pose, so a search can be done in slices. Their size is
+a count of look-ups and no time, so that a replay gives the same answer.
 """
 
 from __future__ import annotations
@@ -19,8 +21,10 @@ from glass_nav.world.grid_map import GridMap
 
 _CELL_M = 0.1  # of the positions that are tried
 _SCALE_M = 0.15  # a point that ends this far from a wall scores by one half
-_HEADINGS = 180  # 2 degrees apart
+_HEADINGS_RAD = np.arange(180) * (2.0 * np.pi / 180)  # 2 degrees apart
 _HIGHEST = 255
+_STRIP_ROWS = 64
+_ALL = 2**62  # look-ups: more than any search needs
 
 
 @dataclass(frozen=True)
@@ -51,11 +55,21 @@ class ScanMatcher:
         self._cell_m = self._per_cell * grid_map.resolution_m
         self._map_from_grid = grid_map.map_from_grid
         allowed = _any_in_blocks(free, self._per_cell)
-        centres = np.stack(np.meshgrid(np.arange(allowed.shape[1]) + 0.5, np.arange(allowed.shape[0]) + 0.5), axis=-1)
-        points = se2.transform_points(self._map_from_grid, centres * self._cell_m)
+        strips = range(0, allowed.shape[0], _STRIP_ROWS)  # those of a large map would not fit in the cache at once
+        scores = np.concatenate(
+            [
+                self._scores(field, first, min(first + _STRIP_ROWS, allowed.shape[0]), allowed.shape[1])
+                for first in strips
+            ]
+        )
+        self._grid = _mrpt_grid.MatchGrid(scores, allowed)
+
+    def _scores(self, field: DistanceField, first: int, last: int, columns: int) -> np.ndarray:
+        """(last - first, W) uint8: how near to a wall the centres of the cells of some rows lie."""
+        centres = np.stack(np.meshgrid(np.arange(columns) + 0.5, np.arange(first, last) + 0.5), axis=-1) * self._cell_m
+        points = se2.transform_points(self._map_from_grid, centres)
         distance = field.distance(points[..., 0], points[..., 1])
-        scores = np.rint(_HIGHEST * _SCALE_M**2 / (_SCALE_M**2 + distance**2)).astype(np.uint8)
-        self._matcher = _mrpt_grid.ScanMatcher(scores, allowed)
+        return np.rint(_HIGHEST * _SCALE_M**2 / (_SCALE_M**2 + distance**2)).astype(np.uint8)
 
     def search(self, points_m: np.ndarray, keep: int) -> Places:
         """At most so many places, one for each square of 0.8 m and each of the headings.
@@ -64,9 +78,39 @@ class ScanMatcher:
             points_m: (B, 2) finite end points of beams in the robot's frame.
             keep: >= 1.
         """
-        headings = np.arange(_HEADINGS) * (2.0 * np.pi / _HEADINGS)
-        row, column, heading, score = self._matcher.search(points_m / self._cell_m, headings, keep)
-        grid_from_base = np.stack([(column + 0.5) * self._cell_m, (row + 0.5) * self._cell_m, headings[heading]], -1)
+        search = self.begin(points_m, keep)
+        search.advance(_ALL)
+        return search.places
+
+    def begin(self, points_m: np.ndarray, keep: int) -> SlicedSearch:
+        """A search as of search() that is done in slices."""
+        search = _mrpt_grid.ScanSearch(self._grid, points_m / self._cell_m, _HEADINGS_RAD, keep)
+        return SlicedSearch(search, self._map_from_grid, self._cell_m)
+
+
+class SlicedSearch:
+    """One scan, to be matched slice by slice."""
+
+    def __init__(self, search: _mrpt_grid.ScanSearch, map_from_grid: np.ndarray, cell_m: float) -> None:
+        """Made by ScanMatcher.begin()."""
+        self._search, self._map_from_grid, self._cell_m = search, map_from_grid, cell_m
+
+    def advance(self, look_ups: int) -> bool:
+        """Go on until about so many cells of the map were looked up; whether the search is complete."""
+        return bool(self._search.advance(look_ups))
+
+    @property
+    def look_ups(self) -> int:
+        """So far."""
+        return int(self._search.look_ups)
+
+    @property
+    def places(self) -> Places:
+        """Of a complete search."""
+        row, column, heading, score = self._search.places()
+        grid_from_base = np.stack(
+            [(column + 0.5) * self._cell_m, (row + 0.5) * self._cell_m, _HEADINGS_RAD[heading]], -1
+        )
         poses = se2.compose(self._map_from_grid, grid_from_base)
         poses[:, 2] = angles.wrap(poses[:, 2])
         return Places(poses, score.astype(float) / _HIGHEST)

@@ -7,7 +7,7 @@ glass_localization.txt: decide beam by beam what the beam met, then weigh the pa
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Callable, List, Optional, Tuple
+from typing import Callable, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from glass_nav.localization.beam_classification.case_votes import BeamCases
 from glass_nav.localization.beam_classification.expected_ranges import ExpectedRanges
 from glass_nav.localization.beam_classification.glass_map import GlassMap
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
+from glass_nav.localization.beam_classification.unmapped_panes import UnmappedPanes
 from glass_nav.localization.integrity import pose_state, protection_level
 from glass_nav.localization.integrity.kidnap_detector import KidnapDetector
 from glass_nav.localization.integrity.protection_level import ProtectionLevels
@@ -34,6 +35,7 @@ from glass_nav.sensing.scan import Scan
 from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
 from glass_nav.world.landmark_map import LandmarkMap
+from glass_nav.world.pane import Pane
 
 _FOUND = np.array([0.1, 0.1, 0.05])  # deviations [m, m, rad] of a place that was found among all others
 _SHOWN = 500  # candidates drawn for particlecloud
@@ -57,23 +59,6 @@ class Estimate:
     confidence: float  # chance that the pose is right, 0..1
     places: int = 1  # that are possible, see pose_state.Judgement
     levels: ProtectionLevels = protection_level.UNKNOWN  # how far off the pose may be
-
-
-class _LazyMatcher:
-    """The matcher over a whole map, made at its first use.
-
-    It does not refer to the localizer, so that a localizer that is dropped leaves the memory at once and not with some
-    later collection of cycles.
-    """
-
-    def __init__(self, grid_map: GridMap, field: DistanceField) -> None:
-        self._grid_map, self._field = grid_map, field
-        self._matcher: Optional[ScanMatcher] = None
-
-    def __call__(self) -> ScanMatcher:
-        if self._matcher is None:
-            self._matcher = ScanMatcher(self._grid_map, self._field)
-        return self._matcher
 
 
 class Localizer:
@@ -122,13 +107,16 @@ class Localizer:
     def _look_at(self, grid_map: GridMap, field: DistanceField) -> None:
         self._grid_map, self._field = grid_map, field
         self._known_area = KnownArea(grid_map)
-        self._everywhere = _LazyMatcher(grid_map, field)
+        # Made with the map: on a large one that takes longer than a scan may wait.
+        self._everywhere = ScanMatcher(grid_map, field) if grid_map.free.any() else None
         self._classifier = self._new_classifier(self._params.classifier, grid_map)
+        self._panes = UnmappedPanes(grid_map, self._params.pane_use, self._params.panes)
         self._kidnap_detector = self._new_kidnap_detector()
 
     def reconfigure(self, params: LocalizerParams) -> None:
         """Other parameters from the next scan on; the particles, the glass map and what the filter learnt stay."""
         self._classifier.reconfigure(params.classifier)
+        self._panes.reconfigure(params.pane_use)
         self._filter.reconfigure(params.particle_filter)
         self._quality.limit_by(params.quality)
         self._kidnap_detector.decide_by(params.search)
@@ -140,6 +128,26 @@ class Localizer:
     def glass_map(self) -> GlassMap:
         """Evidence since set_map() that each wall cell of the map is glass."""
         return self._classifier.glass_map
+
+    @property
+    def unmapped_panes(self) -> Tuple[Pane, ...]:
+        """Panes that the map lacks, found since set_map() or remembered, that count as surfaces."""
+        return self._panes.drawn
+
+    @property
+    def found_panes(self) -> Tuple[Pane, ...]:
+        """All of them, the most probable first, also those that do not count."""
+        return self._panes.candidates
+
+    def remember(self, panes: Sequence[Pane], glass: Mapping[str, np.ndarray]) -> None:
+        """What an earlier run on the same map found: its found_panes and the arrays() of its glass map.
+
+        Raises:
+            ValueError: the glass map is of another one; nothing is changed.
+        """
+        self.glass_map.restore(glass)
+        self._panes = UnmappedPanes(self._grid_map, self._params.pane_use, self._params.panes, panes)
+        self._draw_panes()
 
     def set_pose(self, map_from_base: np.ndarray, covariance: np.ndarray) -> None:
         """Start over around a pose.
@@ -230,7 +238,9 @@ class Localizer:
         self._map_from_odom = se2.compose(self._filter.best.map_from_base, se2.inverse(odom_from_base))
         map_from_base = se2.compose(self._map_from_odom, odom_from_base)
         expected = self._classifier.expected_at(scan, map_from_base)  # the beams were classified at the registered pose
-        return self._judged(scan, map_from_base, cases, expected, updated=True)
+        estimate = self._judged(scan, map_from_base, cases, expected, updated=True)
+        self._look_for_panes(scan, estimate)
+        return estimate
 
     # -- one update
 
@@ -305,6 +315,15 @@ class Localizer:
             protection_level.of(map_from_base, self._filter.best.covariance),
         )
 
+    def _look_for_panes(self, scan: Scan, estimate: Estimate) -> None:
+        """Panes that the map lacks are surfaces from the next scan on."""
+        trusted = estimate.surface_scan.trusted
+        if trusted and self._panes.observe(scan, estimate.map_from_base, estimate.covariance):
+            self._draw_panes()
+
+    def _draw_panes(self) -> None:
+        self._classifier.redraw(self._panes.grid_map(), self._panes.drawn)
+
     def _bearings_from(self, odom_from_base: np.ndarray) -> List[Tuple[LandmarkBearings, LandmarkMap]]:
         """The bearings added since the last update, carried along by odometry to now; they are used once."""
         added, self._bearings = self._bearings, []
@@ -325,9 +344,9 @@ class Localizer:
 
     def _new_search(self, area: Optional[np.ndarray] = None) -> GlobalSearch:
         """Over the free cells of area (H, W), or all of them."""
-        matcher = self._everywhere() if area is None else ScanMatcher(self._grid_map, self._field, area)
-        return GlobalSearch(matcher, self._field, self._params.search)
+        matcher = self._everywhere if area is None else ScanMatcher(self._grid_map, self._field, area)
+        assert matcher is not None  # there are free cells
+        return GlobalSearch(matcher, self._field, self._params.search, self._known_area)
 
     def _new_kidnap_detector(self, usual_fit: Optional[float] = None) -> KidnapDetector:
-        matcher = self._everywhere if self._grid_map.free.any() else None
-        return KidnapDetector(self._field, matcher, self._params.search, usual_fit)
+        return KidnapDetector(self._field, self._everywhere, self._params.search, usual_fit, self._known_area)

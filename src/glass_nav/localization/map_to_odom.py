@@ -45,7 +45,8 @@ class MapToOdom:
 
     def corrected(self, scan_ns: int, map_from_odom: np.ndarray, tolerance_ns: int) -> Optional[StampedTransform]:
         """The filter's answer to a scan (3,); None if it is what was sent when the scan came."""
-        is_sent = scan_ns <= self._last_scan_ns and np.array_equal(map_from_odom, self._map_from_odom)
+        before = self._map_from_odom
+        is_sent = before is not None and scan_ns <= self._last_scan_ns and np.array_equal(map_from_odom, before)
         self._map_from_odom = np.array(map_from_odom, float)
         return None if is_sent else self._stamped(scan_ns, tolerance_ns, self._map_from_odom)
 

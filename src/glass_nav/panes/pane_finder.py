@@ -10,7 +10,7 @@ ours. Lines are traced through the returns (pane_lines.py), and every piece of a
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Dict, List, Optional, Sequence, Tuple
+from typing import Dict, List, Optional, Sequence, Set, Tuple
 
 import numpy as np
 
@@ -32,10 +32,10 @@ _LEAST_SPREAD_M = 0.3  # of the places that saw a pane
 _PIECE_CONTRADICTION, _GAP_CONTRADICTION = -1.0, -1.5  # log odds at which beams say that nothing stands there
 _MOST_LOG_ODDS = 30.0
 _KNOWN_LOG_ODDS = 4.0  # limit for a pane known from before: beams can overrule it
-_FORGOTTEN = 0.05  # a known pane less probable than this is dropped
+_FORGOTTEN = 0.01  # a candidate less probable than this is dropped
 _HELD_LOG_ODDS = (-2.5, 0.0, 1.5)  # more for a pane of which so many ends meet something mapped
 _LOOSE_M = 4.0  # a person who walks beside the robot traces a line too: a shorter one needs an end that is held
-_DUE_SCANS = 20  # kept since the panes were last looked for
+_DUE_SCANS = 30  # kept since the panes were last looked for
 _SAME_ACROSS_M, _SAME_COS = 0.25, float(np.cos(np.radians(20.0)))
 _THIN_M = 0.05  # of a surface for each return that is kept
 _CHORD = 3  # beams to either side, whose ends show how a surface runs
@@ -99,12 +99,12 @@ class PaneFinder:
         self._last: Dict[str, np.ndarray] = {}  # map_from_base of the last kept scan, by lidar
         self._given = tuple(known)
         self._remembered = tuple(known)
-        self._new = 0
+        self._new: Set[int] = set()  # rows kept since panes() was last called
 
     @property
     def due(self) -> bool:
         """Whether enough was seen since panes() was last called for another call to be worth its time."""
-        return self._new >= _DUE_SCANS
+        return len(self._new) >= _DUE_SCANS
 
     def observe(self, scan: Scan, map_from_base: np.ndarray, covariance: np.ndarray) -> bool:
         """Learn from a scan.
@@ -131,22 +131,31 @@ class PaneFinder:
         mapped_m = self._mapped.first_m(laser, scan.angles_rad, min(scan.range_max_m, _LOOK_FARTHER * p.pane_reach_m))
         row = self._scans.keep(scan, map_from_base, mapped_m)
         self._unmapped[row] = self._unmapped_returns(scan, laser, mapped_m)
-        self._new += 1
+        self._new.add(row)
         return True
 
-    def panes(self) -> List[Pane]:
-        """All candidates by what was seen so far, the most probable first: some ten milliseconds for a corridor."""
-        self._new = 0
+    def panes(self, anew: bool = False) -> List[Pane]:
+        """All candidates by what was seen so far, the most probable first.
+
+        Looks again where the robot has been since the last call, which takes some ten milliseconds.
+
+        Args:
+            anew: look again everywhere.
+        """
+        laser_m = self._scans.map_from_laser[:, :2]
+        area = _Box.around(laser_m if anew else laser_m[sorted(self._new)], self._p.pane_reach_m)
+        again = [pane for pane in self._remembered if area.meets(_box_of(pane, 0.0))]
         found: List[Pane] = []
-        returns = self._returns()
+        returns = self._returns([area, *(_box_of(pane, _SAME_ACROSS_M) for pane in again)])
         for line in pane_lines.traced(returns, _LEAST_VOTES_M, _LEAST_SCANS):
             found += [pane for pane in self._along(line, returns) if not _is_one_of(pane, found)]
         for pane in self._remembered:
             if not _is_one_of(pane, found):
-                judged = self._judged_again(pane)
+                judged = self._judged_again(pane) if pane in again else pane
                 found += [judged] if judged.probability >= _FORGOTTEN else []
         found.sort(key=lambda pane: -pane.probability)
-        self._remembered = tuple(pane for pane in found if pane.probability >= 0.5)
+        self._new.clear()
+        self._remembered = tuple(found)
         return found
 
     def _unmapped_returns(
@@ -169,11 +178,18 @@ class PaneFinder:
         chosen = chosen[one_each]
         return points_m[chosen], beam_rad[chosen], np.maximum(width_m[one_each], _THIN_M)
 
-    def _returns(self) -> Returns:
-        rows = sorted(self._unmapped)
+    def _returns(self, boxes: "Sequence[_Box]") -> Returns:
+        """All returns in some boxes."""
+        rows = [
+            row
+            for row, laser in enumerate(self._scans.map_from_laser)
+            if any(box.contains(laser[:2], self._p.pane_reach_m) for box in boxes)
+        ]
         parts = [self._unmapped[row] for row in rows] or [(np.zeros((0, 2)), np.zeros(0), np.zeros(0))]
         points_m, beam_rad, width_m = (np.concatenate(values) for values in zip(*parts))
-        return Returns(points_m, beam_rad, width_m, np.repeat(rows or [0], [len(part[1]) for part in parts]))
+        scan = np.repeat(rows or [0], [len(part[1]) for part in parts])
+        inside = np.any([box.contains(points_m, 0.0) for box in boxes], axis=0)
+        return Returns(points_m[inside], beam_rad[inside], width_m[inside], scan[inside])
 
     def _along(self, line: Line, returns: Returns) -> List[Pane]:
         """The panes on a line: stretches of it that were seen head-on, and what joins them."""
@@ -266,6 +282,31 @@ class PaneFinder:
         """Log odds before any beam is looked up, of a pane that had this probability before; 0: it is new."""
         known = np.clip(_log_odds(before), -_KNOWN_LOG_ODDS, _KNOWN_LOG_ODDS)
         return max(_log_odds(self._p.pane_prior), float(known))
+
+
+@dataclass(frozen=True)
+class _Box:
+    """A part of the map, along its axes."""
+
+    low_m: np.ndarray  # (2,)
+    high_m: np.ndarray  # (2,)
+
+    @staticmethod
+    def around(points_m: np.ndarray, margin_m: float) -> "_Box":
+        """With a margin around points (N, 2); nothing around none."""
+        low_m = points_m.min(axis=0, initial=np.inf) - margin_m
+        return _Box(low_m, points_m.max(axis=0, initial=-np.inf) + margin_m)
+
+    def contains(self, points_m: np.ndarray, margin_m: float) -> np.ndarray:
+        """(...) bool: points (..., 2) lie in the box, or no farther from it than the margin."""
+        return ((points_m >= self.low_m - margin_m) & (points_m <= self.high_m + margin_m)).all(axis=-1)
+
+    def meets(self, other: "_Box") -> bool:
+        return bool((self.low_m <= other.high_m).all() and (other.low_m <= self.high_m).all())
+
+
+def _box_of(pane: Pane, margin_m: float) -> _Box:
+    return _Box.around(np.array([pane.start_m, pane.end_m]), margin_m)
 
 
 def _may_be_normal(beam: np.ndarray, points_m: np.ndarray, beam_rad: np.ndarray) -> np.ndarray:

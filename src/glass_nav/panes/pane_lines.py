@@ -81,6 +81,7 @@ def traced(returns: Returns, least_votes_m: float, least_scans: int) -> Iterator
         free[voters] = False
         if line is not None:
             free[line.members] = False
+            free[_on(line, returns)] = False  # oblique beams that it returned
             yield line
 
 
@@ -146,6 +147,16 @@ def _grown(returns: Returns, free: np.ndarray, voters: np.ndarray, direction_rad
     at_m = (points_m[members] - centre) @ along
     covariance = _covariance(offset_m[members], at_m)
     return Line(centre, direction_rad, float(at_m.min()), float(at_m.max()), covariance, near[members])
+
+
+def _on(line: Line, returns: Returns) -> np.ndarray:
+    """(N,) bool: returns that lie on a line, whatever their beams' directions."""
+    from_centre_m = returns.points_m - line.centre_m
+    along_m = from_centre_m @ line.along
+    on_line: np.ndarray = (
+        (np.abs(from_centre_m @ line.normal) < _NEAR_M) & (along_m >= line.first_m) & (along_m <= line.last_m)
+    )
+    return on_line
 
 
 def _incidence(beam_rad: np.ndarray, direction_rad: float) -> np.ndarray:

@@ -40,4 +40,4 @@ class PaneSearch:
                 f"in none of {self._scans} scans was the pose certain enough (LOCALIZED) to learn about the map; "
                 "nothing is drawn"
             )
-        return self._finder.panes()
+        return self._finder.panes(anew=True)

@@ -63,10 +63,13 @@ class Elsewhere:
     phase, reason, remaining_m = DriverPhase.GOING, "another one drives", math.nan
 
     def __init__(self):
-        self.ending, self.cancelled = None, False
+        self.ending, self.cancelled, self.held = None, False, 0
 
     def step(self, now):
         return np.ones(3)
+
+    def hold(self):
+        self.held += 1
 
     def cancel(self):
         self.cancelled = True
@@ -458,7 +461,7 @@ def test_another_map_is_not_that_of_the_atlas():
         robot.driver.map_served(other, "that of topic /map")
 
 
-def test_a_backend_drives_in_its_place_and_is_cancelled_as_soon_as_there_is_trouble():
+def test_a_backend_drives_in_its_place_and_is_held_while_there_is_trouble():
     tasks = []
 
     def backend(_pose):
@@ -468,15 +471,24 @@ def test_a_backend_drives_in_its_place_and_is_cancelled_as_soon_as_there_is_trou
     robot = started(backend=backend)
     robot.do(robot.driver.goto_node(POSE_GOAL))
     robot.run_for(1.0)
-    assert not only(robot.run_for(1.0), Command)
+    assert not only(robot.run_for(1.0), Command) and not tasks[-1].held
     tasks[-1].ending = Ending(Outcome.NO_WAY, "none")
     end = robot.run_to_end()
     assert end.ending.outcome == Outcome.NO_WAY and tasks[-1].cancelled
     assert robot.phase == DriverPhase.FAILED
+    robot.run_for(1.0)  # zero velocity is sent for a while
     robot.do(robot.driver.goto_node(POSE_GOAL))
     robot.localization = LocalizationState.LOST
-    end = robot.run_to_end(1.0)
-    assert end.ending == Ending(Outcome.NOT_LOCALIZED, "the localization is LOST") and tasks[-1].cancelled
+    assert not only(robot.run_for(2.0), Command)
+    assert robot.phase == DriverPhase.HALTED and tasks[-1].held and not tasks[-1].cancelled
+    robot.localization = LocalizationState.LOCALIZED
+    robot.run_for(0.5)
+    assert robot.phase == DriverPhase.GOING
+    robot.localization = LocalizationState.LOST
+    began_s = robot.now_s
+    end = robot.run_to_end(20.0)
+    assert end.ending == Ending(Outcome.NOT_LOCALIZED, "the localization is LOST, for 10 s") and tasks[-1].cancelled
+    assert 10.0 < robot.now_s - began_s < 12.0
 
 
 def test_where_a_goal_of_somebody_else_failed_they_go_on():

@@ -66,7 +66,8 @@ def test_surfaces_are_preferred_while_they_come_and_the_localization_says_locali
     assert not watch.prefers_surfaces(100.1)  # none came
     watch.take_surfaces(100.0)
     assert watch.prefers_surfaces(100.1)
-    assert not watch.prefers_surfaces(100.7)  # no longer
+    assert watch.prefers_surfaces(100.25)
+    assert not watch.prefers_surfaces(100.35)  # late: scan stands in, before the last one used is 0.6 s old
     watch.take_surfaces(103.5)
     assert not watch.prefers_surfaces(103.5)  # the localization is silent
     watch.take_localization(LocalizationState.UNCERTAIN, "", 103.5)

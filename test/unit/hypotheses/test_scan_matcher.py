@@ -31,6 +31,13 @@ def by_trying(scores, allowed, points, headings):
     return best
 
 
+def search(scores, allowed, points, headings, keep):
+    """Row, column, heading and score of the best places."""
+    complete = _mrpt_grid.ScanSearch(_mrpt_grid.MatchGrid(scores, allowed), points, headings, keep)
+    assert complete.advance(2**62)
+    return complete.places()
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_branch_and_bound_finds_what_trying_everything_finds(seed):
     rng = np.random.default_rng(seed)
@@ -41,19 +48,41 @@ def test_branch_and_bound_finds_what_trying_everything_finds(seed):
     points = rng.uniform(-15.0, 15.0, (int(rng.integers(1, 12)), 2))
     headings = rng.uniform(-np.pi, np.pi, 5)
     expected = by_trying(scores, allowed, points, headings)
-    row, column, heading, score = _mrpt_grid.ScanMatcher(scores, allowed).search(points, headings, 10_000)
+    row, column, heading, score = search(scores, allowed, points, headings, 10_000)
     found = dict(zip(zip(row // BLOCK, column // BLOCK, heading), np.rint(score * len(points)).astype(int)))
     assert found == {key: total for key, total in expected.items() if total > 0}
     assert len(found) == len(row) and np.all(np.diff(score) <= 0.0)
     assert allowed[row, column].all()
-    few = _mrpt_grid.ScanMatcher(scores, allowed).search(points, headings, 7)
+    few = search(scores, allowed, points, headings, 7)
     np.testing.assert_array_equal(few[3], score[:7])
 
 
+def test_many_points_add_up():
+    """More than 16 bits hold, at a place that is allowed alone."""
+    scores, allowed = np.full((30, 30), 255, np.uint8), np.zeros((30, 30), bool)
+    allowed[12, 17] = True
+    row, column, _, score = search(scores, allowed, np.zeros((700, 2)), np.zeros(1), 5)
+    assert (row, column, score) == (12, 17, 255.0)
+
+
+@pytest.mark.parametrize("slice_size", [1, 500])
+def test_a_search_in_slices_finds_what_one_at_once_finds(slice_size):
+    rng = np.random.default_rng(3)
+    scores, allowed = rng.integers(0, 256, (40, 70)).astype(np.uint8), rng.random((40, 70)) < 0.3
+    given = rng.uniform(-20.0, 20.0, (9, 2)), rng.uniform(-np.pi, np.pi, 7), 20
+    sliced = _mrpt_grid.ScanSearch(_mrpt_grid.MatchGrid(scores, allowed), *given)
+    slices = 1
+    while not sliced.advance(slice_size):
+        slices += 1
+    assert slices > 10
+    for part, expected in zip(sliced.places(), search(scores, allowed, *given)):
+        np.testing.assert_array_equal(part, expected)
+
+
 def test_nothing_is_found_with_no_points_or_nothing_to_keep():
-    matcher = _mrpt_grid.ScanMatcher(np.full((9, 9), 255, np.uint8), np.ones((9, 9), bool))
-    assert [len(part) for part in matcher.search(np.zeros((0, 2)), np.zeros(1), 5)] == [0, 0, 0, 0]
-    assert [len(part) for part in matcher.search(np.zeros((3, 2)), np.zeros(1), 0)] == [0, 0, 0, 0]
+    full = np.full((9, 9), 255, np.uint8), np.ones((9, 9), bool)
+    assert [len(part) for part in search(*full, np.zeros((0, 2)), np.zeros(1), 5)] == [0, 0, 0, 0]
+    assert [len(part) for part in search(*full, np.zeros((3, 2)), np.zeros(1), 0)] == [0, 0, 0, 0]
 
 
 @pytest.mark.parametrize(
@@ -66,7 +95,7 @@ def test_nothing_is_found_with_no_points_or_nothing_to_keep():
 )
 def test_wrong_shapes_are_refused(scores, allowed, points, headings, text):
     with pytest.raises(ValueError) as err:
-        _mrpt_grid.ScanMatcher(scores.astype(np.uint8), allowed.astype(bool)).search(points, headings, 5)
+        search(scores.astype(np.uint8), allowed.astype(bool), points, headings, 5)
     assert str(err.value) == text
 
 

@@ -153,3 +153,16 @@ def test_a_known_pane_is_found_again_once() -> None:
 def test_a_bad_parameter_is_refused(name: str, value: float, message: str) -> None:
     with pytest.raises(ValueError, match=f"~{name} {message}"):
         module.PaneFinderParams(**{name: value})  # type: ignore[arg-type]
+
+
+def test_looking_again_only_where_the_robot_was_finds_the_same() -> None:
+    looks = made_pane_drive.pane((1.5, 2.5), (4.0, 2.5)), made_pane_drive.pane((6.0, 2.5), (8.0, 2.5))
+    finder = PaneFinder(hall(), PaneFinderParams(pane_reach_m=2.0))
+    for scan, pose in made_pane_drive.scans(*looks):
+        finder.observe(scan, pose, SURE)
+        finder.panes() if finder.due else None
+    bit_by_bit, at_once = (
+        sorted(pane.length_m for pane in finder.panes(anew) if pane.probability > 0.5) for anew in (False, True)
+    )
+    assert bit_by_bit == pytest.approx(at_once, abs=0.25)
+    assert at_once == pytest.approx([2.0, 2.5], abs=0.25)

@@ -6,6 +6,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <pybind11/numpy.h>
@@ -173,7 +174,7 @@ py::tuple normals(const GridRaycaster& grid) {
   return py::make_tuple(normal_rad, linearity, offset_m);
 }
 
-std::unique_ptr<ScanMatcher> make_matcher(const Array<std::uint8_t>& scores, const Array<std::uint8_t>& allowed) {
+std::shared_ptr<MatchGrid> make_match_grid(const Array<std::uint8_t>& scores, const Array<std::uint8_t>& allowed) {
   if (scores.ndim() != 2 || allowed.ndim() != 2 || scores.shape(0) != allowed.shape(0) ||
       scores.shape(1) != allowed.shape(1)) {
     throw std::invalid_argument("scores and allowed must be (H, W)");
@@ -181,21 +182,19 @@ std::unique_ptr<ScanMatcher> make_matcher(const Array<std::uint8_t>& scores, con
   const auto height = static_cast<int>(scores.shape(0)), width = static_cast<int>(scores.shape(1));
   const std::uint8_t *score = scores.data(), *may = allowed.data();
   py::gil_scoped_release unlocked;
-  return std::make_unique<ScanMatcher>(score, may, height, width);
+  return std::make_shared<MatchGrid>(score, may, height, width);
 }
 
-py::tuple search(const ScanMatcher& matcher, const Array<double>& points, const Array<double>& headings_rad,
-                 std::size_t keep) {
+std::unique_ptr<ScanSearch> make_search(std::shared_ptr<MatchGrid> grid, const Array<double>& points,
+                                        const Array<double>& headings_rad, std::size_t keep) {
   if (points.ndim() != 2 || points.shape(1) != 2) throw std::invalid_argument("points must be (B, 2)");
   if (headings_rad.ndim() != 1) throw std::invalid_argument("headings must be (A,)");
-  std::vector<Match> found;
-  {
-    const double *point = points.data(), *heading = headings_rad.data();
-    const auto count = static_cast<std::size_t>(points.shape(0));
-    const auto headings = static_cast<std::size_t>(headings_rad.shape(0));
-    py::gil_scoped_release unlocked;
-    found = matcher.search(point, count, heading, headings, keep);
-  }
+  return std::make_unique<ScanSearch>(std::move(grid), points.data(), static_cast<std::size_t>(points.shape(0)),
+                                      headings_rad.data(), static_cast<std::size_t>(headings_rad.shape(0)), keep);
+}
+
+py::tuple places(const ScanSearch& search) {
+  const std::vector<Match> found = search.places();
   const std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(found.size())};
   py::array_t<std::int32_t> row(shape), column(shape), turn(shape);
   py::array_t<float> score(shape);
@@ -226,7 +225,11 @@ PYBIND11_MODULE(_mrpt_grid, module) {
       .def("normals", &normals)
       .def("redraw", &redraw, py::arg("occupancy"), py::arg("first_row"), py::arg("first_column"), py::arg("rows"),
            py::arg("columns"));
-  py::class_<ScanMatcher>(module, "ScanMatcher")
-      .def(py::init(&make_matcher), py::arg("scores"), py::arg("allowed"))
-      .def("search", &search, py::arg("points"), py::arg("headings_rad"), py::arg("keep"));
+  py::class_<MatchGrid, std::shared_ptr<MatchGrid>>(module, "MatchGrid")
+      .def(py::init(&make_match_grid), py::arg("scores"), py::arg("allowed"));
+  py::class_<ScanSearch>(module, "ScanSearch")
+      .def(py::init(&make_search), py::arg("grid"), py::arg("points"), py::arg("headings_rad"), py::arg("keep"))
+      .def("advance", &ScanSearch::advance, py::arg("look_ups"), py::call_guard<py::gil_scoped_release>())
+      .def_property_readonly("look_ups", &ScanSearch::look_ups)
+      .def("places", &places);
 }

@@ -7,7 +7,7 @@ walls of this map beams end, and which of its walls are glass. B beams.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Tuple
+from typing import Sequence, Tuple
 
 import numpy as np
 
@@ -26,11 +26,13 @@ from glass_nav.localization.beam_classification.glass_map import GlassEvidence, 
 from glass_nav.localization.beam_classification.preliminary_samples import PreliminarySamples
 from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
+from glass_nav.sensing import wall_thickness
 from glass_nav.sensing.known_area import KnownArea
-from glass_nav.sensing.raycast import RayCaster
+from glass_nav.sensing.raycast import RayCaster, changed_box
 from glass_nav.sensing.scan import Scan
-from glass_nav.sensing.wall_thickness import wall_thickness
+from glass_nav.world import drawn_panes
 from glass_nav.world.grid_map import GridMap
+from glass_nav.world.pane import Pane
 
 _DEPTH_SHARE = 0.5  # of a wall's drawn thickness at which beams end, until it is learnt
 _FEWER_SAMPLES = 2  # times, where no particle is weighed by the cases
@@ -55,7 +57,7 @@ class BeamClassifier:
     def __init__(self, params: BeamClassifierParams, grid_map: GridMap) -> None:
         self._params = params
         self.caster = RayCaster(grid_map, params.raycast_backend, params.raycast_threads)
-        self.thickness_m = wall_thickness(grid_map)  # (H * W,)
+        self.thickness_m = wall_thickness.wall_thickness(grid_map)  # (H * W,)
         self.residuals = RangeResiduals(_DEPTH_SHARE, params.min_sigma_m)
         self.glass_map = GlassMap(grid_map, params.glass)
 
@@ -68,6 +70,18 @@ class BeamClassifier:
             self.caster = RayCaster(self.caster.grid_map, params.raycast_backend, params.raycast_threads)
         self.glass_map.weigh_by(params.glass)
         self._params = params
+
+    def redraw(self, grid_map: GridMap, panes: Sequence[Pane]) -> None:
+        """Go on with the same map after panes were drawn in; what was learnt of other walls stays.
+
+        Args:
+            grid_map: the map with the panes.
+            panes: that it has and the map has not.
+        """
+        rows, columns = changed_box(self.caster.grid_map, grid_map)
+        self.caster.redraw(grid_map)
+        wall_thickness.redraw(self.thickness_m, grid_map, rows, columns)
+        self.glass_map.redraw(grid_map, [(drawn_panes.cells(grid_map, pane), pane.probability) for pane in panes])
 
     def classify(
         self, scan: Scan, map_from_base: np.ndarray, covariance: np.ndarray, for_weights: bool = True

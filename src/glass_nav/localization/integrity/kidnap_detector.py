@@ -5,13 +5,18 @@ confident there. What gives it away is that scans fit worse than they used to. T
 the tracked pose as a candidate that starts ahead (hypotheses/global_search.py). If the robot is merely surrounded by
 people, the scans fit nowhere else, and the pose stays. If another place is better and stays so over some distance, the
 robot is there. The formulation is ours.
+
+Once the pose was sure, dead reckoning since then is a prior over places, with a heavy tail: the robot may have been
+carried away. Of two halls that look alike the one that odometry leads to is right, and a tracked pose that the scans
+dragged away from it has no advantage.
 """
 
 from __future__ import annotations
 
 import collections
 from dataclasses import dataclass
-from typing import Callable, Deque, Optional, Tuple
+from functools import partial
+from typing import Deque, Optional, Tuple
 
 import numpy as np
 
@@ -19,7 +24,9 @@ from glass_nav.geometry import se2
 from glass_nav.hypotheses import global_search, pose_tracker
 from glass_nav.hypotheses.global_search import Candidates, GlobalSearch, SearchParams
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
+from glass_nav.localization.integrity.dead_reckoning import DeadReckoning
 from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.known_area import KnownArea
 from glass_nav.sensing.scan import Scan
 
 _USUAL_FIT = 0.9  # of a right pose, until it is learnt
@@ -30,7 +37,8 @@ _DELAY_M = 3.0  # distance driven without doubt before a fit is learnt
 _MIN_STEP_M = 0.05  # distance that a scan counts for when the robot stands
 _DOUBT = (0.06, 3.0)  # below the usual fit, as such and in deviations: search everywhere
 _POOR = 0.7  # of the usual fit: not to be relied on, whatever there is elsewhere
-_HEAD_START = 3.0  # log likelihood ratio of the tracked pose to all others at the start of a search
+_HEAD_START = 3.0  # log likelihood ratio of the tracked pose, or of where odometry leads, to all others: for doubts
+_CARRIED_AWAY = -10.0  # log likelihood ratio of any other place to where odometry leads: for a new pose
 _SETTLED_M = 6.0  # after this distance as the best candidate, the fit at the tracked pose is the usual one
 _CALM_M = 2.0  # after this distance of usual fits nothing was wrong
 _CLOSE = -1.0  # log likelihood ratio of another place to the tracked pose from which it may be the right one
@@ -46,6 +54,7 @@ class Verdict:
     doubted: bool  # the scans fit worse than they used to
     found: Optional[np.ndarray]  # (3,) the pose where the robot is instead
     candidates: Optional[Candidates]  # during a search
+    elsewhere: Optional[np.ndarray] = None  # (3,) the best place that is not the tracked one, during a search
 
     @property
     def fit_there(self) -> float:
@@ -69,18 +78,20 @@ class KidnapDetector:
     def __init__(
         self,
         field: DistanceField,
-        matcher: Optional[Callable[[], ScanMatcher]],
+        matcher: Optional[ScanMatcher],
         params: SearchParams,
         usual_fit: Optional[float] = None,
+        area: Optional[KnownArea] = None,
     ) -> None:
         """
         Args:
             field: of the map.
-            matcher: makes the one that searches everywhere; called at its first use. None: the map has no free cell.
+            matcher: searches everywhere. None: the map has no free cell.
             params: whether and when another place is accepted.
             usual_fit: of scans at the pose; None: not known yet.
+            area: where the map knows something; None: everywhere.
         """
-        self._field, self._matcher, self._params = field, matcher, params
+        self._field, self._matcher, self._params, self._area = field, matcher, params, area
         self._usual, self._spread = _USUAL_FIT if usual_fit is None else usual_fit, _USUAL_SPREAD
         self._learnt_m = _PRIOR_M
         self._fit = float("nan")
@@ -98,21 +109,33 @@ class KidnapDetector:
         if self._search is not None:
             self._search.decide_by(params)
 
-    def observe(self, scan: Scan, odom_from_base: np.ndarray, map_from_base: np.ndarray) -> Verdict:
-        """One more scan and the tracked pose after it; with too few returns the verdict stays."""
+    def observe(
+        self,
+        scan: Scan,
+        odom_from_base: np.ndarray,
+        map_from_base: np.ndarray,
+        dead_reckoning: Optional[DeadReckoning] = None,
+    ) -> Verdict:
+        """One more scan and the tracked pose after it; with too few returns the verdict stays.
+
+        Args:
+            scan: one revolution of a lidar.
+            odom_from_base: (3,) odometry at its stamp.
+            map_from_base: (3,) the tracked pose.
+            dead_reckoning: from the last sure pose to this scan; None: no pose was sure yet.
+        """
         step_m = self._distance(odom_from_base)
         points = global_search.evidence_points(scan)
         if points is None:
             return self._verdict
-        fit = float(global_search.fit(self._field, points, map_from_base[None])[0])
+        known = points if self._area is None else points[self._area.ends(points, map_from_base[None])[0]]
+        if len(known) < global_search.MIN_BEAMS:  # what ends where the map knows nothing agrees with every pose
+            return self._verdict
+        fit = float(global_search.fit(self._field, known, map_from_base[None])[0])
         self._fit = fit if np.isnan(self._fit) else self._fit + (fit - self._fit) * -np.expm1(-step_m / _FORGET_M)
         doubted = self._usual - self._fit > max(_DOUBT[0], _DOUBT[1] * self._spread)
         if self._search is None and doubted and self._params.recover_when_lost and self._matcher is not None:
-            self._search = GlobalSearch(self._matcher(), self._field, self._params)
-            self._search_m = self._calm_m = self._search_fit_m = 0.0
-            self._search.add(map_from_base, _HEAD_START)
-            self._recent.clear()
-            self._recent_m = 0.0
+            self._begin_search(self._matcher, map_from_base, dead_reckoning)
         if self._search is None:
             if not doubted:
                 self._learn(fit, step_m)
@@ -121,16 +144,43 @@ class KidnapDetector:
             self._search_m += step_m
             self._search_fit_m += step_m * fit
             self._calm_m = 0.0 if doubted else self._calm_m + step_m
-            self._verdict = self._compare(self._search.update(scan, odom_from_base), map_from_base, doubted)
+            prior = None if dead_reckoning is None else partial(dead_reckoning.log_likelihood, least=_CARRIED_AWAY)
+            candidates = self._search.update(scan, odom_from_base, log_prior=prior)
+            self._verdict = self._compare(candidates, map_from_base, doubted, dead_reckoning)
         return self._verdict
 
-    def _compare(self, candidates: Candidates, map_from_base: np.ndarray, doubted: bool) -> Verdict:
+    def _begin_search(
+        self, matcher: ScanMatcher, map_from_base: np.ndarray, dead_reckoning: Optional[DeadReckoning]
+    ) -> None:
+        self._search = GlobalSearch(matcher, self._field, self._params, self._area)
+        self._search_m = self._calm_m = self._search_fit_m = 0.0
+        if dead_reckoning is None:
+            self._search.add(map_from_base, _HEAD_START)
+        else:
+            self._search.add(map_from_base, 0.0)
+            self._search.add(dead_reckoning.map_from_base, 0.0)
+        self._recent.clear()
+        self._recent_m = 0.0
+
+    def _compare(
+        self,
+        candidates: Candidates,
+        map_from_base: np.ndarray,
+        doubted: bool,
+        dead_reckoning: Optional[DeadReckoning],
+    ) -> Verdict:
         """The tracked pose with the best place elsewhere."""
+        if np.isnan(candidates.fit):  # the first scan has not been matched everywhere yet
+            return Verdict(self._fit, self._usual, -np.inf, doubted, None, None)
         here = pose_tracker.same_place(candidates.poses, map_from_base)
         with np.errstate(divide="ignore"):
             log_w = np.log(candidates.weights)
-        elsewhere = log_w[~here].max() if not here.all() else -np.inf
-        log_ratio = float(elsewhere - log_w[here].max()) if here.any() else np.inf
+        if dead_reckoning is not None:  # doubts need less than a new pose
+            likelihood = dead_reckoning.log_likelihood(candidates.poses)
+            log_w = log_w - np.maximum(likelihood, _CARRIED_AWAY) + np.maximum(likelihood, -_HEAD_START)
+        elsewhere = None if here.all() else int(np.flatnonzero(~here)[np.argmax(log_w[~here])])
+        log_there = -np.inf if elsewhere is None else log_w[elsewhere]
+        log_ratio = float(log_there - log_w[here].max()) if here.any() else np.inf
         fit_during_search = self._search_fit_m / self._search_m
         steady = self._fit > fit_during_search - _DOUBT[0]
         best_here = steady and (
@@ -142,7 +192,8 @@ class KidnapDetector:
         if best_here or calm or (log_ratio <= 0.0 and not doubted):
             self._search = None
         found = candidates.poses[0] if candidates.found and not here[0] else None
-        return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates)
+        there = None if elsewhere is None else candidates.poses[elsewhere]
+        return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates, there)
 
     def _learn(self, fit: float, step_m: float) -> None:
         """How well scans fit where the pose is right, and how much that varies."""

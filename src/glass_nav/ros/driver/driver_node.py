@@ -37,6 +37,7 @@ from glass_nav.driving import decisions
 from glass_nav.driving.decisions import Action, Decision
 from glass_nav.driving.driver import Driver
 from glass_nav.driving.input_watch import Odometry
+from glass_nav.driving.move_base_task import MoveBaseTask
 from glass_nav.log_line import LogLine
 from glass_nav.msg import (
     DriverStatus,
@@ -55,7 +56,7 @@ from glass_nav.ros import action_status, command_line, conversions, shutdown
 from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.driver import driver_displays, driver_messages
 from glass_nav.ros.driver.driver_params import MOVE_BASE, DriverParams
-from glass_nav.ros.driver.move_base_task import MoveBase, MoveBaseTask
+from glass_nav.ros.driver.move_base import MoveBase
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
@@ -83,7 +84,7 @@ class DriverNode:
         self._clock = LoopClock()
         atlas = atlas_file.load(shipped_atlases.find(self._p.atlas)) if self._p.atlas else None
         names = self._p.input_names(rospy.resolve_name("localization_status"))
-        backend = self._move_base_backend() if self._p.backend == MOVE_BASE else None
+        backend = self._move_base_backend(p.drive.rules.patience_s) if self._p.backend == MOVE_BASE else None
         self._driver = Driver(p.drive, names, atlas, backend, self._clock.now_s)
         self._markers_pace = RateLimiter()
         self._next_report_s = 0.0  # of diagnostics, by the monotonic clock
@@ -157,9 +158,9 @@ class DriverNode:
             self._report()
         self._commands.publish(Twist())
 
-    def _move_base_backend(self) -> Callable[[np.ndarray], MoveBaseTask]:
-        move_base = MoveBase()
-        return lambda pose: MoveBaseTask(move_base, pose, self._p.global_frame_id, self._p.move_base_wait_s)
+    def _move_base_backend(self, patience_s: float) -> Callable[[np.ndarray], MoveBaseTask]:
+        move_base = MoveBase(self._p.global_frame_id)
+        return lambda pose: MoveBaseTask(move_base, pose, self._p.move_base_wait_s, patience_s)
 
     # -- callbacks of other threads: they store
 

@@ -147,7 +147,7 @@ class Publishers:
         self._glass_is_news = False
         glass = localizer.glass_map.occupancy()
         self._glass_map.publish(conversions.glass_map_msg(stamp_ns, self._frame, grid_map, glass))
-        self._wall_markers.publish(wall_display.wall_markers(self._frame, grid_map, glass))
+        self._wall_markers.publish(wall_display.wall_markers(self._frame, grid_map, glass, localizer.unmapped_panes))
 
     def _show_beams(self, placed: PlacedScan, estimate: Estimate, now_s: float) -> None:
         """The beams for rviz, if it listens and they are due."""

@@ -10,10 +10,13 @@ from buildings import L_ROOM, SECOND_NS, Building, loop_drive, odometry, off
 
 from glass_nav.geometry import se2
 from glass_nav.hypotheses.global_search import SearchParams
+from glass_nav.hypotheses.pose_tracker import same_place
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
+from glass_nav.localization.integrity.dead_reckoning import DeadReckoning
 from glass_nav.localization.integrity.kidnap_detector import KidnapDetector
 from glass_nav.sensing.distance_field import DistanceField
 
+CLOSE = np.diag([0.2, 0.2, 0.05]) ** 2
 SQUARE = Building([(0, 0), (6, 0), (6, 6), (0, 6)])
 
 
@@ -24,24 +27,23 @@ class Watched:
         self.building, self.rng = building, np.random.default_rng(seed)
         grid_map = building.grid_map()
         field = DistanceField(grid_map)
-        self.matchers = 0
-
-        def matcher():
-            self.matchers += 1
-            return ScanMatcher(grid_map, field)
-
-        self.watch = KidnapDetector(field, matcher, SearchParams(**values), usual_fit)
+        self.watch = KidnapDetector(field, ScanMatcher(grid_map, field), SearchParams(**values), usual_fit)
         self.stamp_ns = 0
+        self.searches, self._searching = 0, False
 
-    def drive(self, true, believed=None, odom=None, blind=None):
+    def drive(self, true, believed=None, odom=None, blind=None, reckoned=None):
+        """reckoned: where dead reckoning leads; None: no pose was sure yet."""
         odom = odometry(true, self.rng) if odom is None else odom
         believed = true if believed is None else believed
+        reckoned = [None] * len(true) if reckoned is None else [DeadReckoning(pose, CLOSE) for pose in reckoned]
         verdicts = []
-        for pose, told, moved in zip(true, believed, odom):
+        for pose, told, moved, prior in zip(true, believed, odom, reckoned):
             self.stamp_ns += SECOND_NS
             scan = self.building.scan(pose, self.stamp_ns, self.rng)
             scan = scan if blind is None else replace(scan, ranges_m=blind(len(scan)))
-            verdicts.append(self.watch.observe(scan, moved, np.asarray(told)))
+            verdicts.append(self.watch.observe(scan, moved, np.asarray(told), prior))
+            self.searches += not self._searching and verdicts[-1].candidates is not None
+            self._searching = verdicts[-1].candidates is not None
         return verdicts
 
 
@@ -56,7 +58,7 @@ def test_a_right_pose_is_never_doubted_and_costs_no_search():
     watched = Watched()
     verdicts = watched.drive(loop_drive(60))
     assert not any(verdict.doubted or verdict.poor or verdict.contested for verdict in verdicts)
-    assert watched.matchers == 0 and np.isnan(verdicts[-1].fit_there)
+    assert watched.searches == 0 and np.isnan(verdicts[-1].fit_there)
     assert verdicts[-1].usual == pytest.approx(verdicts[-1].fit, abs=0.05)  # it has learnt how scans fit
 
 
@@ -69,14 +71,14 @@ def test_a_wrong_pose_is_doubted_within_a_metre_and_the_right_one_is_found():
     found = next(index for index, verdict in enumerate(verdicts) if verdict.found is not None)
     assert off(verdicts[found].found, true[found])[0] < 0.1
     assert verdicts[found].fit_there > 0.8 > verdicts[found].fit
-    assert watched.matchers == 1
+    assert watched.searches == 1
 
 
 def test_told_not_to_it_does_not_look_elsewhere():
     watched = Watched(recover_when_lost=False)
     watched.drive(loop_drive(30))
     verdicts = watched.drive(*carried())
-    assert watched.matchers == 0 and verdicts[-1].found is None and not verdicts[-1].contested
+    assert watched.searches == 0 and verdicts[-1].found is None and not verdicts[-1].contested
     assert verdicts[-1].doubted and verdicts[-1].poor
 
 
@@ -94,9 +96,52 @@ def test_people_all_round_make_a_pose_doubtful_but_move_nobody():
 def test_of_places_that_look_alike_the_believed_one_stays():
     """In a square room a pose turned by half about the middle fits as well: nobody can tell, so nobody moves."""
     true = loop_drive(40, (3.0, 3.0))
-    twin = [se2.compose(np.array([3.0, 3.0, np.pi]), np.array([*(pose[:2] - 3.0), pose[2]])) for pose in true]
-    verdicts = Watched(SQUARE).drive(true, twin)
+    verdicts = Watched(SQUARE).drive(true, turned_by_half(true))
     assert not any(verdict.contested for verdict in verdicts)
+
+
+def turned_by_half(true):
+    """The same in the square room, turned by half about its middle: no scan can tell."""
+    return [se2.compose(np.array([3.0, 3.0, np.pi]), np.array([*(pose[:2] - 3.0), pose[2]])) for pose in true]
+
+
+def test_of_places_that_look_alike_odometry_leads_to_one():
+    """The tracked pose was dragged away; four places fit, and odometry since the last sure pose knows which it is."""
+    true = loop_drive(40, (3.0, 3.0))
+    dragged = [se2.compose(np.array([0.4, 0.9, 0.5]), pose) for pose in true]
+    watched = Watched(SQUARE)
+    verdicts = watched.drive(true, dragged, reckoned=true)
+    found = [(each.found, pose) for each, pose in zip(verdicts, true) if each.found is not None]
+    assert found and all(same_place(place[None], pose)[0] for place, pose in found)
+    without = Watched(SQUARE).drive(true, dragged)
+    assert not any(each.found is not None for each in without)
+
+
+def test_of_places_that_look_alike_none_is_found_after_a_kidnapping():
+    """Odometry leads to where no scan fits; the twins remain, and nothing decides between them."""
+    true = loop_drive(40, (3.0, 3.0))
+    wrong = [se2.compose(np.array([0.9, 0.8, 0.6]), pose) for pose in true]
+    verdicts = Watched(SQUARE).drive(true, wrong, reckoned=wrong)
+    assert not any(each.found is not None for each in verdicts)
+    assert verdicts[-1].contested
+
+
+def test_odometry_does_not_hide_a_kidnapping_for_ever():
+    watched = Watched()
+    watched.drive(loop_drive(30), reckoned=loop_drive(30))
+    true, wrong = carried(60)
+    verdicts = watched.drive(true, wrong, reckoned=wrong)
+    assert any(each.contested for each in verdicts[:6])
+    found = next(index for index, each in enumerate(verdicts) if each.found is not None)
+    assert off(verdicts[found].found, true[found])[0] < 0.1
+
+
+def test_another_place_is_named_and_not_the_tracked_one():
+    watched = Watched()
+    watched.drive(loop_drive(30))
+    true, wrong = carried()
+    named = [(each, pose) for each, pose in zip(watched.drive(true, wrong), wrong) if each.elsewhere is not None]
+    assert named and all(not same_place(each.elsewhere[None], pose)[0] for each, pose in named)
 
 
 def test_without_answers_the_verdict_stays():
@@ -126,7 +171,7 @@ def test_where_scans_always_fit_badly_that_becomes_usual():
         verdicts += watched.drive(
             [pose], odom=[moved], blind=lambda beams, exact=exact: exact + watched.rng.normal(0.0, 0.2, beams)
         )
-    assert verdicts[0].usual == 0.9 and 1 <= watched.matchers <= 2
+    assert verdicts[0].usual == 0.9 and 1 <= watched.searches <= 2
     assert verdicts[-1].usual < 0.85 and verdicts[-1].candidates is None
     assert not any(verdict.found is not None or verdict.contested for verdict in verdicts)
 

@@ -121,15 +121,15 @@ def test_the_fewer_beams_say_something_the_less_a_scan_counts():
 
 
 def test_scans_that_fit_better_elsewhere_make_a_pose_uncertain_and_lost_if_they_do_by_far():
-    better = dict(fit=0.8, doubted=True, candidates=candidates())
+    better = dict(fit=0.8, doubted=True, candidates=candidates(), elsewhere=np.array([2.0, 1.0, 0.5]))
     assert judged([0.9], log_ratio=2.0, **better) == (
         "UNCERTAIN",
-        "the scans fit as well or better elsewhere, best at x 2.0 m, y 1.0 m; the map explains 90% of the "
+        "the scans fit as well or better elsewhere, best at x 2.0 m, y 1.0 m, 29 deg; the map explains 90% of the "
         "beams that it covers; 100% of the weight in one place, sigma 0.05 m, 1.1 deg",
     )
     assert judged([0.9], log_ratio=4.0, **better) == (
         "LOST",
-        "the scans fit as well or better elsewhere, best at x 2.0 m, y 1.0 m; the map explains 90% of the "
+        "the scans fit as well or better elsewhere, best at x 2.0 m, y 1.0 m, 29 deg; the map explains 90% of the "
         "beams that it covers",
     )
     assert judged([0.9], log_ratio=-2.0, **better)[0] == "LOCALIZED"

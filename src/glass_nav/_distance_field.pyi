@@ -1,0 +1,30 @@
+# cpp/field; its faces are sensing/distance_field.py and hypotheses/scan_alignment.py. K poses, B beams, H x W cells.
+import numpy as np
+
+class DistanceField:
+    def __init__(
+        self,
+        distance_m: np.ndarray,  # (H, W) float32
+        resolution_m: float,
+        map_from_grid: np.ndarray,  # (3,) float64
+        max_distance_m: float,
+    ) -> None: ...
+    def distance(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray: ...  # (...) float64
+    def at(self, x_m: np.ndarray, y_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...  # (...) float64
+
+def slid(
+    field: DistanceField,
+    points_m: np.ndarray,  # (B, 2) float64
+    poses: np.ndarray,  # (K, 3) float64
+    held: np.ndarray,  # (3, 3) float64
+    damping: float,
+    iterations: int,
+    first_scale_m: float,
+    last_scale_m: float,
+) -> np.ndarray: ...  # (K, 3) float64
+def information(
+    field: DistanceField, points_m: np.ndarray, poses: np.ndarray, scale_m: float
+) -> np.ndarray: ...  # (K, 3, 3) float64
+def fit(
+    field: DistanceField, points_m: np.ndarray, poses: np.ndarray, scale_m: float
+) -> np.ndarray: ...  # (K,) float64

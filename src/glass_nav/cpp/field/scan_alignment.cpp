@@ -1,0 +1,94 @@
+#include "scan_alignment.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace glass_nav {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+double wrap(double angle_rad) { return angle_rad - 2.0 * kPi * std::floor((angle_rad + kPi) / (2.0 * kPi)); }
+
+/// Upper triangle of a symmetric 3 x 3 matrix, and a right side.
+struct Equations {
+  double a00 = 0.0, a01 = 0.0, a02 = 0.0, a11 = 0.0, a12 = 0.0, a22 = 0.0;
+  double b0 = 0.0, b1 = 0.0, b2 = 0.0;
+};
+
+/// Of the squared distances, with Geman-McClure weights.
+Equations normal_equations(const DistanceField& field, const Points& points, const Pose& pose, double scale_m) {
+  const double cos = std::cos(pose[2]), sin = std::sin(pose[2]), square = scale_m * scale_m;
+  Equations sums;
+  for (std::size_t i = 0; i < points.count; ++i) {
+    const double x = cos * points.xy_m[2 * i] - sin * points.xy_m[2 * i + 1];
+    const double y = sin * points.xy_m[2 * i] + cos * points.xy_m[2 * i + 1];
+    const Slope at = field.at(pose[0] + x, pose[1] + y);
+    const double root = square / (square + at.distance * at.distance), weight = root * root;
+    const double along_yaw = at.along_y * x - at.along_x * y;
+    const double w0 = weight * at.along_x, w1 = weight * at.along_y, w2 = weight * along_yaw;
+    sums.a00 += w0 * at.along_x;
+    sums.a01 += w0 * at.along_y;
+    sums.a02 += w0 * along_yaw;
+    sums.a11 += w1 * at.along_y;
+    sums.a12 += w1 * along_yaw;
+    sums.a22 += w2 * along_yaw;
+    sums.b0 += w0 * at.distance;
+    sums.b1 += w1 * at.distance;
+    sums.b2 += w2 * at.distance;
+  }
+  return sums;
+}
+
+/// By Cramer's rule; the matrix is positive definite.
+Pose solve(const Equations& e) {
+  const double c00 = e.a11 * e.a22 - e.a12 * e.a12, c01 = e.a02 * e.a12 - e.a01 * e.a22,
+               c02 = e.a01 * e.a12 - e.a02 * e.a11, c11 = e.a00 * e.a22 - e.a02 * e.a02,
+               c12 = e.a01 * e.a02 - e.a00 * e.a12, c22 = e.a00 * e.a11 - e.a01 * e.a01;
+  const double scale = 1.0 / (e.a00 * c00 + e.a01 * c01 + e.a02 * c02);
+  return {scale * (c00 * e.b0 + c01 * e.b1 + c02 * e.b2), scale * (c01 * e.b0 + c11 * e.b1 + c12 * e.b2),
+          scale * (c02 * e.b0 + c12 * e.b1 + c22 * e.b2)};
+}
+
+}  // namespace
+
+void slide(const DistanceField& field, const Points& points, const Steps& steps, Pose& pose) {
+  const Pose start = pose;
+  const Matrix3& held = steps.held;
+  const double shrink = std::pow(steps.last_scale_m / steps.first_scale_m, 1.0 / std::max(steps.iterations - 1, 1));
+  double scale_m = steps.first_scale_m;
+  for (int iteration = 0; iteration < steps.iterations; ++iteration, scale_m *= shrink) {
+    Equations sums = normal_equations(field, points, pose, scale_m);
+    const double x = pose[0] - start[0], y = pose[1] - start[1], yaw = wrap(pose[2] - start[2]);
+    sums.a00 += held[0] + steps.damping;
+    sums.a01 += held[1];
+    sums.a02 += held[2];
+    sums.a11 += held[4] + steps.damping;
+    sums.a12 += held[5];
+    sums.a22 += held[8] + steps.damping;
+    sums.b0 += held[0] * x + held[1] * y + held[2] * yaw;
+    sums.b1 += held[1] * x + held[4] * y + held[5] * yaw;
+    sums.b2 += held[2] * x + held[5] * y + held[8] * yaw;
+    const Pose step = solve(sums);
+    for (std::size_t i = 0; i < 3; ++i) pose[i] -= step[i];
+  }
+  pose[2] = wrap(pose[2]);
+}
+
+Matrix3 information_at(const DistanceField& field, const Points& points, const Pose& pose, double scale_m) {
+  const Equations e = normal_equations(field, points, pose, scale_m);
+  return {e.a00, e.a01, e.a02, e.a01, e.a11, e.a12, e.a02, e.a12, e.a22};
+}
+
+double fit_at(const DistanceField& field, const Points& points, const Pose& pose, double scale_m) {
+  const double cos = std::cos(pose[2]), sin = std::sin(pose[2]), square = scale_m * scale_m;
+  double total = 0.0;
+  for (std::size_t i = 0; i < points.count; ++i) {
+    const double x = points.xy_m[2 * i], y = points.xy_m[2 * i + 1];
+    const double distance = field.distance(pose[0] + cos * x - sin * y, pose[1] + sin * x + cos * y);
+    total += square / (square + distance * distance);
+  }
+  return total / static_cast<double>(points.count);
+}
+
+}  // namespace glass_nav
