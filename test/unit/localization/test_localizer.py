@@ -74,6 +74,7 @@ def same(one, other):
 # -- it tracks
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(3))
 def test_a_robot_in_an_opaque_room_is_tracked_within_centimetres(seed):
     drive = Drive(seed=seed, steps=40)
@@ -85,6 +86,7 @@ def test_a_robot_in_an_opaque_room_is_tracked_within_centimetres(seed):
     assert all(estimate.updated for estimate in estimates)
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("glass_share", [0.3, 0.9])
 def test_a_robot_beside_glass_is_tracked_within_centimetres(seed, glass_share):
@@ -94,6 +96,7 @@ def test_a_robot_beside_glass_is_tracked_within_centimetres(seed, glass_share):
     assert turn_rad.max() < np.radians(1.5)
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("weight_mode", ["field", "ranges"])
 @pytest.mark.parametrize("seed", range(2))
 def test_either_way_to_weigh_particles_tracks_a_robot_beside_glass(seed, weight_mode):
@@ -166,6 +169,7 @@ def test_a_pane_becomes_glass_over_a_drive_and_a_wall_does_not(seed):
     assert (picture[~MAPS[GLASS_ROOM].occupied] == -1).all()
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(2))
 def test_in_an_opaque_room_no_wall_becomes_glass(seed):
     drive = Drive(seed=seed, steps=40)
@@ -186,6 +190,7 @@ def test_a_lidar_that_sees_no_glass_at_all_is_localized(seed):
     assert estimates[-1].state == "LOCALIZED"
 
 
+@pytest.mark.long_run
 def test_another_map_has_other_glass():
     drive = GlassDrive()
     localizer = started(GLASS_ROOM, drive.true[0])
@@ -279,6 +284,7 @@ def test_a_scan_between_updates_is_cut_too():
     assert np.mean(again.surface_scan.cut == last.surface_scan.cut) > 0.97 and again.surface_scan.cut.any()
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("vote_mode", ["soft", "paper"])
 def test_between_updates_beams_are_told_apart_as_in_one(vote_mode):
     """The same scans from where the robot stands, once with an update and once between updates."""
@@ -310,6 +316,7 @@ def test_few_beams_are_used_as_far_as_they_go(beams):
     assert len(drive.scans[0]) == beams
 
 
+@pytest.mark.long_run
 def test_it_tracks_with_fewer_resamplings_and_more_threads():
     drive = Drive(seed=7, steps=20)
     way_m, _ = drive.errors(drive.through(started(resample_interval=3, raycast_threads=2))).T
@@ -372,6 +379,7 @@ def test_in_an_area_only_what_lies_in_it_is_a_candidate():
     assert off(told.map_from_base, true)[0] < 0.1
 
 
+@pytest.mark.long_run
 def test_a_pose_given_too_vaguely_to_track_is_looked_for_within_its_reach():
     drive = Drive(seed=1, steps=40)
     localizer = Localizer(parameters(), MAPS[L_ROOM], np.random.default_rng(1))
@@ -438,6 +446,7 @@ def test_a_robot_that_stands_for_five_minutes_stays_where_it_is(forced):
 # -- what happens between and beside good scans
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(3))
 def test_a_wheel_that_slips_is_made_up_for_by_the_scan(seed):
     drive = Drive(seed=seed)
@@ -516,12 +525,29 @@ def test_who_stands_still_is_not_moved(drive):
 def test_below_the_least_way_and_turn_odometry_alone_carries_on(drive):
     localizer = started(update_min_d=0.2, update_min_a=0.2)
     before = drive.through(localizer, last=1)[0]
-    odom = se2.compose(drive.odometry[0], np.array([0.15, 0.0, 0.15]))
-    after = localizer.update(replace(drive.scans[1]), odom)
+    step = np.array([0.15, 0.0, 0.15])
+    after = localizer.update(scan_after(drive, step, 1), se2.compose(drive.odometry[0], step))
     assert before.updated and not after.updated
-    np.testing.assert_allclose(after.map_from_base, se2.compose(before.map_from_base, [0.15, 0.0, 0.15]), atol=1e-12)
-    turned = localizer.update(replace(drive.scans[2]), se2.compose(drive.odometry[0], np.array([0.0, 0.0, 0.21])))
-    assert turned.updated
+    np.testing.assert_allclose(after.map_from_base, se2.compose(before.map_from_base, step), atol=1e-12)
+    turn = np.array([0.0, 0.0, 0.21])
+    assert localizer.update(scan_after(drive, turn, 2), se2.compose(drive.odometry[0], turn)).updated
+
+
+def scan_after(drive, step, index, lidar=""):
+    """Of the robot that made that step from where the drive begins."""
+    pose = se2.compose(drive.true[0], np.asarray(step))
+    return replace(L_ROOM.scan(pose, index * SECOND_NS, np.random.default_rng(index)), lidar=lidar)
+
+
+def test_a_scan_that_no_longer_fits_is_an_update(drive):
+    """Odometry reports nothing of a turn: by the distance driven there would be no update."""
+    localizer = started()
+    localizer.update(scan_after(drive, [0.0, 0.0, 0.0], 0), drive.odometry[0])
+    assert not localizer.update(scan_after(drive, [0.0, 0.0, 0.0], 1), drive.odometry[0]).updated
+    turn = np.array([0.0, 0.0, np.radians(6.0)])
+    estimate = localizer.update(scan_after(drive, turn, 2), drive.odometry[0])
+    assert estimate.updated
+    assert off(estimate.map_from_base, se2.compose(drive.true[0], turn))[1] < np.radians(0.5)
 
 
 def test_a_requested_update_uses_the_next_scan_of_a_robot_that_stands(drive):
@@ -540,7 +566,7 @@ def test_of_two_lidars_each_has_its_update_after_a_move(drive):
     localizer = started(update_min_d=0.2, update_min_a=0.2)
     still, moved = drive.odometry[0], se2.compose(drive.odometry[0], np.array([0.21, 0.0, 0.0]))
     updated = [
-        localizer.update(seen_by(drive.scans[index], lidar), odom).updated
+        localizer.update(scan_after(drive, se2.compose(se2.inverse(still), odom), index, lidar), odom).updated
         for index, (lidar, odom) in enumerate(
             [
                 ("front", still),
@@ -753,6 +779,7 @@ def test_mrpts_ray_casts_give_nearly_the_same_answer(drive):
     assert np.mean(same_case) > 0.98
 
 
+@pytest.mark.long_run
 def test_another_seed_gives_nearly_the_same_answer(drive):
     one, other = drive.through(started(seed=5)), drive.through(started(seed=6))
     assert not np.array_equal(one[-1].particles, other[-1].particles)
@@ -950,6 +977,7 @@ def test_a_filter_that_is_given_up_leaves_the_memory_at_once(drive):
         gc.enable()
 
 
+@pytest.mark.long_run
 def test_a_search_goes_on_in_another_map():
     drive = Drive(GLASS_ROOM, seed=2, centre=(3.0, 1.6), glass_share=0.3)
     localizer = started(L_ROOM, drive.true[0])
