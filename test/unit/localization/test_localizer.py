@@ -526,12 +526,29 @@ def test_who_stands_still_is_not_moved(drive):
 def test_below_the_least_way_and_turn_odometry_alone_carries_on(drive):
     localizer = started(update_min_d=0.2, update_min_a=0.2)
     before = drive.through(localizer, last=1)[0]
-    odom = se2.compose(drive.odometry[0], np.array([0.15, 0.0, 0.15]))
-    after = localizer.update(replace(drive.scans[1]), odom)
+    step = np.array([0.15, 0.0, 0.15])
+    after = localizer.update(scan_after(drive, step, 1), se2.compose(drive.odometry[0], step))
     assert before.updated and not after.updated
-    np.testing.assert_allclose(after.map_from_base, se2.compose(before.map_from_base, [0.15, 0.0, 0.15]), atol=1e-12)
-    turned = localizer.update(replace(drive.scans[2]), se2.compose(drive.odometry[0], np.array([0.0, 0.0, 0.21])))
-    assert turned.updated
+    np.testing.assert_allclose(after.map_from_base, se2.compose(before.map_from_base, step), atol=1e-12)
+    turn = np.array([0.0, 0.0, 0.21])
+    assert localizer.update(scan_after(drive, turn, 2), se2.compose(drive.odometry[0], turn)).updated
+
+
+def scan_after(drive, step, index, lidar=""):
+    """Of the robot that made that step from where the drive begins."""
+    pose = se2.compose(drive.true[0], np.asarray(step))
+    return replace(L_ROOM.scan(pose, index * SECOND_NS, np.random.default_rng(index)), lidar=lidar)
+
+
+def test_a_scan_that_no_longer_fits_is_an_update(drive):
+    """Odometry reports nothing of a turn: by the distance driven there would be no update."""
+    localizer = started()
+    localizer.update(scan_after(drive, [0.0, 0.0, 0.0], 0), drive.odometry[0])
+    assert not localizer.update(scan_after(drive, [0.0, 0.0, 0.0], 1), drive.odometry[0]).updated
+    turn = np.array([0.0, 0.0, np.radians(6.0)])
+    estimate = localizer.update(scan_after(drive, turn, 2), drive.odometry[0])
+    assert estimate.updated
+    assert off(estimate.map_from_base, se2.compose(drive.true[0], turn))[1] < np.radians(0.5)
 
 
 def test_a_requested_update_uses_the_next_scan_of_a_robot_that_stands(drive):
@@ -550,7 +567,7 @@ def test_of_two_lidars_each_has_its_update_after_a_move(drive):
     localizer = started(update_min_d=0.2, update_min_a=0.2)
     still, moved = drive.odometry[0], se2.compose(drive.odometry[0], np.array([0.21, 0.0, 0.0]))
     updated = [
-        localizer.update(seen_by(drive.scans[index], lidar), odom).updated
+        localizer.update(scan_after(drive, se2.compose(se2.inverse(still), odom), index, lidar), odom).updated
         for index, (lidar, odom) in enumerate(
             [
                 ("front", still),
