@@ -10,6 +10,7 @@ from typing import Any, Iterator
 import yaml
 
 from glass_nav.evaluation.plots import legend
+from glass_nav.localization.place_shapes import PLACES_NAMESPACE
 from glass_nav.localization.status_text import STATUS_NAMESPACE
 from glass_nav.ros import legend as legend_topic
 from glass_nav.ros.driver import driver_displays, driver_node
@@ -51,7 +52,7 @@ def test_what_is_called_value_is_what_is_enabled():
 
 
 def test_every_case_and_the_status_have_a_checkbox():
-    names = [*(case.label for case in BeamCase), STATUS_NAMESPACE]
+    names = [*(case.label for case in BeamCase), PLACES_NAMESPACE, STATUS_NAMESPACE]
     assert named("Beams by case")["Namespaces"] == dict.fromkeys(names, True)
     assert named("Glass map")["Namespaces"] == dict.fromkeys([*map(str, WallKind), UNMAPPED_GLASS], True)
 

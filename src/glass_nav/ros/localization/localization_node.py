@@ -56,6 +56,7 @@ from glass_nav.ros.localization.map_source import MapSource
 from glass_nav.ros.localization.publishers import Publishers
 from glass_nav.ros.localization.reconfigure import ReconfigureServer
 from glass_nav.ros.localization.segment_service import SegmentService
+from glass_nav.ros.localization.sender_watch import SenderWatch
 from glass_nav.ros.localization.shown_parameters import ShownParameters
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
@@ -114,6 +115,7 @@ class LocalizationNode:
         )
         # Subscribers last: they may fire at once.
         self._listener = tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
+        self._sender_watch = SenderWatch(p.node, self._log)
         self._scans.subscribe(self._take_scan)
         self._bearings.subscribe(self._command(self._bearings.receive))
         rospy.Subscriber("initialpose", PoseWithCovarianceStamped, self._command(self._take_guess), queue_size=2)

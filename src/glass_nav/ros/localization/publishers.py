@@ -159,6 +159,7 @@ class Publishers:
             self._beam_cloud.publish(beam_displays.beam_cloud(placed.scan, estimate.cases, height_m, base))
         if listeners[1]:
             markers = beam_displays.beam_markers(placed.scan, estimate.cases, estimate.surface_scan, height_m, base)
+            markers.markers += beam_displays.place_markers(estimate.state, estimate.particles, self._frame)
             markers.markers.append(
                 beam_displays.status_marker(
                     estimate.map_from_base, self._frame, estimate.state, estimate.reason, estimate.inlier_ratio
