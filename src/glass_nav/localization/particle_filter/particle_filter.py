@@ -187,6 +187,11 @@ class ParticleFilter:
         )
         self._weights = resampling.tempered(log_ratio + self._log_weights(scan, cases, classifier))
 
+    @property
+    def suspect(self) -> Optional[np.ndarray]:
+        """(3,) map_from_odom of a place that a second scan has to confirm before the particles go there; or None."""
+        return self._registration.suspect
+
     def estimate(self) -> None:
         """The best cluster of the weighed particles is the pose."""
         self.best = pose_estimate.of(self.particles, self._weights)

@@ -61,6 +61,11 @@ class ScanRegistration:
         self._scale_m = _MIN_SCALE_M
         self._suspect: Optional[np.ndarray] = None  # (3,) map_from_odom of a place that needs a second scan
 
+    @property
+    def suspect(self) -> Optional[np.ndarray]:
+        """(3,) map_from_odom of a place where the last scan fits, and which the next one has to confirm; or None."""
+        return self._suspect
+
     def find(
         self, mean: np.ndarray, covariance: np.ndarray, odom_from_base: np.ndarray, points_m: np.ndarray
     ) -> Alignment:
