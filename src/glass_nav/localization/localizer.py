@@ -31,7 +31,6 @@ from glass_nav.localization.particle_filter.particle_filter import ONE_PLACE, Pa
 from glass_nav.localization.update_schedule import UpdateSchedule
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
-from glass_nav.sensing.known_area import KnownArea
 from glass_nav.sensing.scan import Scan
 from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
@@ -109,10 +108,10 @@ class Localizer:
 
     def _look_at(self, grid_map: GridMap, field: DistanceField) -> None:
         self._grid_map, self._field = grid_map, field
-        self._known_area = KnownArea(grid_map)
         # Made with the map: on a large one that takes longer than a scan may wait.
         self._everywhere = ScanMatcher(grid_map, field) if grid_map.free.any() else None
         self._classifier = self._new_classifier(self._params.classifier, grid_map)
+        self._known_area = self._classifier.known_area
         self._panes = UnmappedPanes(grid_map, self._params.pane_use, self._params.panes)
         self._kidnap_detector = self._new_kidnap_detector()
         self._integrity = IntegrityMonitor(field, grid_map.resolution_m)
@@ -319,7 +318,7 @@ class Localizer:
         """The pose with its state; `expected` is of that pose, `step` since the last update: None at an update."""
         updated = step is None
         cases = self._classifier.seen_from(cases, scan, expected)
-        evidence = self._classifier.evidence(scan, cases, expected, map_from_base, self._known_area)
+        evidence = self._classifier.evidence(scan, cases, expected, map_from_base)
         if updated:
             judged = evidence.without_crowd()
             self._quality.observe(judged.inlier_ratio, judged.judged_share)
