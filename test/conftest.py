@@ -18,7 +18,7 @@ CORNERS_M = np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 2.8], [4.6, 2.8], [4.6, 4.0]
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Where two tests run at a time, the one that needs no clock gives way: rostests have their processor first.
+    """Where tests run at a time, those that need no clock give way: rostests have their processor first.
 
     The group of those comes first, to a worker that gave way to nobody yet: see its marks, xdist_group.
     """

@@ -197,6 +197,7 @@ WALL_RGB: Dict[WallKind, Rgb] = {
     WallKind.UNDECIDED: (240, 228, 66),
     WallKind.GLASS: (0, 184, 212),
 }
+UNMAPPED_GLASS, UNMAPPED_GLASS_RGB = "unmapped glass", (230, 0, 126)  # panes found that the map lacks
 SOLID_BELOW, GLASS_FROM = 25, 75  # probability of glass [percent]
 
 

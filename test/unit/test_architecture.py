@@ -20,7 +20,7 @@ MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or les
     "panes": "geometry world sensing",
     "hypotheses": "geometry world sensing",
     "localization": "geometry world sensing hypotheses panes",
-    "localization/beam_classification": "geometry world sensing",
+    "localization/beam_classification": "geometry world sensing panes",
     "localization/particle_filter": "geometry world sensing hypotheses localization/beam_classification",
     "localization/integrity": "geometry world sensing hypotheses localization/particle_filter",
     "localization/segments": "geometry world sensing localization/beam_classification localization/particle_filter",

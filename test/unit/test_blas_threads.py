@@ -47,9 +47,11 @@ def busy_threads(first: str, **environment: str) -> int:
 
 @pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="no /proc: threads cannot be told apart")
 class TestThreads:
+    @pytest.mark.long_run
     def test_a_program_that_imports_the_package_first_keeps_one_thread_busy(self):
         assert busy_threads("import glass_nav") == 1
 
+    @pytest.mark.long_run
     @pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one core: BLAS takes one thread by itself")
     def test_a_user_may_ask_for_more(self):
         assert busy_threads("import glass_nav", OPENBLAS_NUM_THREADS="2", OMP_NUM_THREADS="2") == 2

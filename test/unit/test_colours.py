@@ -20,7 +20,7 @@ TOGETHER = {
     "cases of the beams": list(vocabulary.CASE_RGB.values()),
     "states of localization": [rgb(code) for code in vocabulary.STATE_COLOURS.values()],
     "candidates of a search": list(vocabulary.SEARCH_RGB.values()),
-    "walls": list(vocabulary.WALL_RGB.values()),
+    "walls": [*vocabulary.WALL_RGB.values(), vocabulary.UNMAPPED_GLASS_RGB],
     "landmarks": [vocabulary.TAG_RGB, vocabulary.USED_RGB, vocabulary.LEFT_OUT_RGB],
     "nodes of an atlas": [rgb(code) for code in atlas_picture.NODE_COLOURS.values()],
     "nodes passed": [rgb(code) for code in passed_nodes_picture.COLOURS.values()],

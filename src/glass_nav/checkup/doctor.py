@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Iterator, List, Optional, Sequence, Tuple
+from typing import Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from glass_nav.checkup import frame_checks, map_checks, motion_checks, scan_checks, time_checks
+from glass_nav.checkup import frame_checks, glass_checks, map_checks, motion_checks, scan_checks, time_checks
 from glass_nav.checkup.finding import Finding
 from glass_nav.checkup.map_checks import ScansOnMap
 from glass_nav.checkup.scan_motion import FARTHEST_M
@@ -84,6 +84,8 @@ def examine(seen: Observed, grid_map: Optional[GridMap] = None, names: FrameName
         grid_map = None if of_map else grid_map
     for topic, scans in seen.scans.items():
         findings += _check_lidar(topic, scans, robot, grid_map)
+    if grid_map is not None and all(finding.name == map_checks.MISMATCH for finding in findings):
+        findings = [*_check_glass(grid_map, robot)] or findings  # where glass is missing, scans do not fit for it
     unique = {(each.name, each.what): each for each in findings}
     return Report(lines, list(unique.values()))
 
@@ -93,6 +95,7 @@ class _Robot:
 
     def __init__(self, seen: Observed, names: FrameNames) -> None:
         self.findings: List[Finding] = []
+        self.placed: Dict[str, List[Tuple[Scan, np.ndarray]]] = {}  # by lidar: its scans and odom_from_laser
         self.tree = FrameTree()
         stamps: List[Tuple[int, int]] = []
         for each in seen.transforms:
@@ -213,6 +216,7 @@ def _check_motion_and_map(
         elif at is None or not len(at):
             placed.append((scan, np.full(3, np.nan)))
     in_order = [placed[index] for index in np.argsort([scan.stamp_ns for scan, _ in placed], kind="stable")]
+    robot.placed[lidar] = in_order
     opposite = False
     if in_order and np.isfinite(in_order[0][1]).all():
         moves = motion_checks.measure([_points(scan) for scan, _ in in_order], np.array([pose for _, pose in in_order]))
@@ -224,6 +228,16 @@ def _check_motion_and_map(
         yield from found
     if opposite and not any(finding.name == "lidar-mirrored" for finding in found):
         yield _opposite(grid_map is not None, lidar, robot.link)
+
+
+def _check_glass(grid_map: GridMap, robot: _Robot) -> Iterator[Finding]:
+    """What the map lacks and has too much, as each lidar sees it; only for a robot without other faults."""
+    for placed in robot.placed.values():
+        known = [(scan, odom_from_laser) for scan, odom_from_laser in placed if np.isfinite(odom_from_laser).all()]
+        if known:
+            scans = [scan for scan, _ in known]
+            odom_from_base = [se2.compose(pose, se2.inverse(scan.base_from_laser)) for scan, pose in known]
+            yield from glass_checks.check(grid_map, scans, np.array(odom_from_base))
 
 
 def _opposite(with_map: bool, lidar: str, link: str) -> Finding:

@@ -12,6 +12,7 @@ from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.world.grid_map import GridMap
 
+MISMATCH = "map-mismatch"
 SCANS = 16  # that are looked for, spread over the log
 _MIN_SCANS, _MIN_POINTS = 5, 20
 _MAX_POINTS, _COARSE = 150, 60
@@ -108,7 +109,7 @@ def check(scans: ScansOnMap, turns_opposite: bool) -> Iterator[Finding]:
         )
     elif fit < _MIN_FIT:
         yield Finding(
-            "map-mismatch",
+            MISMATCH,
             f"the scans fit the map nowhere: by {fit:.2f} of 1 at their best places",
             "is it the map of this building and floor, and is it of this height above the floor? Look at "
             "scans and map in rviz; map anew if much was rebuilt",

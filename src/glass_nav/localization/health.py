@@ -28,6 +28,7 @@ class Situation:
     map_origin: str  # where the map came from, or why there is none
     scan_period_s: Optional[float]  # from one scan to the next, of any lidar; None: not known yet
     lidars: List[str]  # their frames
+    lacking_glass: Optional[str] = None  # how much glass the map lacks, in words; None: none was found
 
 
 ENTRIES = ("pose", "scans", "beams", "timing", "map")
@@ -140,9 +141,10 @@ class LocalizationHealth:
             return Health(Level.ERROR, now.map_origin)
         height, width = now.grid_map.occupancy.shape
         x, y, yaw = now.grid_map.map_from_grid
+        text = f"{width} x {height} cells of {now.grid_map.resolution_m:g} m from {now.map_origin}"
         return Health(
-            Level.OK,
-            f"{width} x {height} cells of {now.grid_map.resolution_m:g} m from {now.map_origin}",
+            Level.OK if now.lacking_glass is None else Level.WARN,
+            text if now.lacking_glass is None else f"{text}; {now.lacking_glass}",
             {
                 "digest": now.grid_map.digest,
                 "origin": f"x {x:.3f} m, y {y:.3f} m, yaw {yaw:.4f} rad",

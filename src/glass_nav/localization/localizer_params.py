@@ -13,12 +13,14 @@ from glass_nav.localization.beam_classification.beam_classifier import BeamClass
 from glass_nav.localization.beam_classification.case_votes import CaseVote
 from glass_nav.localization.beam_classification.glass_map import GlassEvidence
 from glass_nav.localization.beam_classification.preliminary_samples import PreliminarySamples
+from glass_nav.localization.beam_classification.unmapped_panes import PaneUse
 from glass_nav.localization.integrity.pose_state import QualityLimits
 from glass_nav.localization.particle_filter.importance_weights import BeamMixture
 from glass_nav.localization.particle_filter.motion import OdometryNoise
 from glass_nav.localization.particle_filter.particle_filter import ParticleFilterParams
 from glass_nav.localization.particle_filter.proposal import Proposal
 from glass_nav.localization.particle_filter.resampling import ParticleCount
+from glass_nav.panes.pane_finder import PaneFinderParams
 from glass_nav.params import choice, number
 from glass_nav.sensing.raycast import BACKENDS
 
@@ -80,6 +82,8 @@ class LocalizerParams:
     samples: PreliminarySamples = field(default_factory=PreliminarySamples)
     vote: CaseVote = field(default_factory=CaseVote)
     glass: GlassEvidence = field(default_factory=GlassEvidence)
+    pane_use: PaneUse = field(default_factory=PaneUse)
+    panes: PaneFinderParams = field(default_factory=PaneFinderParams)
     mixture: BeamMixture = field(default_factory=BeamMixture)
     quality: QualityLimits = field(default_factory=QualityLimits)
     search: SearchParams = field(default_factory=SearchParams)

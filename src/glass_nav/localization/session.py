@@ -13,7 +13,9 @@ from glass_nav.localization.initial_pose import PoseGuess, StartPose, StartRules
 from glass_nav.localization.initial_poses import InitialPoses, OdometryAt
 from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.localization.localizer_params import LocalizerParams
+from glass_nav.localization.panes_memory import PanesFilePath, PanesMemory
 from glass_nav.localization.saved_pose import PoseFile
+from glass_nav.localization.state_log import StateLog
 from glass_nav.sensing.scan import Scan
 from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
@@ -31,6 +33,7 @@ class SessionParams:
     start: StartPose
     rules: StartRules
     pose_file: PoseFile
+    panes_file: PanesFilePath = PanesFilePath()
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,7 @@ class LocalizationSession:
         self._params, self._time_is_simulated, self._on_start_over = params, time_is_simulated, on_start_over
         self._rng = params.rules.rng
         self._starts = InitialPoses(params.start, params.rules.start_without_guess, params.pose_file, odometry_at)
+        self._panes = PanesMemory(params.panes_file)
         self.localizer: Optional[Localizer] = None
         self.grid_map: Optional[GridMap] = None
         self.map_origin = ""  # where it came from, in words
@@ -73,6 +77,7 @@ class LocalizationSession:
         self.estimate: Optional[Estimate] = None
         self.scan: Optional[Scan] = None  # that the estimate was made of
         self.last_estimate_s = now_s
+        self._state_log = StateLog()
         self.pose_is_news = True  # until the next estimate is out, even if that scan does not move the particles
 
     # -- maps, poses and parameters from outside
@@ -82,9 +87,11 @@ class LocalizationSession:
         if self.localizer is not None and self.grid_map is not None and grid_map.digest == self.grid_map.digest:
             _log.info(f"the map from {origin} is the one that is in use: nothing changes")
             return False
+        self.keep_panes()
         self.grid_map = grid_map
         if self.localizer is not None:
             self.localizer.set_map(grid_map)
+            self._panes.recall(self.localizer, grid_map)
         elif not self.waits_for_pose:
             self._begin()
         self.map_origin = origin
@@ -150,7 +157,29 @@ class LocalizationSession:
         if not is_finite(estimate):
             return None
         self.estimate, self.scan, self.last_estimate_s = estimate, scan, now_s
+        line = self._state_log.take(estimate)
+        if line is not None:
+            _log.log(line.level, line.text)
+        self._panes.tell(self._running())
         return estimate
+
+    # -- panes that the map lacks
+
+    @property
+    def lacking_glass(self) -> Optional[str]:
+        """How much glass the map lacks, and the command that draws it in; None: none was found."""
+        return None if self.localizer is None else self._panes.summary(self.localizer)
+
+    def save_panes(self) -> str:
+        """Write ~panes_file; what was written, in words. ValueError if it cannot be."""
+        localizer = self._running()
+        assert self.grid_map is not None
+        return self._panes.save(localizer, self.grid_map)
+
+    def keep_panes(self) -> None:
+        """Write ~panes_file, if there is one, before this localizer ends."""
+        if self.localizer is not None and self.grid_map is not None:
+            self._panes.keep(self.localizer, self.grid_map)
 
     # -- time, and what is missing
 
@@ -160,7 +189,7 @@ class LocalizationSession:
         self.last_estimate_s = now_s
         if not self._time_is_simulated and self.estimate is not None:
             self._starts.begin_at(self.estimate.map_from_base, self.estimate.covariance)
-        self.estimate = None
+        self.estimate, self._state_log = None, StateLog()
         self._rng = self._params.rules.rng  # a bag that starts over gives the same poses again
         if self._time_is_simulated and self._params.rules.wait_for_initialpose:
             self.waits_for_pose, self.localizer = True, None
@@ -195,6 +224,7 @@ class LocalizationSession:
         """A new localizer, at the start that there is; where, in words."""
         assert self.grid_map is not None
         self.localizer = Localizer(self._params.localizer, self.grid_map, self._rng)
+        self._panes.recall(self.localizer, self.grid_map)
         self._start_over()
         return self._starts.begin(self.localizer)
 

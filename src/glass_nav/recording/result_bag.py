@@ -8,19 +8,22 @@ B beams, P particles, H rows and W columns of the map.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Set, Tuple
+from typing import Any, List, Sequence, Set, Tuple, Union
 
 import numpy as np
 
 from glass_nav.recording.message_writer import TF_TYPE, MessageWriter
 from glass_nav.recording.messages import BEAM_CASES, STATUS
 from glass_nav.sensing.scan import Scan
+from glass_nav.shapes import Shape, ShapeKind, Text
 from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
 
 NODE = "/glass_localization"
 MAX_SHOWN = 500  # particles: the cloud is only for display
 _FLOAT32 = 7  # of sensor_msgs/PointField
+_LINES, _SQUARES, _TEXT = 5, 8, 9  # of visualization_msgs/Marker: LINE_LIST, POINTS, TEXT_VIEW_FACING
+_ADD, _DELETE = 0, 2
 
 
 class ResultBag(MessageWriter):
@@ -39,8 +42,11 @@ class ResultBag(MessageWriter):
         NODE + "/beam_cases": "glass_nav/msg/BeamCases",
         NODE + "/beam_cloud": "sensor_msgs/msg/PointCloud2",
         NODE + "/glass_map": "nav_msgs/msg/OccupancyGrid",
+        NODE + "/beam_markers": "visualization_msgs/msg/MarkerArray",
+        NODE + "/wall_markers": "visualization_msgs/msg/MarkerArray",
+        "/legend": "sensor_msgs/msg/Image",
     }
-    LATCHED = ("/tf_static", "/map", NODE + "/glass_map")
+    LATCHED = ("/tf_static", "/map", NODE + "/glass_map", NODE + "/wall_markers", "/legend")
     OWN_TYPES = {"glass_nav/msg/LocalizationStatus": STATUS, "glass_nav/msg/BeamCases": BEAM_CASES}
 
     def __init__(self, path: Path, frames: "Tuple[str, str, str]") -> None:
@@ -174,6 +180,67 @@ class ResultBag(MessageWriter):
             reliability=reliability,
             **levels,
         )
+
+    def legend(self, stamp_ns: int, pixels: np.ndarray) -> None:
+        """What the marks mean: (H, W, 3) uint8."""
+        height, width, _ = pixels.shape
+        self._send(
+            "/legend",
+            stamp_ns,
+            header=self._header(stamp_ns, self._map),
+            height=height,
+            width=width,
+            encoding="rgb8",
+            is_bigendian=0,
+            step=3 * width,
+            data=np.ascontiguousarray(pixels, np.uint8).ravel(),
+        )
+
+    def beam_markers(self, stamp_ns: int, of_base: Sequence[Shape], of_map: Sequence[Union[Shape, Text]]) -> None:
+        """Shapes in the robot's frame and in the map's."""
+        markers = [self._marker(stamp_ns, self._base, each) for each in of_base]
+        markers += [self._marker(stamp_ns, self._map, each) for each in of_map]
+        self._send(NODE + "/beam_markers", stamp_ns, markers=markers)
+
+    def wall_markers(self, stamp_ns: int, shapes: Sequence[Shape]) -> None:
+        """Shapes in the map's frame."""
+        self._send(
+            NODE + "/wall_markers", stamp_ns, markers=[self._marker(stamp_ns, self._map, each) for each in shapes]
+        )
+
+    def _marker(self, stamp_ns: int, frame: str, each: Union[Shape, Text]) -> Any:
+        if isinstance(each, Text):
+            kind, shown, alpha, text = _TEXT, bool(each.text), 1.0, each.text
+            points: List[Any] = []
+            size, at_m = (0.0, 0.0, each.letter_m), each.at_m
+        else:
+            kind = _SQUARES if each.kind is ShapeKind.SQUARES else _LINES
+            shown, alpha, text = len(each.points_m) > 0, each.alpha, ""
+            points = [self._point(x, y, each.height_m) for x, y in each.points_m.tolist()]
+            size, at_m = (each.width_m, each.width_m, 0.0), np.zeros(3)
+        red, green, blue = (value / 255.0 for value in each.rgb)
+        pose = self._new("geometry_msgs/Pose", position=self._point(*map(float, at_m)), orientation=self._rotation(0.0))
+        return self._new(
+            "visualization_msgs/Marker",
+            header=self._header(stamp_ns, frame),
+            ns=each.namespace,
+            id=each.number,
+            type=kind,
+            action=_ADD if shown else _DELETE,
+            pose=pose,
+            scale=self._new("geometry_msgs/Vector3", x=size[0], y=size[1], z=size[2]),
+            color=self._new("std_msgs/ColorRGBA", r=red, g=green, b=blue, a=alpha),
+            lifetime=self._new("builtin_interfaces/Duration", sec=0, nanosec=0),
+            frame_locked=False,
+            points=points,
+            colors=[],
+            text=text,
+            mesh_resource="",
+            mesh_use_embedded_materials=False,
+        )
+
+    def _point(self, x: float, y: float, z: float) -> Any:
+        return self._new("geometry_msgs/Point", x=x, y=y, z=z)
 
     def truth(self, stamp_ns: int, map_from_base: np.ndarray) -> None:
         """Where the robot truly was, (3,)."""

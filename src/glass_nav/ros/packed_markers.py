@@ -83,7 +83,7 @@ def shape_marker(header: Header, shape: Shape) -> PackedMarker:
 
 
 def text_marker(header: Header, text: Text) -> Marker:
-    """A text of glass_nav.shapes as a marker."""
+    """A text of glass_nav.shapes as a marker; an empty one deletes what was there."""
     pose = Pose(orientation=Quaternion(w=1.0))
     pose.position.x, pose.position.y, pose.position.z = map(float, text.at_m)
     return Marker(
@@ -91,7 +91,7 @@ def text_marker(header: Header, text: Text) -> Marker:
         ns=text.namespace,
         id=text.number,
         type=Marker.TEXT_VIEW_FACING,
-        action=Marker.ADD,
+        action=Marker.ADD if text.text else Marker.DELETE,
         pose=pose,
         scale=Vector3(0.0, 0.0, text.letter_m),
         text=text.text,

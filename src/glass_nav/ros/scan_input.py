@@ -51,6 +51,13 @@ class ScanInput(ScanQueue):
         """A message of one of the topics; as add()."""
         return self.add(conversions.raw_scan_from_msg(msg), now_s, unusable)
 
+    @property
+    def unpublished(self) -> str:
+        """The topics, if nobody publishes on any; else ""."""
+        if any(subscriber.get_num_connections() for subscriber in self._subscribers):
+            return ""
+        return ", ".join(rospy.resolve_name(topic) for topic in self._topics)
+
     def silence(self, now_s: float) -> str:
         """The log line about missing scans."""
         topics = ", ".join(rospy.resolve_name(topic) for topic in self._topics)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import rospy
 import tf2_ros
 from geometry_msgs.msg import Transform
 
@@ -17,6 +18,15 @@ class TfTransforms(Transforms):
 
     def __init__(self, tf: tf2_ros.Buffer, odom_frame: str, base_frame: str) -> None:
         self._tf, self._odom_frame, self._base_frame = tf, odom_frame, base_frame
+
+    @property
+    def odometry_name(self) -> str:
+        """Of its transform, in words."""
+        return f"{self._odom_frame} <- {self._base_frame}"
+
+    def has_odometry(self) -> bool:
+        """Whether tf has heard of it at all."""
+        return bool(self._tf.can_transform(self._odom_frame, self._base_frame, rospy.Time(0)))
 
     def odom_from_base(self, stamp_ns: int) -> np.ndarray:
         transform = self._lookup(self._odom_frame, self._base_frame, stamp_ns)

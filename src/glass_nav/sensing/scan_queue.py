@@ -15,6 +15,7 @@ from glass_nav.sensing.scan_placement import PlacedScan, RawScan, ScanPlacement
 STALE_SCANS = 20  # that many older scans of one lidar in a row: its clock was set back
 MAX_LIDARS = 16  # a driver that makes up a frame for every scan must not fill the memory
 MAX_PERIOD_S = 5.0  # scans farther apart are a pause
+GRACE_S = 5.0  # after the first scan: until then maps and transforms may still be on their way
 MAX_WAITING = 100  # scans of one lidar
 _WARNING_PERIOD_S, _FAULT_PERIOD_S, _ONCE_S = 5.0, 60.0, float("inf")  # between two warnings of a kind
 
@@ -35,7 +36,12 @@ class ScanQueue:
     """Decides which scans wait, are used, rejected or dropped; counts them and says why."""
 
     def __init__(
-        self, placement: ScanPlacement, max_wait_s: float, now_s: float, warn: Callable[[str, float], None]
+        self,
+        placement: ScanPlacement,
+        max_wait_s: float,
+        now_s: float,
+        warn: Callable[[str, float], None],
+        grace_s: float = GRACE_S,
     ) -> None:
         """
         Args:
@@ -43,8 +49,11 @@ class ScanQueue:
             max_wait_s: a scan that lacks a transform for longer is dropped.
             now_s: the time.
             warn: called with a warning, and with the time [s] in which one of its kind is enough.
+            grace_s: since the first scan; what is missing at the start is not warned about before.
         """
         self._placement, self._max_wait_s, self._warn = placement, max_wait_s, warn
+        self._grace_s = grace_s
+        self._first_arrival_s: Optional[float] = None
         self.last_arrival_s = now_s
         self._lidars: Dict[str, _Waiting] = {}
         self._usable: Set[str] = set()  # lidars that had a scan with its transforms
@@ -85,7 +94,12 @@ class ScanQueue:
         """
         self.counts.received += 1
         self.last_arrival_s = now_s
-        fault = unusable or self._fault(raw)
+        if self._first_arrival_s is None:
+            self._first_arrival_s = now_s
+        if unusable is not None:
+            self._refuse(unusable, quietly=self._is_starting(now_s))
+            return None
+        fault = self._fault(raw)
         if fault is not None:
             self.refuse(fault)
             return None
@@ -98,9 +112,7 @@ class ScanQueue:
 
     def refuse(self, why: str) -> None:
         """Count a scan that is not used, and say why."""
-        self.counts.refused += 1
-        self.trouble = f"scan refused: {why}"
-        self._warn(self.trouble, _WARNING_PERIOD_S)
+        self._refuse(why, quietly=False)
 
     def take_ready(self, now_s: float) -> List[RawScan]:
         """The newest scan of each lidar that has its transforms, by ascending stamps."""
@@ -108,7 +120,7 @@ class ScanQueue:
         for lidar, waiting in self._lidars.items():
             raw, dropped = waiting.take_ready(self._has_transforms, now_s, self._max_wait_s)
             if dropped:
-                self._say_dropped(dropped[-1])
+                self._say_dropped(dropped[-1], quietly=self._is_starting(now_s))
             if raw is not None:
                 self._usable.add(lidar)
                 ready.append(raw)
@@ -129,7 +141,18 @@ class ScanQueue:
         for waiting in self._lidars.values():
             waiting.drop_all()
         self._lidars, self._usable = {}, set()
-        self.last_arrival_s = now_s
+        self.last_arrival_s, self._first_arrival_s = now_s, None
+
+    def _is_starting(self, now_s: float) -> bool:
+        """Whether no scan could be used so far, and that is not yet a reason to complain."""
+        first_s = now_s if self._first_arrival_s is None else self._first_arrival_s
+        return not self._usable and now_s - first_s < self._grace_s
+
+    def _refuse(self, why: str, quietly: bool) -> None:
+        self.counts.refused += 1
+        self.trouble = f"scan refused: {why}"
+        if not quietly:
+            self._warn(self.trouble, _WARNING_PERIOD_S)
 
     def _fault(self, raw: RawScan) -> Optional[str]:
         if raw.stamp_ns == 0:
@@ -152,13 +175,16 @@ class ScanQueue:
     def _has_transforms(self, raw: RawScan) -> bool:
         return self._placement.missing(raw) is None
 
-    def _say_dropped(self, raw: RawScan) -> None:
+    def _say_dropped(self, raw: RawScan, quietly: bool) -> None:
         missing = self._placement.missing(raw)
         if missing is None:
+            if quietly:
+                return
             self._warn(f"scan dropped: its transforms came later than {self._max_wait_s:g} s", _WARNING_PERIOD_S)
             return
         self.trouble = missing
-        self._warn(f"scan dropped after {self._max_wait_s:g} s: {missing}", _WARNING_PERIOD_S)
+        if not quietly:
+            self._warn(f"scan dropped after {self._max_wait_s:g} s: {missing}", _WARNING_PERIOD_S)
 
 
 class _Waiting:

@@ -96,6 +96,7 @@ def test_the_progress_goes_to_stderr(run, floor, monkeypatch):
     assert code == 0 and "graph: 5 of 5 steps" in err and "segment maps: 6 of 6 edges" in err
 
 
+@pytest.mark.long_run
 def test_an_atlas_of_the_package_is_drawn_over_its_map_by_name(run, tmp_path):
     code, out, _ = run("show", "glass_bridge", "--out", "bridge.png")
     assert (code, out) == (0, "drawn to bridge.png\n")

@@ -63,6 +63,7 @@ def test_any_number_of_jobs_gives_the_same_answer_bit_for_bit(run, room_bag, roo
     assert page.document.count("<img ") == 3
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize(
     "limits, code, told",
     [
@@ -93,6 +94,7 @@ def test_a_limit_makes_the_exit_code(run, room_bag, room_map, tmp_path, limits, 
     assert ("failed by" in err) == (code == 1)
 
 
+@pytest.mark.long_run
 def test_what_another_localization_left_in_the_bag_is_measured_as_ours_is(run, room_bag, room_map, tmp_path):
     """Its poses come at the scans 5, 10 and 15, wrong by 0.1, 0.2 and 0.3 m; odometry is exact."""
     path = room_bag(amcl_error_m=0.1).write()
@@ -152,6 +154,7 @@ def test_without_a_ground_truth_ours_start_where_the_recorded_poses_have_the_rob
     assert (code, "start: --initial-pose" in err) == (0, True)
 
 
+@pytest.mark.long_run
 def test_results_of_replays_are_compared_as_new_runs_are(run, room_bag, room_map, few, tmp_path):
     path = room_bag(scans=8, true_beams=(("/true_beams", "TrueBeams"),)).write()
     for seed in (0, 1):

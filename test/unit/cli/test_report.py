@@ -107,6 +107,7 @@ def test_results_of_a_replay_become_the_same_report(run, room_bag, room_map, tmp
     assert "room.bag on " in page
 
 
+@pytest.mark.long_run
 def test_without_a_ground_truth_it_is_said_that_nobody_knows(run, room_bag, room_map, tmp_path):
     x, y, yaw = room_bag().poses(room_bag().stamps_ns[:1])[0]
     code, out, _ = run(

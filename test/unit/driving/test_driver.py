@@ -184,6 +184,7 @@ def started(rules=WAITS, backend=None):
 # -- what it does alone
 
 
+@pytest.mark.long_run
 def test_at_the_start_it_halts_until_it_sees_and_then_drives_to_a_meetpoint_and_reports_it():
     robot = Robot()
     robot.sees = False
@@ -219,6 +220,7 @@ def test_without_seek_at_start_it_waits_for_somebody():
     )
 
 
+@pytest.mark.long_run
 def test_a_search_that_waits_hears_of_the_meetpoint_again_and_again():
     robot = standing()
     assert not only(robot.run_for(3.0), MeetpointReport)
@@ -335,6 +337,7 @@ def test_a_turn_that_it_cannot_take_is_told(rank, name, stamp, text):
     assert robot.phase == DriverPhase.ARRIVED
 
 
+@pytest.mark.long_run
 def test_a_turn_waits_for_nobody():
     robot = standing()
     robot.do(robot.driver.turn_choice(1, "LEFT", 0))

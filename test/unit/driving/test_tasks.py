@@ -109,6 +109,7 @@ def test_an_edge_is_followed_to_the_next_meetpoint_and_reported():
     assert task.step(drive.now()).tolist() == [0.0, 0.0, 0.0]  # it is over
 
 
+@pytest.mark.long_run
 def test_an_edge_that_there_is_not_and_a_meetpoint_that_it_is_not_at_are_refused():
     drive = arrived(corridor())
     with pytest.raises(ObservationError, match="^turn of rank 5: the meetpoint it left has degree 3, allowed 0 to 2$"):
@@ -118,6 +119,7 @@ def test_an_edge_that_there_is_not_and_a_meetpoint_that_it_is_not_at_are_refused
         EdgeTask(drive.driver, QUICK, LIMITS, 1)
 
 
+@pytest.mark.long_run
 def test_called_off_it_asks_for_a_standstill_and_the_driver_for_nothing():
     drive = arrived(corridor())
     task = EdgeTask(drive.driver, QUICK, LIMITS, rank_towards(drive, 0.0))
@@ -140,6 +142,7 @@ def node_near(planner, x, y):
     return int(np.argmin(np.hypot(*(planner.atlas.nodes.position_m - [x, y]).T)))
 
 
+@pytest.mark.long_run
 def test_a_node_is_driven_to_along_the_edges(planner):
     drive = Drive(corridor(), (1.5, 0.8, 2.0))
     task = going(drive, planner, node_near(planner, 5.0, 1.0))

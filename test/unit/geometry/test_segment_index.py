@@ -27,6 +27,7 @@ def made(seed, count):
     return np.column_stack([start, start + length[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])])
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed, count", [(0, 1), (1, 2), (2, 40), (3, 300)])
 def test_the_nearest_is_the_one_that_a_look_at_all_finds(seed, count):
     segments = made(seed, count)

@@ -40,6 +40,7 @@ def drive(search, building, poses, odom=None):
     ]
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(3))
 def test_the_right_place_is_found_and_no_other(seed):
     rng = np.random.default_rng(seed)
@@ -50,6 +51,7 @@ def test_the_right_place_is_found_and_no_other(seed):
         assert not candidates.found or off(candidates.poses[0], pose)[0] < 0.1
 
 
+@pytest.mark.long_run
 def test_places_that_scans_cannot_tell_apart_stay_until_one_sees_a_difference():
     """To a lidar that sees 3 m the plain part of the corridor looks the same in both directions; the niche does not."""
     poses = along(np.arange(3.6, 11.0, 0.2))
@@ -66,6 +68,7 @@ def test_places_that_scans_cannot_tell_apart_stay_until_one_sees_a_difference():
     assert told[-1].found and same_place(told[-1].poses[:1], poses[-1])[0]
 
 
+@pytest.mark.long_run
 def test_a_square_room_is_never_solved():
     room = Building([(0, 0), (6, 0), (6, 6), (0, 6)])
     told = drive(search_in(room), room, loop_drive(40, (3.0, 3.0)))
@@ -150,6 +153,7 @@ def test_with_too_few_answers_candidates_only_move():
     assert after.lead == before.lead
 
 
+@pytest.mark.long_run
 def test_a_place_where_scans_do_not_fit_is_not_found():
     lenient, strict = (search_in(L_ROOM, search_least_fit=fit) for fit in (0.5, 1.0))
     poses = loop_drive(40)

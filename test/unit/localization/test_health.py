@@ -135,6 +135,12 @@ def test_the_map_says_what_it_is(reporter):
     )
 
 
+def test_glass_that_the_map_lacks_is_a_warning_about_the_map(reporter):
+    level, text, _ = said(reporter, "map", lacking_glass="the map lacks 3.0 m of glass (2 panes); draw it in")
+    assert level == WARN
+    assert text.endswith("from service /static_map; the map lacks 3.0 m of glass (2 panes); draw it in")
+
+
 def test_a_report_has_all_entries_before_there_is_anything_to_report(reporter):
     nothing = Situation(None, None, None, None, "no map yet", None, [])
     assert tuple(reporter.report(nothing)) == health.ENTRIES

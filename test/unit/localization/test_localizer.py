@@ -6,6 +6,7 @@ import gc
 import weakref
 from dataclasses import replace
 
+import made_pane_drive
 import numpy as np
 import pytest
 from buildings import BASE_FROM_LASER, GLASS_ROOM, L_ROOM, SECOND_NS, Building, loop_drive, odometry, off
@@ -74,6 +75,7 @@ def same(one, other):
 # -- it tracks
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(3))
 def test_a_robot_in_an_opaque_room_is_tracked_within_centimetres(seed):
     drive = Drive(seed=seed, steps=40)
@@ -85,6 +87,7 @@ def test_a_robot_in_an_opaque_room_is_tracked_within_centimetres(seed):
     assert all(estimate.updated for estimate in estimates)
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("glass_share", [0.3, 0.9])
 def test_a_robot_beside_glass_is_tracked_within_centimetres(seed, glass_share):
@@ -94,6 +97,7 @@ def test_a_robot_beside_glass_is_tracked_within_centimetres(seed, glass_share):
     assert turn_rad.max() < np.radians(1.5)
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("weight_mode", ["field", "ranges"])
 @pytest.mark.parametrize("seed", range(2))
 def test_either_way_to_weigh_particles_tracks_a_robot_beside_glass(seed, weight_mode):
@@ -166,6 +170,7 @@ def test_a_pane_becomes_glass_over_a_drive_and_a_wall_does_not(seed):
     assert (picture[~MAPS[GLASS_ROOM].occupied] == -1).all()
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(2))
 def test_in_an_opaque_room_no_wall_becomes_glass(seed):
     drive = Drive(seed=seed, steps=40)
@@ -186,6 +191,7 @@ def test_a_lidar_that_sees_no_glass_at_all_is_localized(seed):
     assert estimates[-1].state == "LOCALIZED"
 
 
+@pytest.mark.long_run
 def test_another_map_has_other_glass():
     drive = GlassDrive()
     localizer = started(GLASS_ROOM, drive.true[0])
@@ -279,6 +285,7 @@ def test_a_scan_between_updates_is_cut_too():
     assert np.mean(again.surface_scan.cut == last.surface_scan.cut) > 0.97 and again.surface_scan.cut.any()
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("vote_mode", ["soft", "paper"])
 def test_between_updates_beams_are_told_apart_as_in_one(vote_mode):
     """The same scans from where the robot stands, once with an update and once between updates."""
@@ -310,6 +317,7 @@ def test_few_beams_are_used_as_far_as_they_go(beams):
     assert len(drive.scans[0]) == beams
 
 
+@pytest.mark.long_run
 def test_it_tracks_with_fewer_resamplings_and_more_threads():
     drive = Drive(seed=7, steps=20)
     way_m, _ = drive.errors(drive.through(started(resample_interval=3, raycast_threads=2))).T
@@ -372,6 +380,7 @@ def test_in_an_area_only_what_lies_in_it_is_a_candidate():
     assert off(told.map_from_base, true)[0] < 0.1
 
 
+@pytest.mark.long_run
 def test_a_pose_given_too_vaguely_to_track_is_looked_for_within_its_reach():
     drive = Drive(seed=1, steps=40)
     localizer = Localizer(parameters(), MAPS[L_ROOM], np.random.default_rng(1))
@@ -438,6 +447,7 @@ def test_a_robot_that_stands_for_five_minutes_stays_where_it_is(forced):
 # -- what happens between and beside good scans
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(3))
 def test_a_wheel_that_slips_is_made_up_for_by_the_scan(seed):
     drive = Drive(seed=seed)
@@ -516,12 +526,29 @@ def test_who_stands_still_is_not_moved(drive):
 def test_below_the_least_way_and_turn_odometry_alone_carries_on(drive):
     localizer = started(update_min_d=0.2, update_min_a=0.2)
     before = drive.through(localizer, last=1)[0]
-    odom = se2.compose(drive.odometry[0], np.array([0.15, 0.0, 0.15]))
-    after = localizer.update(replace(drive.scans[1]), odom)
+    step = np.array([0.15, 0.0, 0.15])
+    after = localizer.update(scan_after(drive, step, 1), se2.compose(drive.odometry[0], step))
     assert before.updated and not after.updated
-    np.testing.assert_allclose(after.map_from_base, se2.compose(before.map_from_base, [0.15, 0.0, 0.15]), atol=1e-12)
-    turned = localizer.update(replace(drive.scans[2]), se2.compose(drive.odometry[0], np.array([0.0, 0.0, 0.21])))
-    assert turned.updated
+    np.testing.assert_allclose(after.map_from_base, se2.compose(before.map_from_base, step), atol=1e-12)
+    turn = np.array([0.0, 0.0, 0.21])
+    assert localizer.update(scan_after(drive, turn, 2), se2.compose(drive.odometry[0], turn)).updated
+
+
+def scan_after(drive, step, index, lidar=""):
+    """Of the robot that made that step from where the drive begins."""
+    pose = se2.compose(drive.true[0], np.asarray(step))
+    return replace(L_ROOM.scan(pose, index * SECOND_NS, np.random.default_rng(index)), lidar=lidar)
+
+
+def test_a_scan_that_no_longer_fits_is_an_update(drive):
+    """Odometry reports nothing of a turn: by the distance driven there would be no update."""
+    localizer = started()
+    localizer.update(scan_after(drive, [0.0, 0.0, 0.0], 0), drive.odometry[0])
+    assert not localizer.update(scan_after(drive, [0.0, 0.0, 0.0], 1), drive.odometry[0]).updated
+    turn = np.array([0.0, 0.0, np.radians(6.0)])
+    estimate = localizer.update(scan_after(drive, turn, 2), drive.odometry[0])
+    assert estimate.updated
+    assert off(estimate.map_from_base, se2.compose(drive.true[0], turn))[1] < np.radians(0.5)
 
 
 def test_a_requested_update_uses_the_next_scan_of_a_robot_that_stands(drive):
@@ -540,7 +567,7 @@ def test_of_two_lidars_each_has_its_update_after_a_move(drive):
     localizer = started(update_min_d=0.2, update_min_a=0.2)
     still, moved = drive.odometry[0], se2.compose(drive.odometry[0], np.array([0.21, 0.0, 0.0]))
     updated = [
-        localizer.update(seen_by(drive.scans[index], lidar), odom).updated
+        localizer.update(scan_after(drive, se2.compose(se2.inverse(still), odom), index, lidar), odom).updated
         for index, (lidar, odom) in enumerate(
             [
                 ("front", still),
@@ -753,6 +780,7 @@ def test_mrpts_ray_casts_give_nearly_the_same_answer(drive):
     assert np.mean(same_case) > 0.98
 
 
+@pytest.mark.long_run
 def test_another_seed_gives_nearly_the_same_answer(drive):
     one, other = drive.through(started(seed=5)), drive.through(started(seed=6))
     assert not np.array_equal(one[-1].particles, other[-1].particles)
@@ -950,6 +978,7 @@ def test_a_filter_that_is_given_up_leaves_the_memory_at_once(drive):
         gc.enable()
 
 
+@pytest.mark.long_run
 def test_a_search_goes_on_in_another_map():
     drive = Drive(GLASS_ROOM, seed=2, centre=(3.0, 1.6), glass_share=0.3)
     localizer = started(L_ROOM, drive.true[0])
@@ -1131,3 +1160,74 @@ def test_bearings_that_cannot_be_used_are_refused_and_change_nothing(drive):
     with pytest.raises(ValueError, match="^odometry of bearings must be finite x, y, yaw, got "):
         localizer.add_bearings(tags_seen(drive.true[0]), TAGS, np.array([0.0, np.nan, 0.0]))
     same(localizer.update(drive.scans[0], drive.odometry[0]), other.update(drive.scans[0], drive.odometry[0]))
+
+
+# -- it keeps to odometry where scans say nothing
+
+
+def test_where_the_map_lacks_what_is_around_the_robot_odometry_carries_the_pose():
+    """A hall with a door to a place that is not drawn: beams end far from any wall, ever other ones."""
+    drive = Drive(steps=14)
+    localizer = started(update_min_d=0.05)
+    drive.through(localizer)
+    rng = np.random.default_rng(3)
+    true, odom, last = drive.true[-1], drive.odometry[-1], drive.scans[-1]
+    step = np.array([0.15, 0.0, 0.02])
+    for number in range(1, 60):
+        true, odom = se2.compose(true, step), se2.compose(odom, step)
+        ranges_m = rng.uniform(3.0, 11.0, len(last))
+        estimate = localizer.update(replace(last, stamp_ns=last.stamp_ns + number * SECOND_NS, ranges_m=ranges_m), odom)
+        away_m, away_rad = off(estimate.map_from_base, true)
+        assert away_m < 0.05 + 0.02 * 0.15 * number and away_rad < np.radians(3.0)
+    assert estimate.state != "LOCALIZED"
+
+
+def test_a_pose_that_scans_led_astray_goes_back_to_dead_reckoning_when_they_say_nothing():
+    drive = Drive(steps=14)
+    localizer = started(update_min_d=0.05)
+    drive.through(localizer, last=12)
+    localizer._filter.move_to(drive.true[11] + [0.6, 0.4, 0.8])
+    outside = replace(drive.scans[12], ranges_m=np.full(len(drive.scans[12]), 9.0))
+    estimate = localizer.update(outside, drive.odometry[12])
+    away_m, away_rad = off(estimate.map_from_base, drive.true[12])
+    assert away_m < 0.05 and away_rad < np.radians(2.0)
+
+
+# -- glass that the map lacks
+
+
+@pytest.fixture(scope="module")
+def past_a_pane():
+    """A localizer after a drive past a pane that its map lacks, with all scans and poses."""
+    scans = list(made_pane_drive.scans(made_pane_drive.pane((2.0, 2.0), (8.0, 2.0))))
+    localizer = started(grid_map=made_pane_drive.hall(), at=scans[0][1])
+    for scan, pose in scans:
+        localizer.update(scan, pose)
+    return localizer, scans
+
+
+def test_a_pane_that_the_map_lacks_is_found_and_is_glass(past_a_pane):
+    localizer, _ = past_a_pane
+    (pane,) = localizer.unmapped_panes
+    np.testing.assert_allclose(np.array([pane.start_m, pane.end_m])[:, 1], 2.0, atol=0.1)
+    assert pane.length_m > 3.0
+    assert localizer.found_panes[0].probability >= 0.9
+    grid_map = made_pane_drive.hall()
+    row, column = grid_map.cells(np.array([4.0, 2.0]))
+    assert localizer.glass_map.occupancy()[row - 1 : row + 2, column].max() > 80
+    assert not grid_map.occupied[row - 1 : row + 2, column].any()
+
+
+def test_what_a_run_found_the_next_one_knows_at_once_and_beams_end_at_it(past_a_pane):
+    before, scans = past_a_pane
+    scan, pose = scans[40]
+    cut = []
+    for remembers in (True, False):
+        localizer = started(grid_map=made_pane_drive.hall(), at=pose)
+        if remembers:
+            localizer.remember(before.found_panes, before.glass_map.arrays())
+            assert len(localizer.unmapped_panes) == 1
+        cut.append(np.count_nonzero(localizer.update(scan, pose).surface_scan.cut))
+    assert cut[0] > 100 and cut[1] == 0
+    with pytest.raises(ValueError, match="a glass map needs cells"):
+        localizer.remember((), {"glass_cell": np.zeros((2, 2))})

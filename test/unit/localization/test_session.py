@@ -10,15 +10,18 @@ import pytest
 
 from glass_nav.localization import session as session_module
 from glass_nav.localization.beam_classification.case_votes import BeamCases
+from glass_nav.localization.beam_classification.glass_map import GlassEvidence, GlassMap
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
 from glass_nav.localization.initial_pose import PoseGuess, StartPose, StartRules
 from glass_nav.localization.localizer import Estimate
 from glass_nav.localization.localizer_params import LocalizerParams
+from glass_nav.localization.panes_memory import PanesFilePath
 from glass_nav.localization.saved_pose import PoseFile, SavedPose, save
 from glass_nav.localization.session import Inputs, LocalizationSession, SessionParams
 from glass_nav.sensing.scan import Scan
 from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
+from glass_nav.world.pane import Pane
 
 GRID = GridMap(np.zeros((100, 100), np.int8), 0.1, np.zeros(3))
 OTHER_GRID = GridMap(np.eye(100, dtype=np.int8) * 100, 0.1, np.zeros(3))
@@ -33,6 +36,11 @@ class FakeLocalizer:
         self.told = []
         self.first_number = rng.random()
         self.pose = np.array([1.0, 2.0, 0.5])
+        self.unmapped_panes = self.found_panes = ()
+        self.glass_map = GlassMap(grid_map, GlassEvidence())
+
+    def remember(self, panes, glass) -> None:
+        self.unmapped_panes = self.found_panes = panes
 
     def set_pose(self, pose, covariance) -> None:
         self.told.append(("pose", *np.round(pose, 6)))
@@ -78,10 +86,14 @@ def odometry_at(stamp_ns):
 class Bench:
     """A session with what it called back."""
 
-    def __init__(self, simulated=False, pose_file="", **rules) -> None:
+    def __init__(self, simulated=False, pose_file="", panes_file="", **rules) -> None:
         self.starts_over = 0
         self.params = SessionParams(
-            LocalizerParams(), StartPose(initial_pose_x=3.0), StartRules(**rules), PoseFile(pose_file=str(pose_file))
+            LocalizerParams(),
+            StartPose(initial_pose_x=3.0),
+            StartRules(**rules),
+            PoseFile(pose_file=str(pose_file)),
+            PanesFilePath(panes_file=str(panes_file)),
         )
         self.session = LocalizationSession(self.params, odometry_at, simulated, 10.0, self._count)
 
@@ -222,7 +234,7 @@ def test_a_pose_that_is_not_finite_does_not_go_out():
 
 @pytest.mark.parametrize("field", ["map_from_base", "map_from_odom", "covariance"])
 def test_an_estimate_with_nan_is_told_from_one_without(field):
-    good = FakeLocalizer(None, None, np.random.default_rng(0)).update(SCAN, None)
+    good = FakeLocalizer(None, GRID, np.random.default_rng(0)).update(SCAN, None)
     assert session_module.is_finite(good)
     bad = getattr(good, field).copy()
     bad.flat[0] = np.nan
@@ -328,3 +340,31 @@ def test_what_is_missing_is_said_in_its_order():
     assert bench.session.missing(replace(inputs, now_s=14.5)) == "no scan on /scan for 4 s"
     late = replace(inputs, now_s=14.5, last_scan_s=14.4, scan_trouble="scan refused: it has no stamp")
     assert bench.session.missing(late) == "scan refused: it has no stamp"
+
+
+# -- panes that the map lacks
+
+
+PANE = Pane(np.array([0.2, 0.2]), np.array([0.2, 0.6]))
+
+
+def test_panes_are_written_when_asked_when_the_map_changes_and_at_the_end_and_read_at_the_start(tmp_path):
+    robot = Bench(panes_file=tmp_path / "panes.yaml")
+    assert robot.session.lacking_glass is None
+    robot.session.keep_panes()  # there is no map yet
+    robot.session.use_map(GRID, "topic")
+    assert robot.session.lacking_glass is None
+    robot.session.keep_panes()  # nothing was found
+    assert not (tmp_path / "panes.yaml").exists()
+    robot.session.localizer.remember((PANE,), {})
+    assert robot.session.lacking_glass.startswith("the map lacks 0.4 m of glass (1 pane); call ~save_panes, then ")
+    robot.session.keep_panes()
+    again = Bench(panes_file=tmp_path / "panes.yaml")
+    again.session.use_map(GRID, "topic")
+    assert len(again.session.localizer.unmapped_panes) == 1
+    assert again.session.save_panes().startswith("1 panes (0.4 m in use) and the glass map written to ")
+
+
+def test_panes_cannot_be_saved_without_a_map():
+    with pytest.raises(ValueError, match="there is no map yet"):
+        Bench().session.save_panes()

@@ -46,6 +46,7 @@ def same(recording: Recording, plain: Recording) -> None:
     assert recording.notes == plain.notes
 
 
+@pytest.mark.long_run
 @needs_rosbag
 @pytest.mark.parametrize("option", ["--lz4", "--bz2"])
 def test_a_bag_that_rosbag_compressed(room_bag, tmp_path, option):
@@ -56,6 +57,7 @@ def test_a_bag_that_rosbag_compressed(room_bag, tmp_path, option):
     same(open_log(plain), open_log(kept))
 
 
+@pytest.mark.long_run
 @needs_rosbag
 def test_a_run_that_was_recorded_in_parts(room_bag, tmp_path):
     plain = room_bag().write()
@@ -77,6 +79,7 @@ def open_names(path: Path) -> List[str]:
         return list(reader.topics)
 
 
+@pytest.mark.long_run
 @needs_rosbag
 def test_a_bag_that_was_never_closed_comes_with_advice_that_helps(room_bag, tmp_path):
     plain = room_bag().write()
@@ -102,6 +105,7 @@ def test_a_bag_that_was_never_closed_comes_with_advice_that_helps(room_bag, tmp_
     assert [step.scan.stamp_ns for step in saved] == [step.scan.stamp_ns for step in whole[: len(saved)]]
 
 
+@pytest.mark.long_run
 def test_a_bag_of_ros_2_in_sqlite3(room_bag, tmp_path):
     plain = room_bag(true_beams=[("/true_beams", "TrueBeams")]).write()
     subprocess.run(

@@ -8,7 +8,11 @@ import numpy as np
 import pytest
 
 from glass_nav.cli import main as cli
+from glass_nav.evaluation.plots import legend
 from glass_nav.localization.beam_classification import beam_cloud
+from glass_nav.localization.place_shapes import PLACES_NAMESPACE
+from glass_nav.localization.status_text import STATUS_NAMESPACE
+from glass_nav.vocabulary import BeamCase
 
 STARTS_AT = 10**12
 NODE = "/glass_localization"
@@ -84,6 +88,7 @@ def test_the_cloud_has_the_ranges_that_the_lidar_measured(messages):
         np.testing.assert_array_equal(points[:, 4], cases.cases)
 
 
+@pytest.mark.long_run
 def test_the_glass_map_of_the_end_is_the_one_that_was_saved(messages, tmp_path):
     found = messages()
     (glass,) = found[NODE + "/glass_map"]
@@ -102,3 +107,20 @@ def test_a_bag_that_cannot_be_written_is_refused_and_a_run_that_fails_leaves_non
     )
     assert cli.main([*arguments, str(tmp_path / "no.bag"), "--start", "1000"]) == 3
     assert not list(tmp_path.glob("*no.bag*"))
+
+
+def test_markers_and_legend_are_in_it_as_the_node_sends_them(messages):
+    found = messages()
+    markers = {marker.ns: marker for marker in found[NODE + "/beam_markers"][-1].markers}
+    assert {*(case.label for case in BeamCase), PLACES_NAMESPACE, STATUS_NAMESPACE} == set(markers)
+    first = markers[BeamCase.DIFFUSE.label]
+    assert first.header.frame_id == "base_link" and markers[STATUS_NAMESPACE].header.frame_id == "map"
+    assert markers[STATUS_NAMESPACE].text.startswith("LOCALIZED")
+    assert [first.color.r, first.color.g, first.color.b] == pytest.approx([v / 255 for v in BeamCase.DIFFUSE.rgb])
+    squares = [each for each in found[NODE + "/beam_markers"][-1].markers if each.type == 8 and each.action == 0]
+    assert squares and all(len(each.points) for each in squares)
+    assert {marker.ns for marker in found[NODE + "/wall_markers"][-1].markers} >= {"solid", "undecided", "glass"}
+    (picture,) = found["/legend"]
+    pixels = picture.data.reshape(picture.height, picture.width, 3)
+    assert (picture.encoding, picture.step) == ("rgb8", 3 * picture.width)
+    np.testing.assert_array_equal(pixels, legend.draw())

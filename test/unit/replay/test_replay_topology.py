@@ -84,6 +84,7 @@ def test_a_meetpoint_on_the_way_is_seen_and_told(run, tmp_path):
     assert told == [["meetpoints", "1", "1", "(100", "%)", "0", "0", "100", "%"]]
 
 
+@pytest.mark.long_run
 def test_an_atlas_may_be_given_and_figures_of_it_may_decide_the_exit_code(run, drive, tmp_path):
     assert cli.main(["atlas", "build", str(drive / "run.map.yaml"), "--out", str(tmp_path / "t")]) == 0
     code, _, err = run(

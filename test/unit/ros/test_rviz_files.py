@@ -10,13 +10,14 @@ from typing import Any, Iterator
 import yaml
 
 from glass_nav.evaluation.plots import legend
+from glass_nav.localization.place_shapes import PLACES_NAMESPACE
 from glass_nav.localization.status_text import STATUS_NAMESPACE
 from glass_nav.ros import legend as legend_topic
 from glass_nav.ros.driver import driver_displays, driver_node
 from glass_nav.ros.landmarks import landmarks_node
 from glass_nav.ros.localization import localization_node
 from glass_nav.ros.topology import topology_displays
-from glass_nav.vocabulary import PARTICLE_RGB, POSE_RGB, BeamCase, WallKind
+from glass_nav.vocabulary import PARTICLE_RGB, POSE_RGB, UNMAPPED_GLASS, BeamCase, WallKind
 
 REPO = Path(__file__).parents[3]
 CONFIG = yaml.safe_load((REPO / "rviz" / "glass_nav.rviz").read_text(encoding="utf-8"))
@@ -51,9 +52,9 @@ def test_what_is_called_value_is_what_is_enabled():
 
 
 def test_every_case_and_the_status_have_a_checkbox():
-    names = [*(case.label for case in BeamCase), STATUS_NAMESPACE]
+    names = [*(case.label for case in BeamCase), PLACES_NAMESPACE, STATUS_NAMESPACE]
     assert named("Beams by case")["Namespaces"] == dict.fromkeys(names, True)
-    assert named("Glass map")["Namespaces"] == dict.fromkeys(map(str, WallKind), True)
+    assert named("Glass map")["Namespaces"] == dict.fromkeys([*map(str, WallKind), UNMAPPED_GLASS], True)
 
 
 def test_the_topology_is_switched_on_and_has_a_checkbox_for_each_thing():

@@ -75,6 +75,7 @@ def assert_as_slow(world: GridMap, caster: RayCaster, poses, angles_rad, max_ran
             assert hits.cell[p, b] in cells, where
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("backend", ["exact", "mrpt"])
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("make", GRIDS)

@@ -20,11 +20,11 @@ MAX_WAIT_S = 1.0
 class Queue(ScanQueue):
     """With the transforms and the warnings at hand; stamps in ns after STAMP_NS."""
 
-    def __init__(self) -> None:
+    def __init__(self, grace_s: float = 0.0) -> None:
         self.transforms = MadeTransforms()
         self.warnings: List[str] = []
         placement = ScanPlacement(self.transforms)
-        super().__init__(placement, MAX_WAIT_S, 0.0, lambda text, period_s: self.warnings.append(text))
+        super().__init__(placement, MAX_WAIT_S, 0.0, lambda text, period_s: self.warnings.append(text), grace_s)
 
     def come(self, *stamps: int, lidar: str = "laser", now_s: float = 0.0) -> "List[Optional[str]]":
         return [self.add(raw_scan(STAMP_NS + stamp, lidar), now_s) for stamp in stamps]
@@ -204,3 +204,38 @@ def test_other_parameters_hold_for_scans_that_wait_already():
     queue.use(ScanPlacement(queue.transforms, deskews=False), max_wait_s=5.0)
     assert queue.ready(4.0, until=5) == []
     assert queue.ready(4.0, until=10) == [10]
+
+
+def test_at_the_start_nothing_is_warned_about_before_a_grace_time():
+    queue = Queue(grace_s=scan_queue.GRACE_S)
+    queue.add(raw_scan(STAMP_NS), 100.0, "there is no map yet")
+    queue.come(10, now_s=100.0)
+    assert queue.ready(102.0, until=-100) == []
+    assert (queue.warnings, queue.trouble) == ([], "no transform odom <- base")  # ~status says it at once
+    queue.come(20, now_s=106.0)
+    queue.ready(108.0, until=-100)
+    queue.add(raw_scan(STAMP_NS), 109.0, "there is no map yet")
+    assert queue.warnings == [
+        "scan dropped after 1 s: no transform odom <- base",
+        "scan refused: there is no map yet",
+    ]
+
+
+def test_a_malformed_scan_has_no_grace_time_and_neither_has_a_lidar_that_ran():
+    queue = Queue(grace_s=scan_queue.GRACE_S)
+    queue.add(raw_scan(0), 100.0)
+    assert queue.warnings == ["scan refused: it has no stamp"]
+    queue.come(10, now_s=100.1)
+    assert queue.ready(100.2, until=100) == [10]
+    queue.come(20, now_s=100.3)
+    queue.ready(101.5, until=15)
+    assert queue.warnings[1:] == ["scan dropped after 1 s: no transform odom <- base"]
+
+
+def test_after_a_jump_of_time_there_is_a_grace_time_again():
+    queue = Queue(grace_s=scan_queue.GRACE_S)
+    queue.come(10, now_s=100.0)
+    queue.ready(100.1, until=100)
+    queue.restart(0.0)
+    queue.add(raw_scan(STAMP_NS), 3.0, "there is no map yet")
+    assert queue.warnings == []

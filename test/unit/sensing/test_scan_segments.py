@@ -65,6 +65,7 @@ def test_a_scan_that_is_not_all_round_is_no_ring():
     assert len(found) == 5
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("seed", range(3))
 def test_lines_are_as_far_off_as_their_covariance_says(seed):
     """Over 300 draws of the noise: variances and correlation of heading and offset, for each wall."""

@@ -194,6 +194,7 @@ def test_a_scanner_that_cannot_be_is_refused(fields, text):
     assert str(caught.value) == text
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("hidden", ["A2", "A4", "A5"])  # without A3 the rest is far ahead: sigma 0.6 m, refused
 def test_three_tags_of_the_glass_office_tell_a_robot_at_the_start_where_it_is(hidden):
     building = building_file.load(shipped_buildings.find("glass_office"))

@@ -48,6 +48,7 @@ def test_exact_wheels_tell_the_truth(office_drive):
     assert abs(angles.wrap(error[2])) < 1e-9
 
 
+@pytest.mark.long_run
 def test_an_ordinary_drive_drifts_by_one_to_three_percent(office_drive):
     kind, twists, length_m = office_drive
     truth = true_pose(twists)
@@ -91,6 +92,7 @@ def test_a_wrong_wheel_base_tells_turns_too_wide_and_leaves_ways_alone():
     np.testing.assert_allclose(reported(p, "diff", [[0.01, 0, 0]] * 100).odom_from_base, [1.0, 0.0, 0.0], atol=1e-12)
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("steps", [10, 400])
 def test_slip_grows_with_the_root_of_the_way_however_it_is_cut(steps):
     p = replace(EXACT, slip_m_per_sqrt_m=0.02, slip_rad_per_sqrt_m=0.01)
@@ -111,6 +113,7 @@ def test_only_an_omnidirectional_base_slips_sideways():
     assert reported(p, "omni", [[0.1, 0, 0]] * 10).odom_from_base[1] != 0.0
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_wheel_that_spins_tells_a_way_that_was_none(kind):
     p = replace(EXACT, slip_event_per_m=0.05, slip_event_max_m=0.04)

@@ -128,6 +128,7 @@ def test_a_second_path_begins_where_the_first_ended():
     np.testing.assert_array_equal(second.map_from_base, first[-1].map_from_base)
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("path", ["into the wall", "through the pane"])
 def test_neither_walls_nor_panes_are_driven_through(path):
     run = simulation()

@@ -9,6 +9,7 @@ from glass_nav.simulation.building import Building, Thing, Wall, box, distances
 OFFICE = building_file.load(shipped_buildings.find("glass_office"))
 
 
+@pytest.mark.long_run
 def test_a_random_place_has_room_and_is_another_with_each_seed():
     surfaces = OFFICE.surfaces
     places = [start_place.start("random", OFFICE, seed) for seed in range(20)]

@@ -48,6 +48,7 @@ def test_a_robot_that_turns_sees_each_beam_later_than_the_one_before(office):
         assert turned.ranges_m[beam] == pytest.approx(alone, abs=0.05)  # a sector is of one moment
 
 
+@pytest.mark.long_run
 def test_a_frame_is_of_its_first_beam_and_odometry_deskews_it(office):
     simulation = Simulation(office, QUIET, seed=1, turn_time_s=0.08)
     frames = [simulation.look(), *(simulation.step(0.1, np.array([0.3, 0.0, 1.0])) for _ in range(15))]

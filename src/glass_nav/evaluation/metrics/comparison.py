@@ -14,7 +14,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from glass_nav.evaluation.metrics import confidence, integrity_scores, pose_errors, replay_result
+from glass_nav.evaluation.metrics import confidence, integrity_scores, pose_errors, relative_errors, replay_result
 from glass_nav.evaluation.metrics.confidence import Interval
 from glass_nav.evaluation.metrics.integrity_scores import IntegrityTrace
 from glass_nav.evaluation.metrics.pose_errors import PoseErrors
@@ -42,6 +42,11 @@ FIGURES = (
     Figure("position_rmse_m", "position error, rms", "m", 1.0, 4, -1),
     Figure("position_p95_m", "position error, 95 %", "m", 1.0, 4, -1),
     Figure("yaw_mean_deg", "yaw error, mean", "deg", 1.0, 3, -1),
+    Figure("aligned_rmse_m", "position error after alignment, rms", "m", 1.0, 4, -1),
+    Figure("relative_1m_rmse_m", "relative error over 1 m, rms", "m", 1.0, 4, -1),
+    Figure("relative_1m_yaw_rmse_deg", "relative yaw over 1 m, rms", "deg", 1.0, 3, -1),
+    Figure("relative_1s_rmse_m", "relative error over 1 s, rms", "m", 1.0, 4, -1),
+    Figure("relative_1s_yaw_rmse_deg", "relative yaw over 1 s, rms", "deg", 1.0, 3, -1),
     Figure("lost_share", "more than 0.5 m off", "%", 100.0, 3, -1),
     Figure("localized_share", "reports LOCALIZED", "%", 100.0, 2, 1),
     Figure("misleading_share", "misleading", "%", 100.0, 2, -1),
@@ -223,6 +228,8 @@ def _values(run: Run, stamps_ns: np.ndarray, first: Sequence[Run]) -> Dict[str, 
     summary = pose_errors.summary(PoseErrors(run.errors.position_m[used], run.errors.yaw_rad[used]))
     absent = math.nan if not run.errors.matched[used].any() else math.inf  # summary() has None for both
     found = {name: absent if value is None else value for name, value in summary.items()}
+    relative = relative_errors.summary(run.stamps_ns[used], run.map_from_base[used], run.reference)
+    found.update((name, math.nan if value is None else value) for name, value in relative.items())
     states = None if run.states is None else np.array(run.states)[used]
     pairs = seed_pairs([run.seed], [each.seed for each in first])
     apart = [_apart_m(run, each, stamps_ns) for each in first if (run.seed, each.seed) in pairs]

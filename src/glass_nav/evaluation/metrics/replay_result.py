@@ -16,7 +16,7 @@ from typing import Any, Dict, List, Mapping, Optional, Tuple
 
 import numpy as np
 
-from glass_nav.evaluation.metrics import integrity_scores, pose_errors
+from glass_nav.evaluation.metrics import integrity_scores, pose_errors, relative_errors
 from glass_nav.evaluation.metrics.case_scores import CaseScores, SurfaceScores
 from glass_nav.evaluation.metrics.integrity_scores import IntegrityTrace
 from glass_nav.evaluation.metrics.pose_errors import PoseErrors
@@ -129,6 +129,7 @@ class ReplayResult:
             "updates": int(self.updated.sum()),
             "scans_without_ground_truth": None if self.reference is None else int((~errors.matched).sum()),
             **pose_errors.summary(errors),
+            **relative_errors.summary(self.stamps_ns, self.map_from_base, self.reference),
             **integrity_scores.summary(self.integrity),
             "case_share": {str(case): (float(count) / beams if beams else 0.0) for case, count in zip(CASES, counts)},
             "scans_with_true_cases": None

@@ -10,6 +10,7 @@ from typing import List, Optional, Tuple
 
 import numpy as np
 
+from glass_nav.evaluation.metrics import relative_errors
 from glass_nav.evaluation.metrics.pose_errors import LOST_M, RIGHT_M, RIGHT_RAD, PoseErrors
 from glass_nav.evaluation.metrics.replay_result import NO_BEAM, ReplayResult
 from glass_nav.vocabulary import BeamCase, LocalizationState
@@ -254,6 +255,14 @@ def _figures(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -> 
                 "Heading error", f"{np.median(yaw_deg):.2f}°", f"median; 95 % below {_percentile(yaw_deg, 95):.2f}°"
             ),
         ]
+        relative = relative_errors.summary(result.stamps_ns, result.map_from_base, result.reference)
+        over_m, over_s = relative["relative_1m_rmse_m"], relative["relative_1s_rmse_m"]
+        if over_s is not None:
+            shown = metres(over_s) if over_m is None else metres(over_m)
+            note = f"rms over 1 {'s' if over_m is None else 'm'} of driving, as evo's RPE"
+            figures.append(
+                Figure("Relative error", shown, note + ("" if over_m is None else f"; over 1 s {metres(over_s)}"))
+            )
     else:
         claimed = np.hypot(result.deviation[:, 0], result.deviation[:, 1])
         figures += [

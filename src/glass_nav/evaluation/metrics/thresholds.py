@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, Callable, Dict, Mapping, Optional, Sequence
 
-from glass_nav.evaluation.metrics import integrity_scores, pose_errors
+from glass_nav.evaluation.metrics import integrity_scores, pose_errors, relative_errors
 from glass_nav.vocabulary import BeamCase, LocalizationState
 
 COMPARISONS: "Dict[str, Callable[[float, float], bool]]" = {
@@ -20,6 +20,7 @@ COMPARISONS: "Dict[str, Callable[[float, float], bool]]" = {
 }
 KNOWN = (
     *pose_errors.METRICS,
+    *relative_errors.METRICS,
     *integrity_scores.METRICS,
     "scans",
     "scans_refused",

@@ -28,6 +28,7 @@ def run_lines(result: ReplayResult) -> List[str]:
             f"yaw error       mean {figures['yaw_mean_deg']:.2f} deg  "
             f"median {figures['yaw_median_deg']:.2f} deg  p95 {figures['yaw_p95_deg']:.2f} deg"
         )
+        lines += _relative_lines(figures)
         lines.append(
             f"lost            {100 * figures['lost_share']:.1f} % of the scans more than 0.5 m off, "
             f"{100 * figures['lost_1m_share']:.1f} % more than 1 m"
@@ -38,6 +39,18 @@ def run_lines(result: ReplayResult) -> List[str]:
         + "  ".join(f"{case.words} {100 * figures['case_share'][str(case.value)]:.1f} %" for case in CASES_IN_ORDER)
     )
     return lines + _case_lines(figures["cases"]) + _surface_lines(figures["scan_surfaces"])
+
+
+def _relative_lines(figures: Dict[str, Any]) -> List[str]:
+    """By evo's definitions, see relative_errors.py."""
+    over = [
+        f"over {name} {figures[f'relative_{key}_rmse_m']:.4f} m, {figures[f'relative_{key}_yaw_rmse_deg']:.3f} deg"
+        for key, name in (("1m", "1 m"), ("1s", "1 s"))
+        if figures[f"relative_{key}_rmse_m"] is not None
+    ]
+    if not over:
+        return []
+    return [f"relative rmse   {'  '.join(over)}; aligned position {figures['aligned_rmse_m']:.4f} m"]
 
 
 def _integrity_lines(figures: Dict[str, Any]) -> List[str]:
@@ -90,6 +103,23 @@ def _figure(value: Optional[float], digits: int = 3) -> str:
 
 def _metres(value: Optional[float]) -> str:
     return "infinite" if value is None else f"{value:.3f} m"
+
+
+def smoothed_lines(figures: Optional[Dict[str, Any]]) -> List[str]:
+    """Distances of the filter and the ground truth from the smoothed trajectory; none if it was not asked for."""
+    if figures is None:
+        return []
+    lines = [f"from smoothed   {_distances(figures['filter_from_smoothed'])}"]
+    if figures["smoothed_from_truth"]["position_mean_m"] is not None:
+        lines.append(f"smoothed error  {_distances(figures['smoothed_from_truth'])}")
+    return lines
+
+
+def _distances(errors: Dict[str, Optional[float]]) -> str:
+    return (
+        f"mean {_metres(errors['position_mean_m'])}  rmse {_metres(errors['position_rmse_m'])}  "
+        f"max {_metres(errors['position_max_m'])}  yaw mean {_figure(errors['yaw_mean_deg'], 2)} deg"
+    )
 
 
 def topology_lines(figures: Optional[Dict[str, Any]]) -> List[str]:

@@ -25,6 +25,7 @@ from glass_nav.vocabulary import (
     SEARCH_RGB,
     SOLID_BELOW,
     TAG_RGB,
+    UNMAPPED_GLASS_RGB,
     USED_RGB,
     BeamCase,
     Rgb,
@@ -32,7 +33,7 @@ from glass_nav.vocabulary import (
     WallKind,
 )
 
-WIDTH, HEIGHT = 350, 424  # of the panel
+WIDTH, HEIGHT = 350, 439  # of the panel
 BACKGROUND, INK, FAINT_INK = (250, 250, 250), (20, 20, 20), (85, 85, 85)
 FONT_PX = 11
 _ROW, _HEADING, _MARGIN = 15, 18, 5
@@ -65,7 +66,10 @@ SECTIONS: Dict[str, List[Row]] = {
     "Beams, by what they met": [
         Row(f"beam {case.mark}", case.rgb, case.label + CASE_NOTES.get(case, "")) for case in CASES_IN_ORDER
     ],
-    "Walls, by the beams that crossed them": [Row("wall", kind.rgb, words) for kind, words in WALL_WORDS.items()],
+    "Walls, by the beams that crossed them": [
+        *(Row("wall", kind.rgb, words) for kind, words in WALL_WORDS.items()),
+        Row("line", UNMAPPED_GLASS_RGB, "glass that the map lacks"),
+    ],
     "Pose": [
         Row("arrow", POSE_RGB, "pose with its covariance"),
         Row("arrow", PARTICLE_RGB, "particle"),

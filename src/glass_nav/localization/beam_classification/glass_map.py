@@ -9,7 +9,7 @@ no such memory (it decides cases scan by scan); the formulation is ours. H rows,
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Tuple
+from typing import Dict, Mapping, Sequence, Tuple
 
 import numpy as np
 
@@ -81,6 +81,8 @@ class GlassMap:
     def __init__(self, grid_map: GridMap, evidence: GlassEvidence) -> None:
         self._shape = grid_map.occupancy.shape
         self._occupied = np.pad(grid_map.occupied, 2).ravel()
+        self._mapped = self._occupied
+        self._drawn_in = np.zeros(0, np.int64)  # cells of panes that the map lacks
         self._stride = self._shape[1] + 4
         # Log odds that beams added: can be seen through, and is there though it can; bordered by 2 cells.
         self._log_odds = np.zeros((2, len(self._occupied)), np.float32)
@@ -92,6 +94,25 @@ class GlassMap:
         """Other evidence per crossing from now on; what was learnt before stays."""
         self._evidence = evidence
         self._prior = np.log([[evidence.glass_prior / (1.0 - evidence.glass_prior)], [_THERE / (1.0 - _THERE)]])
+
+    def redraw(self, grid_map: GridMap, panes: Sequence[Tuple[np.ndarray, float]]) -> None:
+        """Go on with the same map after panes were drawn in; what was learnt of the walls stays.
+
+        Args:
+            grid_map: with the panes.
+            panes: of each, its flat cells and its probability.
+        """
+        self._occupied = np.pad(grid_map.occupied, 2).ravel()
+        before, self._drawn_in = self._drawn_in, np.zeros(0, np.int64)
+        for cell, probability in panes:
+            cells = self._bordered(cell)
+            cells = cells[~self._mapped[cells]]
+            new = np.setdiff1d(cells, before)
+            odds = min(np.log(probability / max(1.0 - probability, 1e-9)), self._evidence.glass_memory)
+            self._log_odds[:, new], self._crossed[new] = odds - np.minimum(self._prior, 0.0), True
+            self._drawn_in = np.union1d(self._drawn_in, cells)
+        gone = np.setdiff1d(before, self._drawn_in)
+        self._log_odds[:, gone], self._crossed[gone] = 0.0, False
 
     def chances(self, cell: np.ndarray) -> np.ndarray:
         """(2, ...) probabilities for flat cells (...) of the map: that it can be seen through, and if so that it is there,
@@ -111,6 +132,24 @@ class GlassMap:
         percent = np.full(len(self._crossed), UNKNOWN, np.int8)
         percent[self._crossed] = np.rint(100.0 * np.prod(chances, axis=0))
         return percent.reshape(-1, self._stride)[2:-2, 2:-2].copy()
+
+    def arrays(self) -> Dict[str, np.ndarray]:
+        """What was learnt, by name, for restore()."""
+        learnt = np.flatnonzero(self._crossed)
+        return {"glass_cell": learnt.astype(np.int32), "glass_log_odds": self._log_odds[:, learnt]}
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """What arrays() of the same map gave.
+
+        Raises:
+            ValueError: it is not that.
+        """
+        cell, log_odds = (arrays.get(name, np.zeros(0)) for name in ("glass_cell", "glass_log_odds"))
+        if cell.ndim != 1 or log_odds.shape != (2, len(cell)) or not np.isfinite(log_odds).all():
+            raise ValueError(f"a glass map needs cells (C,) and log odds (2, C), got {cell.shape}, {log_odds.shape}")
+        if len(cell) and not (cell.dtype.kind == "i" and 0 <= cell.min() and cell.max() < len(self._crossed)):
+            raise ValueError("the cells of a glass map must be whole numbers within its map")
+        self._log_odds[:, cell], self._crossed[cell] = log_odds, True
 
     def learn(self, cell: np.ndarray, incidence_rad: np.ndarray, passed: np.ndarray) -> None:
         """Learn from one scan.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Optional
+from typing import List, Optional
 
 import numpy as np
 from sensor_msgs.msg import PointCloud2, PointField
@@ -12,10 +12,12 @@ from glass_nav.localization.beam_classification import beam_cloud as beam_points
 from glass_nav.localization.beam_classification.beam_shapes import beam_shapes
 from glass_nav.localization.beam_classification.case_votes import BeamCases
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
+from glass_nav.localization.place_shapes import place_shapes
 from glass_nav.localization.status_text import status_text
 from glass_nav.ros import conversions
 from glass_nav.ros.packed_markers import PackedMarkerArray, shape_marker, text_marker
 from glass_nav.sensing.scan import Scan
+from glass_nav.shapes import Text
 
 
 def beam_cloud(scan: Scan, cases: BeamCases, height_m: float, base_frame: str) -> PointCloud2:
@@ -36,6 +38,15 @@ def beam_markers(scan: Scan, cases: BeamCases, surface: SurfaceScan, height_m: f
     """beam_shapes() in the robot's frame; for publishing only: `points` stay empty."""
     head = conversions.header(scan.stamp_ns, base_frame)
     return PackedMarkerArray([shape_marker(head, shape) for shape in beam_shapes(scan, cases, surface, height_m)])
+
+
+def place_markers(state: str, particles: np.ndarray, map_frame: str) -> List[Marker]:
+    """place_shapes() in the map's frame."""
+    header = conversions.header(0, map_frame)
+    return [
+        text_marker(header, each) if isinstance(each, Text) else shape_marker(header, each)
+        for each in place_shapes(state, particles)
+    ]
 
 
 def status_marker(

@@ -11,12 +11,13 @@ Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseAr
     passed or was mirrored at. Stamp, frame and beams are the scan's; its `intensities` are 0 as measured, 1 cut,
     and -1 for all beams while the pose is not trusted: the scan is then passed on raw. One for every scan that is
     used; none for a scan that is rejected or has no transforms, because it is unknown where to cut it;
-    ~glass_map (OccupancyGrid, latched): probability of glass by wall cell [percent], -1 where unknown;
+    ~glass_map (OccupancyGrid, latched): probability of glass by wall cell [percent], -1 where unknown, with the cells
+    of panes that were found and that the map lacks;
     ~segment_quality (SegmentQuality), while somebody listens: how well the scan lies on the wall segments of the map;
     for rviz, while somebody listens: ~beam_cloud (PointCloud2), ~beam_markers (MarkerArray, a namespace per case
-    and one for the status), ~wall_markers (MarkerArray, latched: the known cells of the glass map), legend and ~legend
-    (Image, latched).
-Services: global_localization, request_nomotion_update (Empty), set_map (SetMap), ~locate (Locate: a rough pose
+    and one for the status), ~wall_markers (MarkerArray, latched: the known cells of the glass map, and
+    the panes that the map lacks), legend and ~legend (Image, latched).
+Services: ~save_panes (Trigger: writes ~panes_file), global_localization, request_nomotion_update (Empty), set_map (SetMap), ~locate (Locate: a rough pose
     corrected by wall segments), ~set_parameters (Reconfigure, with
     its topics ~parameter_descriptions and ~parameter_updates). Calls static_map (GetMap).
 Parameters: LocalizationNodeParams and LocalizerParams; explained in config/localization.yaml.
@@ -38,13 +39,14 @@ from geometry_msgs.msg import PolygonStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import SetMap, SetMapRequest, SetMapResponse
 from sensor_msgs.msg import LaserScan
-from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
+from std_srvs.srv import Empty, EmptyRequest, EmptyResponse, Trigger, TriggerRequest, TriggerResponse
 
 from glass_nav.localization import health, initial_pose
 from glass_nav.localization.health import LocalizationHealth, Situation
 from glass_nav.localization.pose_memory import PoseMemory
 from glass_nav.localization.saved_pose import SavedPose
 from glass_nav.localization.session import Inputs, LocalizationSession
+from glass_nav.localization.start_hints import what_to_start
 from glass_nav.ros import command_line, conversions, mailbox, shutdown
 from glass_nav.ros.diagnostics import Diagnostics
 from glass_nav.ros.landmarks.bearing_messages import LONGEST_TURN_S
@@ -54,6 +56,8 @@ from glass_nav.ros.localization.map_source import MapSource
 from glass_nav.ros.localization.publishers import Publishers
 from glass_nav.ros.localization.reconfigure import ReconfigureServer
 from glass_nav.ros.localization.segment_service import SegmentService
+from glass_nav.ros.localization.sender_watch import SenderWatch
+from glass_nav.ros.localization.shown_parameters import ShownParameters
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
@@ -88,9 +92,10 @@ class LocalizationNode:
         self._maps = MapSource(p.node, self._log, self._use_map)
         self._memory = PoseMemory(p.pose_file, _keep_on_server, lambda line: self._log.warn(line, period_s=60.0))
         self._outputs = Publishers(p.node)
+        self._transforms = TfTransforms(self._tf, p.node.odom_frame_id, p.node.base_frame_id)
         self._session = LocalizationSession(
             p.session,
-            TfTransforms(self._tf, p.node.odom_frame_id, p.node.base_frame_id).odom_from_base,
+            self._transforms.odom_from_base,
             bool(rospy.get_param("/use_sim_time", False)),
             self._clock.now_s,
             self._outputs.start_over,
@@ -100,6 +105,7 @@ class LocalizationNode:
 
         rospy.Service("global_localization", Empty, self._serve_global_localization)
         rospy.Service("request_nomotion_update", Empty, self._serve_nomotion_update)
+        rospy.Service("~save_panes", Trigger, self._serve_save_panes)
         rospy.Service("set_map", SetMap, self._serve_set_map)
         self._segments = SegmentService(p.node.global_frame_id, self._scan_and_map)
         self._reconfigure = ReconfigureServer(
@@ -109,6 +115,7 @@ class LocalizationNode:
         )
         # Subscribers last: they may fire at once.
         self._listener = tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
+        self._sender_watch = SenderWatch(p.node, self._log)
         self._scans.subscribe(self._take_scan)
         self._bearings.subscribe(self._command(self._bearings.receive))
         rospy.Subscriber("initialpose", PoseWithCovarianceStamped, self._command(self._take_guess), queue_size=2)
@@ -138,15 +145,20 @@ class LocalizationNode:
             self._send_glass_map()
             self._report()
 
-    def save_pose(self) -> None:
-        """For the next start."""
+    def save(self) -> None:
+        """The pose and the panes, for the next start."""
         self._memory.save()
+        self._session.keep_panes()
 
     # -- callbacks of other threads: they store, services also wait for the outcome
 
     def _take_scan(self, msg: LaserScan) -> None:
         self._inbox.put("scans", msg)
-        self._outputs.send_transform_again(conversions.ns_from_stamp(msg.header.stamp), rospy.Time.now().to_nsec())
+        try:
+            self._outputs.send_transform_again(conversions.ns_from_stamp(msg.header.stamp), rospy.Time.now().to_nsec())
+        except rospy.ROSException:  # the topic was closed meanwhile
+            if not rospy.is_shutdown():
+                raise
 
     def _command(self, handle: Callable[[Any], None]) -> Callable[[Any], None]:
         return lambda msg: self._inbox.put("commands", lambda: handle(msg))
@@ -168,6 +180,15 @@ class LocalizationNode:
         except (ValueError, TimeoutError) as err:
             raise rospy.ServiceException(str(err)) from err
         return EmptyResponse()
+
+    def _serve_save_panes(self, _request: TriggerRequest) -> TriggerResponse:
+        written: List[str] = []
+        try:
+            self._in_run_loop(lambda: written.append(self._session.save_panes()))
+        except (ValueError, TimeoutError) as err:
+            rospy.logwarn(f"save_panes refused: {err}")
+            return TriggerResponse(success=False, message=str(err))
+        return TriggerResponse(success=True, message=written[0])
 
     def _serve_set_map(self, request: SetMapRequest) -> SetMapResponse:
         try:
@@ -300,6 +321,7 @@ class LocalizationNode:
                 self._log.warn(trouble, NO_SCAN_WARNING_S)
         elif self._clock.now_s - self._scans.last_arrival_s > NO_SCAN_WARNING_S:
             self._log.warn(silence, NO_SCAN_WARNING_S)
+        self._say_what_to_start()
         if trouble is not None:
             self._outputs.send_trouble(session.estimate, session.state_without_scans, trouble)
         situation = Situation(
@@ -310,8 +332,21 @@ class LocalizationNode:
             session.map_origin if session.grid_map else self._maps.trouble or "no map yet",
             self._scans.period_s,
             self._scans.lidars,
+            session.lacking_glass,
         )
         self._diagnostics.publish(self._health.report(situation))
+
+    def _say_what_to_start(self) -> None:
+        """While nothing was localized: what is missing, for those who started this node alone."""
+        if self._session.estimate is not None or time.monotonic() - self._started_s < SETTLING_S:
+            return
+        hint = what_to_start(
+            self._maps.is_missing,
+            self._scans.unpublished,
+            "" if self._transforms.has_odometry() else self._transforms.odometry_name,
+        )
+        if hint is not None:
+            self._log.warn(hint, NO_SCAN_WARNING_S)
 
 
 def _keep_on_server(saved: SavedPose) -> None:
@@ -357,6 +392,7 @@ def main(name: str = "glass_localization") -> None:
         node = LocalizationNode(p)
     except landmark_file.LandmarkError as err:
         shutdown.refuse_to_start(err)
+    shown = ShownParameters(params.on_server(p), given)
     for line in ignored:
         rospy.logwarn(line)
     if unused:
@@ -364,5 +400,6 @@ def main(name: str = "glass_localization") -> None:
     try:
         node.run(ending)
     finally:
-        node.save_pose()
+        node.save()
+        shown.hide()
         rospy.signal_shutdown("ended")

@@ -35,6 +35,11 @@ class MapSource:
         self._next_request_s = 0.0  # by the monotonic clock
         self.trouble: Optional[str] = None if p.use_map_topic else "no map yet"  # None: there is a map, or none is due
 
+    @property
+    def is_missing(self) -> bool:
+        """Whether there is no map so far, and one is due."""
+        return not self._taken
+
     def request(self) -> None:
         """Ask static_map for the first map if it is time; the loop comes back until there is one."""
         if self._p.use_map_topic or self._taken or time.monotonic() < self._next_request_s:
@@ -53,7 +58,8 @@ class MapSource:
             self.take(conversions.map_from_msg(msg), msg.header.frame_id, f"service {name}")
         except rospy.ServiceException as err:
             self.trouble = f"no map: service {name} fails: {err}"
-            self._log.warn(self.trouble)
+            if time.monotonic() - self._started_s > SETTLING_S:
+                self._log.warn(self.trouble)
         except ValueError as err:
             self.trouble = f"no map: the one of service {name} is refused: {err}"
             self._log.error(self.trouble)

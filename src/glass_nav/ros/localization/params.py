@@ -17,6 +17,7 @@ import numpy as np
 from glass_nav import amcl_parameters, params
 from glass_nav.localization.initial_pose import StartPose, StartRules
 from glass_nav.localization.localizer_params import LocalizerParams
+from glass_nav.localization.panes_memory import PanesFilePath
 from glass_nav.localization.particle_filter.motion import MODELS
 from glass_nav.localization.saved_pose import PoseFile
 from glass_nav.localization.session import SessionParams
@@ -91,13 +92,14 @@ class LocalizationParams:
     start: StartPose = field(default_factory=StartPose)
     rules: StartRules = field(default_factory=StartRules)
     pose_file: PoseFile = field(default_factory=PoseFile)
+    panes_file: PanesFilePath = field(default_factory=PanesFilePath)
     deskew: Deskew = field(default_factory=Deskew)
     localizer: LocalizerParams = field(default_factory=LocalizerParams)
 
     @property
     def session(self) -> SessionParams:
         """Those that the session begins with."""
-        return SessionParams(self.localizer, self.start, self.rules, self.pose_file)
+        return SessionParams(self.localizer, self.start, self.rules, self.pose_file, self.panes_file)
 
 
 # The node's own parameters that may change while it runs; of the filter's, all may.
@@ -185,3 +187,9 @@ def without_unknown(mapping: Mapping[str, Any], owner: str) -> Tuple[Dict[str, A
         {name: value for name, value in mapping.items() if name in known},
         [f"{params.unknown(name, known, owner)}; not used, as by amcl" for name in unknown],
     )
+
+
+def on_server(p: LocalizationParams) -> Dict[str, Any]:
+    """Name -> value of all parameters that the parameter server can hold."""
+    held = {name: list(value) if isinstance(value, tuple) else value for name, value in params.as_mapping(p).items()}
+    return {name: value for name, value in held.items() if isinstance(value, (bool, int, float, str, list))}

@@ -117,7 +117,7 @@ class Publishers:
         return round(self._p.transform_tolerance * 1e9)
 
     def _send(self, transform: Optional[StampedTransform]) -> None:
-        if transform is not None:
+        if transform is not None and not rospy.is_shutdown():
             self._broadcaster.sendTransform(
                 conversions.transform_stamped(
                     transform.stamp_ns, self._frame, self._p.odom_frame_id, transform.map_from_odom
@@ -147,7 +147,7 @@ class Publishers:
         self._glass_is_news = False
         glass = localizer.glass_map.occupancy()
         self._glass_map.publish(conversions.glass_map_msg(stamp_ns, self._frame, grid_map, glass))
-        self._wall_markers.publish(wall_display.wall_markers(self._frame, grid_map, glass))
+        self._wall_markers.publish(wall_display.wall_markers(self._frame, grid_map, glass, localizer.unmapped_panes))
 
     def _show_beams(self, placed: PlacedScan, estimate: Estimate, now_s: float) -> None:
         """The beams for rviz, if it listens and they are due."""
@@ -159,6 +159,7 @@ class Publishers:
             self._beam_cloud.publish(beam_displays.beam_cloud(placed.scan, estimate.cases, height_m, base))
         if listeners[1]:
             markers = beam_displays.beam_markers(placed.scan, estimate.cases, estimate.surface_scan, height_m, base)
+            markers.markers += beam_displays.place_markers(estimate.state, estimate.particles, self._frame)
             markers.markers.append(
                 beam_displays.status_marker(
                     estimate.map_from_base, self._frame, estimate.state, estimate.reason, estimate.inlier_ratio

@@ -1,18 +1,27 @@
-"""bag_player: waits until the localization has its map, then becomes `rosbag play` with the same arguments.
+"""bag_player: waits until the localization has its map, then runs `rosbag play` with the same arguments.
 
+Logs when it starts, how far it is every few seconds, and when it is over. Subscribes: /clock, which the player sends.
 Calls: request_nomotion_update (Empty), which the localization rejects until it is ready.
 Parameters: ~wait_s (default 60), the longest wait; after it, the bag is played anyway, with a warning.
 """
 
 from __future__ import annotations
 
-import os
+import signal
+import subprocess
 import sys
+import threading
 import time
+from pathlib import Path
+from typing import List, Optional
 
+import rosbag
 import rospy
+from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Empty
 
+from glass_nav.recording import play_progress
+from glass_nav.recording.play_progress import PlayedPart
 from glass_nav.ros import command_line, shutdown
 
 ASK_PERIOD_S = 0.2
@@ -35,8 +44,39 @@ def main() -> None:
         ending.wait(ASK_PERIOD_S)
     if ending.is_set():
         return
-    rospy.signal_shutdown("rosbag play takes this node's name")
-    os.execvp("rosrun", ["rosrun", "rosbag", "play", *sys.argv[1:]])
+    sys.exit(_play([word for word in sys.argv[1:] if not word.startswith("__")], ending))
+
+
+def _play(arguments: List[str], ending: threading.Event) -> int:
+    """Play, and say how far it is; the exit code of rosbag play."""
+    clock_s: List[float] = []
+    rospy.Subscriber("/clock", Clock, lambda msg: clock_s.__setitem__(slice(None), [msg.clock.to_sec()]), queue_size=1)
+    part = _part(arguments)
+    if part is not None:
+        rospy.loginfo(part.started([Path(path).name for path in play_progress.bags_of(arguments)]))
+    player = subprocess.Popen(["rosrun", "rosbag", "play", *arguments])
+    next_line_s = time.monotonic() + play_progress.PERIOD_S
+    while player.poll() is None:
+        if ending.wait(ASK_PERIOD_S):
+            player.send_signal(signal.SIGINT)
+            return player.wait()
+        if part is not None and clock_s and time.monotonic() >= next_line_s:
+            next_line_s += play_progress.PERIOD_S
+            rospy.loginfo(part.progress(clock_s[0]))
+    rospy.loginfo("the bag is over" if player.returncode == 0 else f"rosbag play ended with {player.returncode}")
+    return player.returncode
+
+
+def _part(arguments: List[str]) -> Optional[PlayedPart]:
+    """What will be played; None if a bag cannot be read: rosbag play says why."""
+    spans_s = []
+    try:
+        for path in play_progress.bags_of(arguments):
+            with rosbag.Bag(path) as bag:
+                spans_s.append((bag.get_start_time(), bag.get_end_time()))
+    except (OSError, rosbag.ROSBagException):
+        return None
+    return play_progress.played_part(arguments, spans_s) if spans_s else None
 
 
 def _localization_is_ready() -> bool:

@@ -220,6 +220,7 @@ def test_a_search_that_was_stopped_goes_on():
     assert drive.arrival().traversal is None
 
 
+@pytest.mark.long_run
 def test_what_it_cannot_do_it_says_and_changes_nothing():
     driver = EdgeDriver()
     with pytest.raises(ValueError, match="^it stands at no meetpoint that it could leave: it is IDLE$"):

@@ -62,6 +62,7 @@ def passed():
     return drive(corridors(), LONG)
 
 
+@pytest.mark.long_run
 def test_the_meetpoint_of_a_t_is_seen_where_three_walls_are_equally_far(passed):
     """(0, y) with y + 1 = hypot(1, 1 - y): y = 1/4, r = 5/4."""
     nodes, places, _ = passed
@@ -106,6 +107,7 @@ def test_a_node_counts_that_graphs_agree_on_and_whose_obstacles_are_known():
         assert not observer.counts(PassedNode(0, 0, 0, np.zeros(2), np.zeros(2), 0.1, 3, 1.0, doubt_m, looks, share))
 
 
+@pytest.mark.long_run
 def test_a_pane_across_the_side_corridor_takes_its_meetpoint_away():
     """Beams meet it at right angles as the robot drives past: only before that there is a meetpoint."""
     pane = Pane(np.array([[-1.05, 1.0], [1.05, 1.0]]))

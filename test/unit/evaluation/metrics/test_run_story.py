@@ -69,12 +69,13 @@ def test_a_good_run_is_told_as_one():
     assert [(each.name, each.value) for each in story.figures] == [
         ("Position error", "2.0 cm"),
         ("Heading error", "0.00°"),
+        ("Relative error", "0.0 cm"),
         ("Reported LOCALIZED", "100 %"),
         ("Beams explained", "90.0 %"),
         ("Update", "20 ms"),
     ]
-    assert story.figures[3].note == "of those that came back; 25.0 % of all were mirrored or went through glass"
-    assert story.figures[4].note == "CPU, median; a scan came every 1000 ms"
+    assert story.figures[4].note == "of those that came back; 25.0 % of all were mirrored or went through glass"
+    assert story.figures[5].note == "CPU, median; a scan came every 1000 ms"
 
 
 @pytest.mark.parametrize(

@@ -52,6 +52,7 @@ def test_without_a_ground_truth_the_headline_is_how_far_they_are_apart():
     )
 
 
+@pytest.mark.long_run
 def test_names_are_no_markup(tmp_path):
     found = compared({"<b>": (0.4, 0.5), "a&b": (0.3, 40.0)})
     drawn = comparison_pictures.draw_all(tmp_path, found, {})

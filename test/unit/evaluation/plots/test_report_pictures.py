@@ -58,6 +58,7 @@ def test_pictures_are_drawn_whatever_came_out(tmp_path, changes, there, absent, 
     assert not [str(warning.message) for warning in recwarn if "glass_nav" in str(warning.filename)]
 
 
+@pytest.mark.long_run
 def test_one_scan_is_a_run_too(tmp_path):
     whole = a_result(worst=KEPT[:1])
     one = replace(
@@ -113,6 +114,7 @@ def test_places_that_were_only_candidates_do_not_widen_the_picture():
     assert high[0] < 20.0
 
 
+@pytest.mark.long_run
 def test_a_bad_scan_is_shown_where_it_was_thought_to_be_and_where_it_was(tmp_path):
     """A beam of case 4 that ends 2 m ahead: left at the estimate, right at the truth, a metre lower in the map."""
     empty = GridMap(np.zeros((100, 100), np.int8), 0.1, np.array([-5.0, -5.0, 0.0]))
@@ -132,6 +134,7 @@ def test_a_bad_scan_is_shown_where_it_was_thought_to_be_and_where_it_was(tmp_pat
     assert rows[left].mean() < rows[~left].mean() - 20
 
 
+@pytest.mark.long_run
 def test_the_page_takes_texts_as_texts(tmp_path):
     result = a_result(reasons=["<script>alert(1)</script> & more"] * 4)
     drawn, worst = report_pictures.draw_all(tmp_path, result, Ground(GRID, None), None)

@@ -43,6 +43,7 @@ def test_the_ways_and_the_candidates_are_drawn(tmp_path):
     assert {rgb(SEARCH_COLOUR), rgb(TOUR_COLOUR), rgb(CANDIDATE_COLOUR)} <= colours(tmp_path / "a.png")
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("depths", [0, 1, 20])
 def test_any_number_of_depths_makes_a_picture_that_can_be_looked_at(depths, tmp_path):
     wake_up_picture.draw(tmp_path / "a.png", grid(), story(depths), "office")
@@ -50,6 +51,7 @@ def test_any_number_of_depths_makes_a_picture_that_can_be_looked_at(depths, tmp_
     assert 1000 < width < 2000 and 300 < height < 6000
 
 
+@pytest.mark.long_run
 def test_a_robot_that_found_nothing_has_a_picture_too(tmp_path):
     empty = WakeUpStory([Depth(np.zeros((0, 3)), None, "LOST")], np.zeros((0, 2)))
     wake_up_picture.draw(tmp_path / "a.png", grid(), empty, "office")

@@ -320,3 +320,72 @@ def test_wrong_values_are_refused_in_one_line(values, text):
     with pytest.raises(ValueError) as err:
         GlassEvidence(**values)
     assert str(err.value) == text
+
+
+# -- panes that are drawn in, and what is kept for the next run
+
+
+def with_pane(probability=0.95, column=slice(5, 12)):
+    """The map with a pane in row 4, and its cells."""
+    grid_map = wall_map()
+    grid_map.occupancy[4, column] = 100
+    return grid_map, (np.arange(4 * COLUMNS + column.start, 4 * COLUMNS + column.stop), probability)
+
+
+def test_a_pane_that_is_drawn_in_is_glass_and_the_walls_stay_as_learnt():
+    found = learnt([[(CELL, HEAD_ON, False)]] * 20)
+    before = chances(found)
+    grid_map, pane = with_pane()
+    found.redraw(grid_map, [pane])
+    np.testing.assert_allclose(chances(found, flat(4, 8))[0], 0.95, atol=1e-6)
+    assert found.occupancy()[4, 8] >= 90
+    np.testing.assert_array_equal(chances(found), before)
+    found.learn(np.array([flat(4, 8)]), np.array([SIDEWAYS]), np.array([True]))
+    assert chances(found, flat(4, 8))[0] > 0.95
+
+
+def test_a_pane_that_is_taken_out_leaves_nothing():
+    found = learnt([])
+    grid_map, pane = with_pane()
+    found.redraw(grid_map, [pane])
+    found.redraw(wall_map(), [])
+    assert found.occupancy()[4].max() == -1
+    np.testing.assert_allclose(chances(found, flat(4, 8))[0], GlassEvidence().glass_prior)
+
+
+def test_what_was_learnt_of_a_pane_outlives_another_pane():
+    found = learnt([])
+    grid_map, pane = with_pane()
+    found.redraw(grid_map, [pane])
+    for _ in range(20):
+        found.learn(np.array([flat(4, 8)]), np.array([HEAD_ON]), np.array([True]))
+    there = chances(found, flat(4, 8))
+    other, longer = with_pane(column=slice(5, 20))
+    found.redraw(other, [longer])
+    np.testing.assert_array_equal(chances(found, flat(4, 8)), there)
+
+
+def test_what_is_kept_is_what_was_learnt():
+    found, fresh = learnt([[(CELL, SIDEWAYS, True)]] * 10), learnt([])
+    fresh.restore(found.arrays())
+    np.testing.assert_array_equal(fresh.occupancy(), found.occupancy())
+    np.testing.assert_array_equal(chances(fresh), chances(found))
+
+
+@pytest.mark.parametrize(
+    "change, text",
+    [
+        ({"glass_cell": np.zeros((2, 2), np.int32)}, r"needs cells \(C,\) and log odds \(2, C\), got \(2, 2\)"),
+        ({"glass_log_odds": np.full((2, 25), np.nan)}, "needs cells"),
+        ({"glass_cell": np.full(25, 10**6, np.int32)}, "must be whole numbers within its map"),
+        ({"glass_cell": np.full(25, 1.5)}, "must be whole numbers within its map"),
+    ],
+)
+def test_what_is_no_glass_map_is_refused(change, text):
+    found = learnt([[(CELL, SIDEWAYS, True)]])
+    kept = {**found.arrays(), **change}
+    if "glass_cell" in change and change["glass_cell"].ndim == 1:
+        kept["glass_cell"] = change["glass_cell"][: kept["glass_log_odds"].shape[1]]
+        kept["glass_log_odds"] = kept["glass_log_odds"][:, : len(kept["glass_cell"])]
+    with pytest.raises(ValueError, match=text):
+        learnt([]).restore(kept)

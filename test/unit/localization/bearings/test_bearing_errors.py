@@ -110,6 +110,7 @@ def test_the_predicted_covariance_is_that_of_drawn_bearings(number, sigma_deg):
     np.testing.assert_allclose(told, predicted, rtol=1e-6)
 
 
+@pytest.mark.long_run
 def test_the_covariance_counts_how_unsure_the_landmarks_are():
     unsure = landmark_map.seen_from_all_sides(FIELD.ids, FIELD.positions_m, sigma_m=0.05)
     rng, pose, sigma_rad = np.random.default_rng(5), VIEWERS[0], np.radians(0.1)

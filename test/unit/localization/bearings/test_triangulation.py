@@ -83,6 +83,7 @@ def test_least_squares_is_at_the_minimum_of_the_squared_residuals():
     )
 
 
+@pytest.mark.long_run
 def test_the_covariance_of_the_average_is_that_of_drawn_bearings():
     rng, sigma_rad = np.random.default_rng(8), np.radians(0.2)
     told = triangulation.average(seen(FIELD, VIEWERS[0], sigma_rad), FIELD).covariance
@@ -92,6 +93,7 @@ def test_the_covariance_of_the_average_is_that_of_drawn_bearings():
     np.testing.assert_allclose(drawn.std(axis=0), np.sqrt(np.diag(told)), rtol=0.1)
 
 
+@pytest.mark.long_run
 def test_the_average_over_triples_beats_the_worst_of_them():
     """The document's Figure 7: four landmarks, angles read in steps of 1 degree, four viewers."""
     rng = np.random.default_rng(7)
@@ -213,6 +215,7 @@ def test_of_five_or_more_one_wrong_bearing_is_found(seed, count):
     assert found >= 18
 
 
+@pytest.mark.long_run
 def test_of_four_bearings_a_wrong_one_is_found_or_refused():
     """With one bearing to spare geometry alone cannot tell which one it is.
 

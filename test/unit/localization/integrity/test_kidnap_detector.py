@@ -62,6 +62,7 @@ def test_a_right_pose_is_never_doubted_and_costs_no_search():
     assert verdicts[-1].usual == pytest.approx(verdicts[-1].fit, abs=0.05)  # it has learnt how scans fit
 
 
+@pytest.mark.long_run
 def test_a_wrong_pose_is_doubted_within_a_metre_and_the_right_one_is_found():
     watched = Watched()
     watched.drive(loop_drive(30))
@@ -176,6 +177,7 @@ def test_where_scans_always_fit_badly_that_becomes_usual():
     assert not any(verdict.found is not None or verdict.contested for verdict in verdicts)
 
 
+@pytest.mark.long_run
 def test_other_limits_hold_from_the_next_scan_on():
     watched = Watched(search_margin=1000.0)
     watched.drive(loop_drive(30))

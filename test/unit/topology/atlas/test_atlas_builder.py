@@ -89,6 +89,7 @@ def test_what_borders_on_unknown_space_has_a_deviation_to_match():
     assert atlas.nodes.sigma_r_m[left] < 0.1 < 0.8 < atlas.nodes.sigma_r_m[right]
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("name", sorted(shipped_buildings.shipped()))
 def test_the_atlas_of_a_building_is_drawn_on_a_plane_and_is_the_one_shipped(name):
     """Euler: nodes - edges + faces = 2 for each part. It fails where two darts of a node are in the wrong order."""

@@ -55,6 +55,7 @@ def test_the_graph_is_exact_however_rough_the_walls(resolution_m, rough, seeds, 
             np.testing.assert_allclose(graph.r_m[graph.degree > 2], r_of_w * (W + resolution_m), atol=resolution_m)
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("rough", [0.0, 0.1, 0.3])
 def test_a_floor_of_corridors_and_rooms_has_exactly_their_graph(rough):
     """4 corridors cross 3: bends at the 4 corners, 6 T around, 2 crosses inside; a room in each of the 6 blocks."""

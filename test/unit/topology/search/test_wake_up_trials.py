@@ -13,6 +13,7 @@ from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.vocabulary import SearchState
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("nodes, seed", [(100, 21), (1500, 22)])
 def test_the_truth_is_never_eliminated_while_errors_are_within_tolerance(nodes: int, seed: int) -> None:
     atlas = made_atlases.voronoi(nodes, seed)
@@ -43,6 +44,7 @@ def test_no_robot_in_the_atlas_is_told_a_wrong_place_few_with_a_poor_detector() 
     ] + figures["undecided_share"] == pytest.approx(1.0)
 
 
+@pytest.mark.long_run
 def test_robots_elsewhere_are_lost_with_the_documents_rule_many_are_told_a_place() -> None:
     atlas = made_atlases.voronoi(400, 25)
     figures = wake_up_trials.metrics(

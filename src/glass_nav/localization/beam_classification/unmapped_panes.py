@@ -1,0 +1,104 @@
+"""Scans at trusted poses -> panes that the map lacks, drawn into a second map beside it.
+
+The finder is panes/pane_finder.py. A pane that is probable enough becomes a surface for the beam classifier; the map
+itself, on which everything else relies, never changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import List, Sequence, Tuple
+
+import numpy as np
+
+from glass_nav.panes.pane_finder import PaneFinder, PaneFinderParams
+from glass_nav.params import number
+from glass_nav.sensing.scan import Scan
+from glass_nav.world import drawn_panes
+from glass_nav.world.drawn_panes import PaneError
+from glass_nav.world.grid_map import GridMap
+from glass_nav.world.pane import Pane
+
+_SAME_M = 0.1  # a pane whose ends move by less stays as it is drawn
+_KEPT_PROBABILITY = 0.7  # of the least one: a drawn pane stays until it falls below
+
+
+@dataclass(frozen=True)
+class PaneUse:
+    """Whether panes that the map lacks are looked for, and which of them count."""
+
+    find_panes: bool = True
+    pane_min_probability: float = number(0.9, 0.0, 1.0)  # of a pane that beams and scan_surfaces respect
+
+
+class UnmappedPanes:
+    """The panes that one map lacks, as far as they are known."""
+
+    def __init__(self, grid_map: GridMap, use: PaneUse, finder: PaneFinderParams, known: Sequence[Pane] = ()) -> None:
+        """
+        Args:
+            grid_map: the map.
+            use: of the panes.
+            finder: how they are found.
+            known: panes in that map that were found before.
+        """
+        self._map, self._use = grid_map, use
+        self._finder = PaneFinder(grid_map, finder, known=known)
+        self._drawn: Tuple[Pane, ...] = tuple(pane for pane in known if pane.probability >= use.pane_min_probability)
+
+    def reconfigure(self, use: PaneUse) -> None:
+        """Other limits from the next scan on; what was found stays."""
+        self._use = use
+
+    @property
+    def drawn(self) -> Tuple[Pane, ...]:
+        """The panes that count as surfaces."""
+        return self._drawn
+
+    @property
+    def candidates(self) -> Tuple[Pane, ...]:
+        """All panes that were found, the most probable first."""
+        return tuple(self._finder.panes())
+
+    def grid_map(self) -> GridMap:
+        """The map with those panes."""
+        return drawn_panes.drawn(self._map, self._drawn)
+
+    def observe(self, scan: Scan, map_from_base: np.ndarray, covariance: np.ndarray) -> bool:
+        """Learn from a scan at a trusted pose; whether other panes count as surfaces now.
+
+        Args:
+            scan: of one lidar.
+            map_from_base: (3,) the pose.
+            covariance: (3, 3) of it.
+        """
+        if not self._use.find_panes or not self._finder.observe(scan, map_from_base, covariance):
+            return False
+        if not self._finder.due:
+            return False
+        before = self._drawn
+        self._drawn = tuple(self._believed())
+        return self._drawn != before
+
+    def _believed(self) -> List[Pane]:
+        """The probable panes; one that hardly changed stays as it is drawn."""
+        believed = []
+        for pane in self._finder.panes():
+            old = next((old for old in self._drawn if _alike(pane, old)), None)
+            least = self._use.pane_min_probability * (1.0 if old is None else _KEPT_PROBABILITY)
+            if pane.probability >= least and self._in_map(pane):
+                believed.append(pane if old is None else old)
+        return believed
+
+    def _in_map(self, pane: Pane) -> bool:
+        try:
+            return bool(len(drawn_panes.cells(self._map, pane)))
+        except PaneError:
+            return False
+
+
+def _alike(pane: Pane, other: Pane) -> bool:
+    """The same pane, and hardly longer or elsewhere."""
+    ends, others = np.array([pane.start_m, pane.end_m]), np.array([other.start_m, other.end_m])
+    moved_m = [float(np.hypot(*(ends - each).T).max()) for each in (others, others[::-1])]
+    return min(moved_m) < _SAME_M
