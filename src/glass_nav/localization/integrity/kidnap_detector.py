@@ -44,7 +44,9 @@ _HEAD_START = 3.0  # log likelihood ratio of the tracked pose, or of where odome
 _CARRIED_AWAY = -10.0  # log likelihood ratio of any other place to where odometry leads: for a new pose
 _SETTLED_M = 6.0  # after this distance as the best candidate, the fit at the tracked pose is the usual one
 _CALM_M = 2.0  # after this distance of usual fits nothing was wrong
-_CLEAR = 3.0  # log likelihood ratio of the tracked pose to all others from which it is trusted though the robot was moved
+_CLEAR = (
+    3.0  # log likelihood ratio of the tracked pose to all others from which it is trusted though the robot was moved
+)
 _CLOSE = -1.0  # log likelihood ratio of another place to the tracked pose from which it may be the right one
 
 

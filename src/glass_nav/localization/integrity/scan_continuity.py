@@ -13,7 +13,7 @@ from typing import Optional, Tuple
 
 import numpy as np
 
-from glass_nav.geometry import angles, se2
+from glass_nav.geometry import se2
 from glass_nav.sensing.scan import Scan
 
 _TOLERANCE_M, _TOLERANCE_SHARE = 0.15, 0.03  # of a range: nearer than that to what was seen is no contradiction
@@ -21,7 +21,8 @@ _TOLERANCE_RAD = 0.035  # of a bearing, odometry's error included
 _MIN_BEAMS = 20  # with fewer a scan is no evidence
 _MEMORY_SCANS = 20.0  # that what is usual is averaged over
 _MIN_SCANS = 5  # before anything is unusual
-_USUAL = (0.1, 4.0)  # above the usual share of contradictions, as such and in mean deviations: a break
+_USUAL = (0.15, 4.0)  # above the usual share of contradictions, as such and in mean deviations: a break
+_TURNS_RAD = (0.0, -0.05, 0.05, -0.1, 0.1, -0.2, 0.2)  # that odometry may have missed
 _MAX_STEP_M = 1.0  # farther apart two scans need not have anything in common
 
 
@@ -47,7 +48,9 @@ class ScanContinuity:
         self._before, self._last = None, now
         excess = -np.inf if last is None else self._excess(last, now)
         confirmed = before is not None and self._excess(before, now) > self._limit
-        if before is None and excess > self._limit:  # else the last scan was the odd one, and contradicts both its sides
+        if (
+            before is None and excess > self._limit
+        ):  # else the last scan was the odd one, and contradicts both its sides
             self._before = last
         if np.isfinite(excess):
             self._learn(excess)
@@ -63,7 +66,12 @@ class ScanContinuity:
         step = se2.compose(se2.inverse(before[1]), after[1])
         if before[0].lidar != after[0].lidar or se2.travelled(step)[0] > _MAX_STEP_M:
             return -np.inf
-        return contradictions(before[0], after[0], step) - self._usual
+        least = np.inf
+        for turn_rad in _TURNS_RAD:
+            least = min(least, contradictions(before[0], after[0], step + [0.0, 0.0, turn_rad]) - self._usual)
+            if least <= self._limit:  # explained
+                break
+        return least
 
     def _learn(self, excess: float) -> None:
         self._scans += 1

@@ -30,7 +30,9 @@ def test_a_drive_has_no_break():
 
 def test_a_robot_that_was_carried_away_is_noticed_with_the_second_scan():
     drive = loop_drive(40)
-    there = [se2.compose(se2.compose(drive[20], [0.8, 0.7, 1.0]), se2.compose(se2.inverse(drive[20]), p)) for p in drive]
+    there = [
+        se2.compose(se2.compose(drive[20], [0.8, 0.7, 1.0]), se2.compose(se2.inverse(drive[20]), p)) for p in drive
+    ]
     breaks = observed(L_ROOM, [*drive[:20], *there[20:]], odom=drive)
     assert breaks.index(True) == 21 and sum(breaks) == 1
 
