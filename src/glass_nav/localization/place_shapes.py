@@ -41,7 +41,9 @@ def place_shapes(state: str, particles: np.ndarray) -> List[Union[Shape, Text]]:
 
 def places(particles: np.ndarray) -> "tuple[np.ndarray, np.ndarray]":
     """Poses (K, 3) that stand for all particles (P, 3) within _APART_M of them, and their shares (K,), most first."""
-    left, poses, shares = particles, [], []
+    left = particles
+    poses: List[np.ndarray] = []
+    shares: List[float] = []
     while len(left) and len(poses) < MAX_PLACES:
         cells, number = np.unique(np.floor(left[:, :2] / _APART_M), axis=0, return_inverse=True)
         densest = left[number.ravel() == np.bincount(number.ravel(), minlength=len(cells)).argmax()]
