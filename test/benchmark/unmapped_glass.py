@@ -8,7 +8,7 @@
 Sections:
     glass  all panes are erased from the map (or, with --mapper erasing, by a mapper that lets beams pass); the robot
            drives its path there and back. Found: share of the visible pane length within 0.1 m and 3 degrees of a pane
-           that counts as a surface after the way there; a point of a pane is visible if the robot had it head-on within
+           of probability 0.9 after the way there; a point of a pane is visible if the robot had it head-on within
            6 m. Glass: share of what was found that is. Cases, pose and cut beams of the way there with the true map, the
            lacking one, and the lacking one with what was found drawn in; live: cut beams of the way back.
     false  pane length that is found where the map lacks none: with film on all glass, and with a third of the furniture
@@ -255,7 +255,7 @@ def glass(arguments: argparse.Namespace) -> Iterator[Bar]:
             lacking = building_map.draw(building, erased=erased_glass.choose(building, 1.0, seed))
         localizer = started(lacking, there[0].map_from_base, seed)
         without = follow(localizer, there)
-        drawn = localizer.unmapped_panes
+        drawn = [pane for pane in localizer.found_panes if pane.probability >= PaneUse().pane_min_probability]
         live = follow(localizer, back)
         with_true, with_drawn = (
             follow(started(each, there[0].map_from_base, seed, find_panes=False), there)

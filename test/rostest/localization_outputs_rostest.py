@@ -20,7 +20,8 @@ import rostest
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap, GetMapResponse
-from room_robot import BEAMS, Robot, changed, pose_message, room
+from room_robot import BEAMS, Robot, changed, pose_message
+from room_with_pane import PANE_COLUMN, LidarAndPane, room_with_a_pane
 from rostest_support import Heard, LogLines, wait_until
 from sensor_msgs.msg import Image, LaserScan
 from std_srvs.srv import Empty
@@ -32,50 +33,19 @@ from glass_nav.localization.place_shapes import PLACES_NAMESPACE
 from glass_nav.localization.status_text import STATUS_NAMESPACE
 from glass_nav.msg import LocalizationStatus, SegmentQuality
 from glass_nav.ros import conversions
-from glass_nav.sensing.raycast import RayCaster
 from glass_nav.srv import Locate
 from glass_nav.vocabulary import UNMAPPED_GLASS, BeamCase, WallKind
-from glass_nav.world.grid_map import GridMap
 
-PANE_COLUMN = 160
 NODE = "/glass_localization"
-HEAD_ON_RAD = 0.15  # up to this angle to its normal the pane answers
 MOUNTING = np.array([0.2, 0.0, 0.3])  # of the robot's lidar
 PERIOD_S = 0.5  # ~glass_map_period_s
 TOLERANCE_NS = 100_000_000  # ~transform_tolerance
-
-
-def room_with_a_pane() -> GridMap:
-    """The room, and a pane that parts its eastern third, 1.3 m and more from the robot."""
-    empty = room()
-    occupancy = empty.occupancy.copy()
-    occupancy[20:170, PANE_COLUMN] = 100
-    return GridMap(occupancy, empty.resolution_m, empty.map_from_grid)
 
 
 def stamp_of(msg: TFMessage) -> int:
     """Of map -> odom [ns]; 0: another transform."""
     (transform,) = msg.transforms
     return transform.header.stamp.to_nsec() if transform.header.frame_id == "map" else 0
-
-
-class LidarAndPane:
-    """Ranges in the room with the pane, as RayCaster gives them of one without panes."""
-
-    def __init__(self) -> None:
-        self.room, self.with_pane = RayCaster(room()), RayCaster(room_with_a_pane())
-        self._normal_rad = room().map_from_grid[2]
-
-    def cast(self, poses: np.ndarray, bearings: np.ndarray, max_range_m: float) -> np.ndarray:
-        """(P, B) ranges [m] along bearings (B,) from poses (P, 3)."""
-        head_on = self.incidence(poses, bearings) < HEAD_ON_RAD
-        return np.where(
-            head_on, self.with_pane.cast(poses, bearings, max_range_m), self.room.cast(poses, bearings, max_range_m)
-        )
-
-    def incidence(self, poses: np.ndarray, bearings: np.ndarray) -> np.ndarray:
-        """(P, B) angles to the normal of the pane [rad]."""
-        return np.abs(angles.wrap(poses[:, 2:] + bearings - self._normal_rad))
 
 
 class LocalizationOutputs(unittest.TestCase):

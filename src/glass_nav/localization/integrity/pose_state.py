@@ -19,6 +19,7 @@ from glass_nav.params import number
 from glass_nav.vocabulary import LocalizationState
 
 _POSSIBLE = 8.0  # log likelihood ratio of the best place to one that is still counted as possible
+_MIN_RELIABILITY = 0.05  # of a pose that nothing else speaks against
 _LOST = 3.0  # log likelihood ratio of another place to the tracked pose
 
 
@@ -91,8 +92,14 @@ class PoseQuality:
         """What the kidnap detector says about the tracked pose."""
         self._verdict = verdict
 
-    def judge(self, best: PoseEstimate) -> Judgement:
-        """State of the best cluster of particles."""
+    def judge(self, best: PoseEstimate, covariance: Optional[np.ndarray] = None) -> Judgement:
+        """State of the best cluster of particles.
+
+        Args:
+            best: the cluster.
+            covariance: (3, 3) of its pose over x [m], y [m], yaw [rad]; None: the spread of the particles.
+        """
+        covariance = best.covariance if covariance is None else covariance
         if self._candidates is not None:
             known = best.share if len(self._candidates.poses) else 0.0
             return Judgement(
@@ -102,8 +109,8 @@ class PoseQuality:
                 _possible(self._candidates),
             )
         limits = self._limits
-        position_sigma_m = float(np.sqrt(np.linalg.eigvalsh(best.covariance[:2, :2])[-1]))
-        heading_sigma_rad = float(np.sqrt(best.covariance[2, 2]))
+        position_sigma_m = float(np.sqrt(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
+        heading_sigma_rad = float(np.sqrt(covariance[2, 2]))
         wide = (
             position_sigma_m > limits.localized_max_position_sigma_m
             or heading_sigma_rad > limits.localized_max_heading_sigma_rad
@@ -127,7 +134,7 @@ class PoseQuality:
         if wide or self._inlier_ratio < limits.uncertain_used_share:
             return Judgement(LocalizationState.UNCERTAIN, f"{explained}; {spread}", confidence)
         doubted = self._verdict is not None and self._verdict.doubted
-        if doubted and confidence < limits.localized_min_reliability:
+        if confidence < (limits.localized_min_reliability if doubted else _MIN_RELIABILITY):
             return Judgement(
                 LocalizationState.UNCERTAIN,
                 f"the pose is right with a chance of only {confidence:.0%}; {explained}; {spread}",

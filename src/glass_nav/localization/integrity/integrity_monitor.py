@@ -1,0 +1,128 @@
+"""Scans, tracked poses -> a covariance that holds at every scan, and whether the scan still fits there.
+
+Four things make a pose uncertain: the spread of the particles, what the scan leaves free and the disagreement of map and
+lidar (fit_information.py), what odometry brought since the last fit (pose_covariance.py), and a scan that says something
+else now: its fit is best beside the pose, or at a place that a second scan has to confirm.
+"""
+
+from __future__ import annotations
+
+from typing import Dict, Optional, Tuple
+
+import numpy as np
+
+from glass_nav.geometry import angles
+from glass_nav.localization.integrity.fit_information import FitInformation, ScanFit
+from glass_nav.localization.integrity.pose_covariance import PoseCovariance, larger_of
+from glass_nav.localization.particle_filter.motion import OdometryNoise
+from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.scan import Scan, spread_evenly
+
+_BEAMS = 90  # looked at
+_MIN_BEAMS = 10
+_BESIDE = 3.0  # deviations between the pose and the best fit: the scan no longer fits
+_FARTHER = 2.0  # times as far as after the last update
+_LESS = 0.15  # share of the beams at walls, below that at the last update: the scan no longer fits
+
+
+class IntegrityMonitor:
+    """Follows one tracked pose in one map."""
+
+    def __init__(self, field: DistanceField, resolution_m: float) -> None:
+        """
+        Args:
+            field: distances to the walls of the map.
+            resolution_m: of its cells.
+        """
+        self._fit = ScanFit(field, resolution_m)
+        self._covariance: Optional[PoseCovariance] = None
+        self._at_update: Dict[str, Tuple[float, float]] = {}  # of each lidar's last update: beside_of() and share then
+        self._other: Optional[np.ndarray] = None  # (3,) how far off another possible place is, in map
+        self._now: Optional[FitInformation] = None  # of the present scan at the carried pose
+
+    def start(self, covariance: np.ndarray) -> None:
+        """The pose was placed anew, with a covariance (3, 3)."""
+        self._covariance = PoseCovariance(covariance)
+        self._now = self._other = None
+        self._at_update = {}
+
+    def stop(self) -> None:
+        """There is no tracked pose."""
+        self._covariance = None
+
+    def fits(self, scan: Scan, map_from_base: np.ndarray, step: Optional[np.ndarray], noise: OdometryNoise) -> bool:
+        """Whether a scan still fits at the pose (3,) to which a step (3,) of odometry since the last update leads."""
+        self._now = None if self._covariance is None else self._look(scan, map_from_base, matched=False)
+        if self._covariance is None or self._now is None or scan.lidar not in self._at_update:
+            return True
+        beside_then, share_then = self._at_update[scan.lidar]
+        beside = _beside(self._now, self._covariance.carried(step, noise))
+        return beside <= max(_BESIDE, _FARTHER * beside_then) and self._now.share >= share_then - _LESS
+
+    def update(
+        self,
+        scan: Scan,
+        map_from_base: np.ndarray,
+        step: Optional[np.ndarray],
+        noise: OdometryNoise,
+        believed: bool,
+        suspect: Optional[np.ndarray],
+    ) -> None:
+        """A scan moved the particles.
+
+        Args:
+            scan: the scan.
+            map_from_base: (3,) pose after it.
+            step: (3,) of odometry since the last update, in the robot's frame then; None: there was none.
+            noise: of odometry.
+            believed: the scan fits there as scans usually do.
+            suspect: (3,) pose where it fits instead, and another scan has to confirm it; None: there is none.
+        """
+        if self._covariance is None:
+            return
+        self._now = self._look(scan, map_from_base, matched=believed)
+        self._covariance.update(step, map_from_base, self._now if believed else None, noise)
+        if self._now is not None:
+            beside = _beside(self._now, self._covariance.carried(None, noise))
+            self._at_update[scan.lidar] = beside, self._now.share
+        self._other = None
+        if suspect is not None:
+            self._other = suspect - map_from_base
+            self._other[2] = angles.wrap(self._other[2])
+
+    def narrow(self, spread: np.ndarray) -> None:
+        """Evidence other than scans weighed the particles, whose spread (3, 3) holds now."""
+        if self._covariance is not None:
+            self._covariance.narrow(spread)
+
+    def at(self, step: Optional[np.ndarray], noise: OdometryNoise, spread: np.ndarray) -> np.ndarray:
+        """(3, 3) covariance at the present scan.
+
+        Args:
+            step: (3,) of odometry since the last update, in the robot's frame then; None: this scan was one.
+            noise: of odometry.
+            spread: (3, 3) of the particles.
+        """
+        if self._covariance is None:
+            return spread
+        carried = self._covariance.carried(step, noise)
+        covariance = larger_of(carried, spread)
+        if self._now is not None:
+            beside = _beside(self._now, carried)
+            excess = max(0.0, 1.0 - 4.0 / max(beside**2, 1e-9))  # that is not chance
+            covariance = covariance + excess * np.outer(self._now.offset, self._now.offset)
+        if self._other is not None:
+            covariance = covariance + np.outer(self._other, self._other)
+        return covariance
+
+    def _look(self, scan: Scan, map_from_base: np.ndarray, matched: bool) -> Optional[FitInformation]:
+        beams = spread_evenly(scan.answered, _BEAMS)
+        if len(beams) < _MIN_BEAMS:
+            return None
+        share = len(beams) / max(int(np.count_nonzero(scan.answered)), 1)
+        return self._fit.of(scan.points_in_base()[beams], scan.base_from_laser[:2], map_from_base, share, matched)
+
+
+def _beside(fit: FitInformation, covariance: np.ndarray) -> float:
+    """Distance of the best fit from a pose with that covariance (3, 3), in deviations of both."""
+    return float(np.sqrt(fit.offset @ np.linalg.solve(fit.covariance + covariance, fit.offset)))

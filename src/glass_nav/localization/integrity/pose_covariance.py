@@ -1,0 +1,110 @@
+"""Odometry, fits of scans -> a covariance of the tracked pose that holds.
+
+The spread of the particles is no such covariance: each scan is weighed as if its errors were new, but consecutive scans
+see the same walls, and err in the same way. So information is never added up over scans: in each direction, the pose is
+as good as the better of the two says, the carried pose or the present scan. This is the ellipsoidal intersection of Sijs
+et al., State fusion with unknown correlation, Proc. European Control Conf. (2010), without its mutual mean.
+
+Between two fits odometry carries the pose. Its noise is the filter's model of it, scaled by how large the corrections of
+the last updates were in that model. All covariances are over x [m], y [m], yaw [rad] in map.
+"""
+
+from __future__ import annotations
+
+from typing import Optional
+
+import numpy as np
+
+from glass_nav.geometry import angles
+from glass_nav.localization.integrity.dead_reckoning import DeadReckoning
+from glass_nav.localization.integrity.fit_information import FitInformation
+from glass_nav.localization.particle_filter.motion import OdometryNoise
+
+_MEMORY = 0.95  # weight of the past per update, of the scale of odometry's noise
+_MIN_SCALE = 0.01  # of the variances of the model of odometry
+_ALIKE = 1.5  # ratio of variances up to which the scan is as good as the carried pose
+_MAX_CORRECTION = 6.0  # deviations: a larger one is an event of its own
+
+
+class PoseCovariance:
+    """Remembers the covariance at the last update, and how good odometry has been."""
+
+    def __init__(self, covariance: np.ndarray) -> None:
+        """
+        Args:
+            covariance: (3, 3) of the start.
+        """
+        self._at_update = np.array(covariance, float)
+        self._last: Optional[np.ndarray] = None  # (3,) map_from_base at the last update
+        self._noise_scale = np.ones(3)  # of the variances along, across and of the heading
+
+    def update(
+        self, step: Optional[np.ndarray], map_from_base: np.ndarray, fit: Optional[FitInformation], noise: OdometryNoise
+    ) -> None:
+        """The particles were moved.
+
+        Args:
+            step: (3,) of odometry since the last update, in the robot's frame then; None: there was none.
+            map_from_base: (3,) the pose after it.
+            fit: of the scan there; None: the scan says nothing about the pose.
+            noise: of odometry.
+        """
+        if step is not None and self._last is not None:
+            if fit is not None:
+                self._learn(step, map_from_base, noise)
+            self._at_update = self.carried(step, noise)
+        if fit is not None:
+            self._at_update = better_of(self._at_update, fit.covariance)
+        self._last = np.array(map_from_base, float)
+
+    def narrow(self, covariance: np.ndarray) -> None:
+        """Something else determines the pose at the last update, with that covariance (3, 3)."""
+        self._at_update = better_of(self._at_update, covariance)
+
+    def carried(self, step: Optional[np.ndarray], noise: OdometryNoise) -> np.ndarray:
+        """(3, 3) after a step (3,) of odometry since the last update, in the robot's frame then."""
+        if step is None or self._last is None:
+            return self._at_update
+        before = DeadReckoning(self._last, np.zeros((3, 3)))
+        moved = DeadReckoning(self._last, self._at_update).carried(step, noise).covariance
+        by_odometry = before.carried(step, noise).covariance
+        turned = _turned(self._last[2])
+        scale = turned @ np.diag(np.sqrt(self._noise_scale)) @ turned.T
+        return moved - by_odometry + scale @ by_odometry @ scale.T
+
+    def _learn(self, step: np.ndarray, map_from_base: np.ndarray, noise: OdometryNoise) -> None:
+        """How large this correction is in the model of odometry."""
+        assert self._last is not None
+        predicted = DeadReckoning(self._last, np.zeros((3, 3))).carried(step, noise)
+        turned = _turned(self._last[2])
+        off = map_from_base - predicted.map_from_base
+        off[2] = angles.wrap(off[2])
+        variance = np.diag(turned.T @ predicted.covariance @ turned)
+        known = variance > 1e-10
+        squared = np.minimum((turned.T @ off)[known] ** 2 / variance[known], _MAX_CORRECTION**2)
+        scale = _MEMORY * self._noise_scale[known] + (1.0 - _MEMORY) * squared
+        self._noise_scale[known] = np.maximum(scale, _MIN_SCALE)
+
+
+def better_of(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """(3, 3): in each direction the smaller of two covariances."""
+    root = np.linalg.cholesky(first + 1e-12 * np.eye(3))
+    half = np.linalg.solve(root, second)
+    values, axes = np.linalg.eigh(np.linalg.solve(root, half.T))
+    mixed = root @ axes
+    ratio = np.where(values > 1.0, 1.0 + (values - 1.0) * np.exp(-(values - 1.0) / _ALIKE), values)
+    return (mixed * ratio) @ mixed.T
+
+
+def larger_of(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """(3, 3): in each direction the larger of two covariances."""
+    root = np.linalg.cholesky(first + 1e-12 * np.eye(3))
+    half = np.linalg.solve(root, second)
+    values, axes = np.linalg.eigh(np.linalg.solve(root, half.T))
+    mixed = root @ axes
+    return (mixed * np.maximum(values, 1.0)) @ mixed.T
+
+
+def _turned(yaw: float) -> np.ndarray:
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])

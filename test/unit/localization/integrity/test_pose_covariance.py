@@ -1,0 +1,98 @@
+"""The covariance of a tracked pose over a drive: what scans and odometry leave of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from glass_nav.geometry import se2
+from glass_nav.localization.integrity import pose_covariance
+from glass_nav.localization.integrity.fit_information import FitInformation
+from glass_nav.localization.integrity.pose_covariance import PoseCovariance
+from glass_nav.localization.particle_filter.motion import OdometryNoise
+
+NOISE = OdometryNoise()
+STEP = np.array([0.1, 0.0, 0.0])
+
+
+def fit(*deviations):
+    return FitInformation(np.diag(np.square(deviations)), np.zeros(3), 1.0)
+
+
+def driven(covariance, steps, found, odometry_error=np.zeros(3)):
+    """After so many steps along x, each with that fit."""
+    pose = np.zeros(3)
+    covariance.update(None, pose, found, NOISE)
+    for _ in range(steps):
+        pose = se2.compose(pose, STEP + odometry_error)
+        covariance.update(STEP, pose, found, NOISE)
+    return np.sqrt(np.diag(covariance.carried(None, NOISE)))
+
+
+def test_scans_of_the_same_walls_do_not_make_the_pose_better_and_better():
+    found = driven(PoseCovariance(np.eye(3)), 200, fit(0.02, 0.02, 0.005))
+    np.testing.assert_allclose(found, [0.02, 0.02, 0.005], rtol=0.3)
+
+
+def test_along_a_corridor_odometry_holds_and_its_error_grows():
+    start = np.diag(np.square([0.05, 0.05, 0.01]))
+    near, far = (driven(PoseCovariance(start), steps, fit(2.0, 0.02, 0.005)) for steps in (20, 200))
+    assert 0.05 < near[0] < far[0] < 2.0
+    assert far[1] < 0.03
+
+
+def test_a_scan_that_says_nothing_leaves_the_pose_to_odometry():
+    pose = PoseCovariance(np.diag(np.square([0.05, 0.05, 0.01])))
+    assert np.all(driven(pose, 50, None) > [0.05, 0.05, 0.01])
+
+
+def test_between_updates_the_pose_gets_less_certain():
+    pose = PoseCovariance(np.zeros((3, 3)))
+    driven(pose, 5, fit(0.01, 0.01, 0.002))
+    before = np.trace(pose.carried(None, NOISE))
+    steps = [np.trace(pose.carried(np.array([x, 0.0, 0.0]), NOISE)) for x in (0.02, 0.05, 0.09)]
+    assert before < steps[0] < steps[1] < steps[2]
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_odometry_that_was_often_wrong_is_trusted_less(axis):
+    """In the direction in which it was wrong."""
+    error = np.zeros(3)
+    error[axis] = (0.04, 0.04, 0.05)[axis]
+    wrong, right = PoseCovariance(np.eye(3)), PoseCovariance(np.eye(3))
+    driven(wrong, 60, fit(0.01, 0.01, 0.002), error)
+    driven(right, 60, fit(0.01, 0.01, 0.002))
+    more, less = (each.carried(STEP, NOISE) - each.carried(None, NOISE) for each in (wrong, right))
+    assert wrong.carried(STEP, NOISE)[axis, axis] > right.carried(STEP, NOISE)[axis, axis]
+    assert np.trace(more) > np.trace(less)
+
+
+def test_other_evidence_narrows_the_pose():
+    pose = PoseCovariance(np.eye(3))
+    pose.narrow(np.diag([100.0, 0.01, 100.0]))
+    np.testing.assert_allclose(np.diag(pose.carried(None, NOISE))[[0, 2]], 1.0)
+    assert pose.carried(None, NOISE)[1, 1] == pytest.approx(0.01)
+
+
+def random_covariance(rng):
+    root = rng.normal(size=(3, 3))
+    return root @ root.T + 0.01 * np.eye(3)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_better_of_two_is_never_better_than_both_together(seed):
+    """And never worse than the first, whose directions it keeps where the second is hardly worse."""
+    rng = np.random.default_rng(seed)
+    first, second = random_covariance(rng), random_covariance(rng)
+    better = pose_covariance.better_of(first, second)
+    both = np.linalg.inv(np.linalg.inv(first) + np.linalg.inv(second))
+    assert np.linalg.eigvalsh(better - both).min() > -1e-9
+    larger = pose_covariance.larger_of(first, second)
+    for each in (first, second):
+        assert np.linalg.eigvalsh(larger - each).min() > -1e-9
+
+
+def test_of_two_alike_the_scan_holds():
+    better = pose_covariance.better_of(np.eye(3), 1.5 * np.eye(3))
+    assert 1.2 < better[0, 0] < 1.5
+    np.testing.assert_allclose(pose_covariance.better_of(np.eye(3), 100.0 * np.eye(3)), np.eye(3), atol=1e-9)
