@@ -13,7 +13,7 @@ from glass_nav.evaluation.metrics import replay_result, run_story
 from glass_nav.evaluation.metrics.replay_result import NO_BEAM, KeptScan
 from glass_nav.evaluation.pages import report_page
 from glass_nav.evaluation.plots import report_pictures
-from glass_nav.evaluation.plots.report import cases_over_time, driven_path, reliability
+from glass_nav.evaluation.plots.report import cases_over_time, driven_path, reliability, worst_scans
 from glass_nav.evaluation.plots.report.ground import Ground
 from glass_nav.vocabulary import BeamCase
 from glass_nav.world.grid_map import GridMap
@@ -178,7 +178,7 @@ def test_every_axis_of_a_report_has_a_name_and_a_unit(tmp_path, monkeypatch):
         figures.append(self)
 
     monkeypatch.setattr(Figure, "__init__", remember)
-    report_pictures.draw_all(tmp_path, a_result(worst=KEPT), Ground(GRID, None), None)
+    report_pictures.draw_all(tmp_path, a_result(worst=KEPT[:1]), Ground(GRID, None), None)
     assert len(figures) >= 6
     for figure in figures:
         for axes in figure.axes:
@@ -193,5 +193,5 @@ def test_the_worst_scan_is_laid_over_itself_at_the_true_pose(tmp_path):
         worst=[KeptScan(1, np.zeros(3), np.array([[2.0, 0.0]]))],
         map_from_base=np.array([[i, 1.0, 0.0] for i in range(4)], float),
     )
-    _, (picture,) = report_pictures.draw_all(tmp_path, result, Ground(empty, None), None)
+    picture = worst_scans.draw(tmp_path, result, Ground(empty, None), 1, result.worst[0])
     assert "where the same beams end at the true pose" in picture.caption
