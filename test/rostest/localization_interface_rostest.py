@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import numpy as np
 import rospy
 import rostest
+import tf2_ros
 from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped, Quaternion
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import SetMap, SetMapRequest
@@ -332,6 +333,18 @@ class LocalizationInterface(RoomTest):
         self.expect_right_pose()
         self.assertNotIn(self.status.last.state_name, ("LOST", "UNKNOWN"), self.status.last.reason)
         self.expect_understood()
+
+    def test_another_sender_of_map_to_odom_is_named(self) -> None:
+        other = tf2_ros.TransformBroadcaster()
+        here = conversions.transform_stamped(0, "map", "odom", np.array([3.0, 0.0, 0.0]))
+
+        def is_named() -> bool:
+            here.header.stamp = rospy.Time.now()
+            other.sendTransform(here)
+            return bool(self.lines.having("tf map -> odom comes from", "stop one of them", rospy.get_name()))
+
+        self.assertTrue(wait_until(is_named, 30.0), "nothing is said of the second sender")
+        self.expect_right_pose()
 
     # -- start and end of a node of its own
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 import tempfile
 import threading
@@ -256,11 +257,19 @@ class LocalizationStart(unittest.TestCase):
                     client.update_configuration(bad)
                 self.wait_for_line("parameters stay as they are", words)
                 self.assertEqual(client.get_configuration()["laser_z_hit"], 1.0)
+        self.check_dynparam(client)
         self.assertEqual(client.update_configuration({"restore_defaults": True})["laser_z_hit"], 0.95)
         self.check_many_at_once(client)
         self.assertTrue(self.is_right())
         self.end()
         self.assertFalse(rospy.has_param("/under_test/min_particles"), "the next start would take it as given")
+
+    def check_dynparam(self, client: Client) -> None:
+        """The command that doc/localization.md names."""
+        program = "/usr/lib/dynamic_reconfigure/dynparam"
+        command = [program] if Path(program).is_file() else ["rosrun", "dynamic_reconfigure", "dynparam"]
+        subprocess.run([*command, "set", "/under_test", "update_min_d", "0.2"], check=True, timeout=60.0)
+        self.assertEqual(client.get_configuration(timeout=10.0)["update_min_d"], 0.2)
 
     def check_many_at_once(self, client: Client) -> None:
         """Callers beside each other do not undo one another's values."""

@@ -7,6 +7,7 @@ from typing import Dict, Iterator, List, Sequence, Set, Tuple
 
 import numpy as np
 
+from glass_nav.checkup import sender_checks
 from glass_nav.checkup.finding import Finding
 from glass_nav.recording import frames
 from glass_nav.recording.observed import HeardScan, HeardTransform
@@ -17,6 +18,7 @@ _SAME_M, _SAME_TURN = 1e-3, 1e-3
 _GAP_S, _GAP_M, _GAP_RAD = 0.5, 0.2, 0.1  # of odometry during which the robot moved
 _IN_GAPS, _LONG_GAP_S = 0.01, 10.0  # share of the scans that may fall into such gaps, if none is that long
 _JUMP_M, _JUMP_M_S = 0.5, 8.0
+_FASTEST_M_S, _FASTEST_RAD_S = 10.0, 15.0  # in the mean over the log
 _UNCOVERED = 0.02  # share of the scans that may have no odometry: before it started, after it ended
 
 
@@ -38,7 +40,9 @@ def check_links(transforms: Sequence[HeardTransform]) -> Iterator[Finding]:
             "normalise the quaternion where it is made; tf2 drops such transforms",
         )
     yield from _parents(transforms)
-    yield from _contradictions(transforms)
+    contradictions = [*_contradictions(transforms)]
+    yield from contradictions
+    yield from () if contradictions else sender_checks.check(transforms)
 
 
 def _is_valid(each: HeardTransform) -> bool:
@@ -137,6 +141,13 @@ def check_coverage(
             "scans fall into the gaps",
             "look at the rate of the node that sends it (rosrun tf tf_monitor) and at the load of the "
             "computer: a live node drops these scans",
+        )
+    span_s = float(stamps_ns[-1] - stamps_ns[0]) * 1e-9
+    if way_m.sum() > _FASTEST_M_S * max(span_s, 1.0) or turn.sum() > _FASTEST_RAD_S * max(span_s, 1.0):
+        yield Finding(
+            "odometry-speed",
+            f"{link} drives {way_m.sum():.1f} m and turns {turn.sum():.1f} rad in {span_s:.1f} s: faster than any robot",
+            "look for a second node that sends it (rosrun tf tf_monitor), and at the units of the base's driver",
         )
     jump = (way_m > _JUMP_M) & (way_m > _JUMP_M_S * np.maximum(apart_s, 1e-3))
     if jump.any():

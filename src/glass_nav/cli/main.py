@@ -108,6 +108,9 @@ def _run(program: str, module: Any, arguments: argparse.Namespace) -> int:
     except (ValueError, OSError) as err:  # RecordingError, MapError, ParamError and others are ValueErrors
         print(f"{program}: {_one_line(err)}", file=sys.stderr)
         return BAD_INPUT
+    except MemoryError:
+        print(f"{program}: there is not enough memory for this input", file=sys.stderr)
+        return BAD_INPUT
     except KeyboardInterrupt:
         print(f"{program}: interrupted, nothing written", file=sys.stderr)
         return INTERRUPTED

@@ -56,6 +56,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "the map, as without a value at the end of the line",
     )
     parser.add_argument(
+        "--smooth",
+        action="store_true",
+        help="also smooth the whole log, past and future together, and compare the filter with it: smoothed.tum and "
+        "figures, a third opinion where there is no ground truth",
+    )
+    parser.add_argument(
         "--fail-if",
         action="append",
         default=[],
@@ -86,7 +92,7 @@ def main(arguments: argparse.Namespace) -> bool:
     Raises:
         RecordingError, MapError, AtlasError, ParamError, ValueError, OSError: bad input; one line.
     """
-    outputs = Outputs(arguments.out, arguments.bag, arguments.topology, not arguments.no_picture)
+    outputs = Outputs(arguments.out, arguments.bag, arguments.topology, not arguments.no_picture, arguments.smooth)
     metrics = run(_options(arguments), outputs)
     failures = [failure for failure in (each.failure(metrics) for each in _thresholds(arguments)) if failure]
     for failure in failures:
@@ -113,9 +119,15 @@ def run(options: ReplayOptions, outputs: Outputs) -> Dict[str, Any]:
     for reason, count in result.refusals.most_common():
         _say(f"{count} scans rejected: {reason}")
     passed = None if topology is None else topology.metrics()
-    print("\n".join(replay_table.run_lines(result) + replay_table.topology_lines(passed)))
+    smoothed = None if replay.smoothed is None else replay.smoothed.metrics()
+    lines = replay_table.run_lines(result) + replay_table.smoothed_lines(smoothed) + replay_table.topology_lines(passed)
+    print("\n".join(lines))
     print(f"written to {outputs.folder}" + ("" if outputs.bag is None else f" and {outputs.bag}"))
-    return {**result.metrics(), **({} if passed is None else {"topology": passed})}
+    return {
+        **result.metrics(),
+        **({} if passed is None else {"topology": passed}),
+        **({} if smoothed is None else {"smoothed": smoothed}),
+    }
 
 
 def _options(arguments: argparse.Namespace) -> ReplayOptions:

@@ -13,6 +13,7 @@ from typing import Optional
 
 import numpy as np
 
+_JUMP_NS = 1_000_000_000  # stamps that go back by more are of a clock that was set back
 _AHEAD_NS = 500_000_000  # a scan stamped further in the future has a wrong clock, and tf would keep its stamp
 
 
@@ -33,9 +34,9 @@ class MapToOdom:
         self._last_sent_ns = 0
 
     def start_over(self) -> None:
-        """The pose is no longer known, and stamps may go back."""
+        """The pose is no longer known, and the clock may have been set back."""
         self._map_from_odom = None
-        self._last_scan_ns = self._last_sent_ns = 0
+        self._last_scan_ns = 0
 
     def arrived(self, scan_ns: int, now_ns: int, tolerance_ns: int) -> Optional[StampedTransform]:
         """A scan has come: the last correction again, if there is one. Not for a scan older than another."""
@@ -51,6 +52,8 @@ class MapToOdom:
         return None if is_sent else self._stamped(scan_ns, tolerance_ns, self._map_from_odom)
 
     def _stamped(self, scan_ns: int, tolerance_ns: int, map_from_odom: np.ndarray) -> StampedTransform:
+        if self._last_scan_ns == 0 and scan_ns + tolerance_ns < self._last_sent_ns - _JUMP_NS:
+            self._last_sent_ns = 0
         self._last_scan_ns = max(scan_ns, self._last_scan_ns)
         self._last_sent_ns = max(scan_ns + tolerance_ns, self._last_sent_ns + 1)
         return StampedTransform(self._last_sent_ns, map_from_odom)

@@ -11,14 +11,18 @@ from typing import Any, Callable, Dict, List, Optional
 import numpy as np
 
 from glass_nav import params
-from glass_nav.evaluation.metrics import replay_result
+from glass_nav.evaluation.metrics import replay_result, smoothed_score
 from glass_nav.evaluation.metrics.passed_nodes import TopologyScore
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
+from glass_nav.evaluation.metrics.smoothed_score import SmoothedScore
 from glass_nav.evaluation.plots import run_pictures
 from glass_nav.localization.localizer import Estimate
+from glass_nav.recording import trajectory_file
 from glass_nav.recording.recording import Step
 from glass_nav.replay import replay_bag, replay_topology
 from glass_nav.replay.prepared_replay import Listener, PreparedReplay
+from glass_nav.replay.smoother import Smoother
+from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.world import map_file
 from glass_nav.world.grid_map import GridMap
 
@@ -31,6 +35,7 @@ class Outputs:
     bag: Optional[Path] = None  # for rviz and PlotJuggler
     topology: Optional[str] = None  # name of an atlas, see replay_topology.atlas_of()
     pictures: bool = True
+    smooth: bool = False  # also smoothed.tum, and the filter scored against it
 
 
 class FiledReplay:
@@ -47,6 +52,8 @@ class FiledReplay:
         if outputs.topology is not None:
             atlas = replay_topology.atlas_of(outputs.topology, ready.options.map, ready.grid_map)
             self._watch = replay_topology.Watch(atlas, ready.grid_map)
+        self._smoother = Smoother(DistanceField(ready.grid_map)) if outputs.smooth else None
+        self.smoothed: Optional[SmoothedScore] = None  # after write()
         outputs.folder.mkdir(parents=True, exist_ok=True)
         if outputs.bag is not None:
             outputs.bag.parent.mkdir(parents=True, exist_ok=True)
@@ -60,6 +67,8 @@ class FiledReplay:
         ready, path = self._ready, self._outputs.bag
         with ExitStack() as stack:
             listeners: List[Listener] = [] if self._watch is None else [self._watch.listen]
+            if self._smoother is not None:
+                listeners.append(self._smoother.listen)
             if path is not None:
                 bag = replay_bag.listener(path, ready.recording, ready.localizer, ready.grid_map)
                 listeners.append(stack.enter_context(bag))
@@ -70,6 +79,7 @@ class FiledReplay:
         ready, folder = self._ready, self._outputs.folder
         grid_map, options = ready.grid_map, ready.options
         topology = self._write_topology(result)
+        self.smoothed = self._write_smoothed(result)
         about: Dict[str, Any] = {
             "log": " ".join(map(str, options.log)),
             "map": str(options.map),
@@ -78,6 +88,7 @@ class FiledReplay:
             "params": params.as_mapping(ready.settings.localizer),
             "versions": versions(),
             **({} if topology is None else {"topology": topology.metrics()}),
+            **({} if self.smoothed is None else {"smoothed": self.smoothed.metrics()}),
         }
         replay_result.write(result, folder, about)
         glass = GridMap(ready.localizer.glass_map.occupancy(), grid_map.resolution_m, grid_map.map_from_grid)
@@ -87,6 +98,13 @@ class FiledReplay:
             if result.case_scores is not None:
                 run_pictures.draw_cases(folder / "cases.png", grid_map, result, ready.recording.name)
         return topology
+
+    def _write_smoothed(self, result: ReplayResult) -> Optional[SmoothedScore]:
+        if self._smoother is None:
+            return None
+        smoothed = self._smoother.smooth()
+        trajectory_file.save_tum(self._outputs.folder / "smoothed.tum", smoothed)
+        return smoothed_score.of(smoothed, result)
 
     def _write_topology(self, result: ReplayResult) -> Optional[TopologyScore]:
         if self._watch is None:

@@ -25,10 +25,11 @@ class KnownArea:
         near = int(round(_NEAR_WALL_M / grid_map.resolution_m))
         self._border = near + 1  # cells around the grid
         unknown = np.pad(grid_map.occupancy == UNKNOWN, self._border, constant_values=True)
-        known = ~_grown(unknown, _BESIDE_CELLS) | _grown(np.pad(grid_map.occupied, self._border), near)
-        self._known = known.ravel()
-        self._stride = known.shape[1]
-        self._last = np.array(known.shape) - 1
+        near_wall = _grown(np.pad(grid_map.occupied, self._border), near)
+        self._known = (~_grown(unknown, _BESIDE_CELLS) | near_wall).ravel()
+        self._unknown = unknown.ravel()
+        self._stride = unknown.shape[1]
+        self._last = np.array(unknown.shape) - 1
 
     def contains(self, points_m: np.ndarray) -> np.ndarray:
         """Whether the map knows something of places.
@@ -40,10 +41,11 @@ class KnownArea:
             (...) bool; False in unknown cells, outside of the grid, and within 3 cells of either, unless a wall is
             within half a metre.
         """
-        rows, columns = self._grid_map.cells(points_m)
-        rows = np.clip(rows + self._border, 0, self._last[0])  # the outermost cells are unknown
-        columns = np.clip(columns + self._border, 0, self._last[1])
-        return self._known[rows * self._stride + columns]
+        return self._known[self._cell(points_m)]
+
+    def is_unmapped(self, points_m: np.ndarray) -> np.ndarray:
+        """(...) bool: the mapper did not see points (..., 2) [m]: unknown cells, and all outside of the grid."""
+        return self._unknown[self._cell(points_m)]
 
     def ends(self, points_m: np.ndarray, map_from_base: np.ndarray) -> np.ndarray:
         """Which beams of a scan end where the map knows something, seen from each pose.
@@ -56,6 +58,12 @@ class KnownArea:
             (P, B) bool.
         """
         return self.contains(se2.transform_points(np.asarray(map_from_base, float)[:, None], points_m))
+
+    def _cell(self, points_m: np.ndarray) -> np.ndarray:
+        rows, columns = self._grid_map.cells(points_m)
+        rows = np.clip(rows + self._border, 0, self._last[0])  # the outermost cells are unknown
+        columns = np.clip(columns + self._border, 0, self._last[1])
+        return rows * self._stride + columns
 
 
 def _grown(cells: np.ndarray, reach: int) -> np.ndarray:

@@ -115,6 +115,18 @@ def second_value(_: int, each: Any) -> List[Any]:
     return [each, other]
 
 
+def beside(sends: Callable[[int], Any]) -> Callable[[int, Any], Any]:
+    """A second node sends the transform as well, 0.3 m and 0.1 rad off, with stamps a third of a period later."""
+
+    def change(index: int, each: Any) -> Any:
+        if not sends(index):
+            return each
+        other = with_planar(copy.deepcopy(each), faults.planar(each) + [0.3, 0.0, 0.1])
+        return [each, with_stamp(other, lambda ns: ns + 6 * 10**6)]
+
+    return change
+
+
 def parents_in_turns(index: int, each: Any) -> Any:
     each.header.frame_id = "odom_ekf" if index % 2 else "odom"
     return each
@@ -196,6 +208,8 @@ ON_EACH_MESSAGE: "List[Tuple[str, faults.Change, Set[str]]]" = [
     ("frame-two-parents", links(parents_in_turns), set()),
     ("frame-slash", links(slashed), set()),
     ("tf-contradiction", links(second_value), set()),
+    ("tf-two-senders", links(beside(lambda i: 1)), {"odometry-speed"}),
+    ("tf-two-senders", links(beside(lambda i: i % 3 == 0)), {"odometry-speed"}),
     ("tf-invalid", links(longer_quaternion), set()),
     ("lidar-tilted", links(tilted, "laser"), set()),
 ]

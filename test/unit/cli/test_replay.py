@@ -46,6 +46,17 @@ def figures(tmp_path):
     return json.loads((tmp_path / "out" / "metrics.json").read_text())
 
 
+def test_a_smoothed_replay_says_how_far_the_filter_is_from_the_whole_log(run, room_bag, tmp_path):
+    code, out, _ = run(room_bag().write(), "--smooth", "--no-picture")
+    assert code == 0
+    smoothed = np.loadtxt(tmp_path / "out" / "smoothed.tum")
+    np.testing.assert_array_equal(smoothed[:, 0], np.loadtxt(tmp_path / "out" / "trajectory.tum")[:, 0])
+    scores = figures(tmp_path)["smoothed"]
+    assert 0.0 < scores["filter_from_smoothed"]["position_max_m"] < 0.2
+    assert scores["smoothed_from_truth"]["position_max_m"] < 0.1
+    assert "from smoothed   mean 0.0" in out and "smoothed error  mean 0.0" in out
+
+
 def test_a_replay_follows_the_robot_and_writes_everything(run, room_bag, tmp_path):
     code, out, err = run(room_bag().write())
     assert code == 0

@@ -6,6 +6,7 @@ import gc
 import weakref
 from dataclasses import replace
 
+import made_pane_drive
 import numpy as np
 import pytest
 from buildings import BASE_FROM_LASER, GLASS_ROOM, L_ROOM, SECOND_NS, Building, loop_drive, odometry, off
@@ -1159,3 +1160,74 @@ def test_bearings_that_cannot_be_used_are_refused_and_change_nothing(drive):
     with pytest.raises(ValueError, match="^odometry of bearings must be finite x, y, yaw, got "):
         localizer.add_bearings(tags_seen(drive.true[0]), TAGS, np.array([0.0, np.nan, 0.0]))
     same(localizer.update(drive.scans[0], drive.odometry[0]), other.update(drive.scans[0], drive.odometry[0]))
+
+
+# -- it keeps to odometry where scans say nothing
+
+
+def test_where_the_map_lacks_what_is_around_the_robot_odometry_carries_the_pose():
+    """A hall with a door to a place that is not drawn: beams end far from any wall, ever other ones."""
+    drive = Drive(steps=14)
+    localizer = started(update_min_d=0.05)
+    drive.through(localizer)
+    rng = np.random.default_rng(3)
+    true, odom, last = drive.true[-1], drive.odometry[-1], drive.scans[-1]
+    step = np.array([0.15, 0.0, 0.02])
+    for number in range(1, 60):
+        true, odom = se2.compose(true, step), se2.compose(odom, step)
+        ranges_m = rng.uniform(3.0, 11.0, len(last))
+        estimate = localizer.update(replace(last, stamp_ns=last.stamp_ns + number * SECOND_NS, ranges_m=ranges_m), odom)
+        away_m, away_rad = off(estimate.map_from_base, true)
+        assert away_m < 0.05 + 0.02 * 0.15 * number and away_rad < np.radians(3.0)
+    assert estimate.state != "LOCALIZED"
+
+
+def test_a_pose_that_scans_led_astray_goes_back_to_dead_reckoning_when_they_say_nothing():
+    drive = Drive(steps=14)
+    localizer = started(update_min_d=0.05)
+    drive.through(localizer, last=12)
+    localizer._filter.move_to(drive.true[11] + [0.6, 0.4, 0.8])
+    outside = replace(drive.scans[12], ranges_m=np.full(len(drive.scans[12]), 9.0))
+    estimate = localizer.update(outside, drive.odometry[12])
+    away_m, away_rad = off(estimate.map_from_base, drive.true[12])
+    assert away_m < 0.05 and away_rad < np.radians(2.0)
+
+
+# -- glass that the map lacks
+
+
+@pytest.fixture(scope="module")
+def past_a_pane():
+    """A localizer after a drive past a pane that its map lacks, with all scans and poses."""
+    scans = list(made_pane_drive.scans(made_pane_drive.pane((2.0, 2.0), (8.0, 2.0))))
+    localizer = started(grid_map=made_pane_drive.hall(), at=scans[0][1])
+    for scan, pose in scans:
+        localizer.update(scan, pose)
+    return localizer, scans
+
+
+def test_a_pane_that_the_map_lacks_is_found_and_is_glass(past_a_pane):
+    localizer, _ = past_a_pane
+    (pane,) = localizer.unmapped_panes
+    np.testing.assert_allclose(np.array([pane.start_m, pane.end_m])[:, 1], 2.0, atol=0.1)
+    assert pane.length_m > 3.0
+    assert localizer.found_panes[0].probability >= 0.9
+    grid_map = made_pane_drive.hall()
+    row, column = grid_map.cells(np.array([4.0, 2.0]))
+    assert localizer.glass_map.occupancy()[row - 1 : row + 2, column].max() > 80
+    assert not grid_map.occupied[row - 1 : row + 2, column].any()
+
+
+def test_what_a_run_found_the_next_one_knows_at_once_and_beams_end_at_it(past_a_pane):
+    before, scans = past_a_pane
+    scan, pose = scans[40]
+    cut = []
+    for remembers in (True, False):
+        localizer = started(grid_map=made_pane_drive.hall(), at=pose)
+        if remembers:
+            localizer.remember(before.found_panes, before.glass_map.arrays())
+            assert len(localizer.unmapped_panes) == 1
+        cut.append(np.count_nonzero(localizer.update(scan, pose).surface_scan.cut))
+    assert cut[0] > 100 and cut[1] == 0
+    with pytest.raises(ValueError, match="a glass map needs cells"):
+        localizer.remember((), {"glass_cell": np.zeros((2, 2))})

@@ -58,9 +58,17 @@ def test_stamps_only_ascend_when_a_later_correction_is_of_an_older_scan_or_the_t
     assert np.all(np.diff([each.stamp_ns for each in stamps]) > 0)
 
 
-def test_starting_over_forgets_pose_and_stamps():
+def test_starting_over_forgets_the_pose_and_sends_no_stamp_twice():
     sender = MapToOdom()
     sender.corrected(100 * MS, ONE, 50 * MS)
     sender.start_over()
     assert sender.arrived(200 * MS, 200 * MS, 50 * MS) is None
-    assert sender.corrected(50 * MS, OTHER, 50 * MS).stamp_ns == 100 * MS
+    assert sender.corrected(100 * MS, OTHER, 50 * MS).stamp_ns == 150 * MS + 1
+
+
+def test_after_the_clock_was_set_back_stamps_are_those_of_the_scans_again():
+    sender = MapToOdom()
+    sender.corrected(9000 * MS, ONE, 50 * MS)
+    sender.start_over()
+    assert sender.corrected(100 * MS, OTHER, 50 * MS).stamp_ns == 150 * MS
+    assert sender.arrived(200 * MS, 200 * MS, 50 * MS).stamp_ns == 250 * MS

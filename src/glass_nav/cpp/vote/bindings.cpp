@@ -19,7 +19,7 @@ py::array_t<double> case_votes(const Array<double>& measured_m, const Array<doub
                                const Array<float>& thickness_m, const Array<double>& prior, double nothing,
                                double depth_share, double sigma_m, double gate_m, double min_cos, double temper) {
   if (measured_m.ndim() != 1) throw std::invalid_argument("measured must be (B,)");
-  const py::ssize_t beams = measured_m.shape(0), paths = kPaths;
+  const py::ssize_t beams = measured_m.shape(0), paths = kPaths, others = kOthers;
   const auto fits = [&](const py::array& array) {
     return array.ndim() == 3 && array.shape(0) == paths && array.shape(1) == range_m.shape(1) &&
            array.shape(2) == beams;
@@ -27,8 +27,8 @@ py::array_t<double> case_votes(const Array<double>& measured_m, const Array<doub
   if (range_m.ndim() != 3 || range_m.shape(1) < 1 || !fits(range_m) || !fits(cos) || !fits(thickness_m)) {
     throw std::invalid_argument("ranges, cosines and thicknesses must be (4, N, B)");
   }
-  if (prior.ndim() != 2 || prior.shape(0) != paths + 1 || prior.shape(1) != beams) {
-    throw std::invalid_argument("priors must be (5, B)");
+  if (prior.ndim() != 2 || prior.shape(0) != paths + others || prior.shape(1) != beams) {
+    throw std::invalid_argument("priors must be (6, B)");
   }
   py::array_t<double> share({paths + 1, beams});
   const Offers offers{static_cast<std::size_t>(range_m.shape(1)),

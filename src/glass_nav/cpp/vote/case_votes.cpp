@@ -8,6 +8,7 @@ namespace glass_nav {
 namespace {
 
 constexpr std::size_t kFirst = 0, kMirrored = 1, kSecond = 2;
+constexpr std::size_t kGone = kPaths, kElsewhere = kPaths + 1;  // rows of the priors
 constexpr double kMostSquare = 100.0;  // of a residual in sigmas
 
 /// Weights of the samples, sum 1, from their log evidence.
@@ -41,14 +42,18 @@ void count_case_votes(const Offers& offers, const Chances& chances, double* shar
           end_m += 2.0 * first_depth * offers.cos[kFirst * plane + i];  // a mirror lies that much deeper
         const double across = (z - end_m) * cos;
         if (!(std::abs(across) <= chances.gate_m)) continue;
-        const double sigmas = across / chances.sigma_m;
-        const double density = std::exp(-0.5 * std::min(sigmas * sigmas, kMostSquare));
+        // An error of the mirror's own place counts twice, along its normal.
+        const double widening =
+            path == kMirrored ? std::hypot(1.0, 2.0 * offers.cos[kFirst * plane + i]) : 1.0;
+        const double sigmas = across / (chances.sigma_m * widening);
+        const double density = std::exp(-0.5 * std::min(sigmas * sigmas, kMostSquare)) / widening;
         const double of_path = chances.prior[path * beams + b] * density;
         if (path == kSecond) at_second = density;
         joint[(path + 1) * plane + i] = of_path;
         total += of_path;
       }
-      const double nothing = uncertain + chances.prior[kPaths * beams + b] * at_second;
+      const double nothing =
+          uncertain + chances.prior[kGone * beams + b] * at_second + chances.prior[kElsewhere * beams + b];
       joint[i] = nothing;
       weight[n] += std::log(total + nothing);
     }

@@ -7,7 +7,8 @@
 
 namespace glass_nav {
 
-constexpr std::size_t kPaths = 4;  // to the first surface, mirrored there, to the second and the third
+constexpr std::size_t kPaths = 4;   // to the first surface, mirrored there, to the second and the third
+constexpr std::size_t kOthers = 2;  // ends on no map: at the second surface where the first is gone; anywhere else
 
 /// Expected and measured ranges. Row-major arrays of kPaths * samples * beams, or beams.
 struct Offers {
@@ -20,7 +21,7 @@ struct Offers {
 
 /// How a beam may end.
 struct Chances {
-  const double* prior;  // (kPaths + 1) * beams: of the cases in the order of the paths; last, see gone
+  const double* prior;  // (kPaths + kOthers) * beams: of the cases in the order of the paths, then of other ends
   double nothing;       // prior of meeting something that is on no map
   double depth_share;   // of the thickness of a wall: how deep in it beams end
   double sigma_m;       // around that, across the wall
@@ -30,8 +31,8 @@ struct Chances {
 };
 
 /// Writes shares of the vote, (kPaths + 1) * beams: nothing on the map, then the cases in the order of the paths; the
-/// shares of each beam add up to 1. The last prior is that of a beam to end at the second surface where the first is
-/// gone, which is on no map either.
+/// shares of each beam add up to 1. The prior of an end anywhere else is a density on the scale of the others, which are
+/// 1 at the peak: it does not depend on the sample.
 void count_case_votes(const Offers& offers, const Chances& chances, double* share);
 
 }  // namespace glass_nav

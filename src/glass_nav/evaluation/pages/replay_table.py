@@ -105,6 +105,23 @@ def _metres(value: Optional[float]) -> str:
     return "infinite" if value is None else f"{value:.3f} m"
 
 
+def smoothed_lines(figures: Optional[Dict[str, Any]]) -> List[str]:
+    """Distances of the filter and the ground truth from the smoothed trajectory; none if it was not asked for."""
+    if figures is None:
+        return []
+    lines = [f"from smoothed   {_distances(figures['filter_from_smoothed'])}"]
+    if figures["smoothed_from_truth"]["position_mean_m"] is not None:
+        lines.append(f"smoothed error  {_distances(figures['smoothed_from_truth'])}")
+    return lines
+
+
+def _distances(errors: Dict[str, Optional[float]]) -> str:
+    return (
+        f"mean {_metres(errors['position_mean_m'])}  rmse {_metres(errors['position_rmse_m'])}  "
+        f"max {_metres(errors['position_max_m'])}  yaw mean {_figure(errors['yaw_mean_deg'], 2)} deg"
+    )
+
+
 def topology_lines(figures: Optional[Dict[str, Any]]) -> List[str]:
     """The figures of TopologyScore.metrics() for people; none where no atlas was given."""
     if figures is None:

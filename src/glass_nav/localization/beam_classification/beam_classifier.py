@@ -7,10 +7,11 @@ walls of this map beams end, and which of its walls are glass. B beams.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Sequence, Tuple
+from typing import Callable, Sequence, Tuple
 
 import numpy as np
 
+from glass_nav.geometry import se2
 from glass_nav.localization.beam_classification import (
     beam_evidence,
     case_votes,
@@ -57,6 +58,7 @@ class BeamClassifier:
     def __init__(self, params: BeamClassifierParams, grid_map: GridMap) -> None:
         self._params = params
         self.caster = RayCaster(grid_map, params.raycast_backend, params.raycast_threads)
+        self.known_area = KnownArea(grid_map)
         self.thickness_m = wall_thickness.wall_thickness(grid_map)  # (H * W,)
         self.residuals = RangeResiduals(_DEPTH_SHARE, params.min_sigma_m)
         self.glass_map = GlassMap(grid_map, params.glass)
@@ -98,7 +100,15 @@ class BeamClassifier:
         behind_m = max(case_votes.reach_m(self.residuals, self._params.vote), glass_map.reach_m(self.residuals))
         expected = self._expected(scan, samples, behind_m)
         glass = self.glass_map.chances(expected.cell[[0, 2], 0])
-        cases = case_votes.classify(scan.ranges_m, expected, self.residuals, self._params.vote, glass, scan.range_max_m)
+        cases = case_votes.classify(
+            scan.ranges_m,
+            expected,
+            self.residuals,
+            self._params.vote,
+            glass,
+            scan.range_max_m,
+            self._at_ends(self.known_area.is_unmapped, scan, map_from_base),
+        )
         return cases, expected
 
     def expected_at(self, scan: Scan, map_from_base: np.ndarray) -> ExpectedRanges:
@@ -134,13 +144,19 @@ class BeamClassifier:
         )
 
     def evidence(
-        self, scan: Scan, cases: BeamCases, expected: ExpectedRanges, map_from_base: np.ndarray, known_area: KnownArea
+        self, scan: Scan, cases: BeamCases, expected: ExpectedRanges, map_from_base: np.ndarray
     ) -> BeamEvidence:
         """How much of the scan speaks for the pose (3,), of which `expected` is, and how much against it."""
-        known_end = np.zeros(len(scan), bool)
-        known_end[scan.answered] = known_area.ends(scan.points_in_base()[scan.answered], map_from_base[None])[0]
         seen_through = self.glass_map.chances(expected.cell[0, 0])[0]
+        known_end = self._at_ends(self.known_area.contains, scan, map_from_base)
         return beam_evidence.of(scan.ranges_m, cases.case, expected, seen_through, known_end)
+
+    @staticmethod
+    def _at_ends(holds: Callable[[np.ndarray], np.ndarray], scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
+        """(B,) bool: the beam returned, and from a point where that holds."""
+        ends = scan.answered.copy()
+        ends[ends] = holds(se2.transform_points(map_from_base, scan.points_in_base()[ends]))
+        return ends
 
     @property
     def max_glass_thickness_m(self) -> float:
@@ -167,4 +183,5 @@ class BeamClassifier:
             self.max_glass_thickness_m,
             self.min_linearity,
             behind_m,
+            mirrored_by_line=self._params.vote.vote_mode != "paper",  # the document casts on the cells
         )

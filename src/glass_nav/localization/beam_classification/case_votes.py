@@ -11,12 +11,12 @@ and in which neighbouring beams pull each other. N samples, B beams.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Tuple
+from typing import Optional, Tuple
 
 import numpy as np
 
 from glass_nav import _beam_vote
-from glass_nav.localization.beam_classification import glass_return_model
+from glass_nav.localization.beam_classification import behind_panes, glass_return_model
 from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, ExpectedRanges
 from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
 from glass_nav.params import choice, number
@@ -27,12 +27,12 @@ _TIE_ORDER = (BeamCase.DIFFUSE, BeamCase.FIRST_PENETRATION, BeamCase.SECOND_PENE
 _GATE_SIGMAS = 3.0
 _OTHER_SURFACE_M = 0.3  # between two expected ranges: an edge lies between them
 _REPORTED_GATES = 2.0  # the samples that won the vote may be one gate away from the reported pose
-_PANE_INDEX = 1.51  # of soda-lime glass
-_WALL_OVER_DARK = 5.0  # reflectance of a wall over that of the darkest one seen at the largest range
 _UNSEEN_SIDE = 0.002  # probability that a beam meets a wall from an unmapped side, over that from the mapped side
 _MIN_SEEN_THROUGH = 0.05  # a cell may hold a post and the edge of the pane beside it
+_MIRROR_MIN_SHARE = 0.78  # of the vote: a beam that is called mirrored wrongly costs more than an uncertain one
 _TEMPER = 0.2  # of a sample's evidence: the errors of beams are correlated, and the best sample shall not vote alone
 _REACH, _ROUNDS = 2, 3  # of the pull between neighbouring beams
+_MIRRORED = BeamCase.SPECULAR - 1  # row of the expected ranges
 _BY_SAMPLE = ("range_m", "cos_incidence", "thickness_m")  # fields of ExpectedRanges that hold all samples
 
 
@@ -90,6 +90,7 @@ def classify(
     vote: CaseVote,
     glass: np.ndarray,
     max_range_m: float,
+    unmapped_end: Optional[np.ndarray] = None,
 ) -> BeamCases:
     """Cases of the beams of one scan.
 
@@ -102,13 +103,22 @@ def classify(
         glass: (2, 2, B) probabilities that the first and the second surface at sample 0 can be seen through, and if so
             that they are there; for the soft vote.
         max_range_m: of the lidar; for the soft vote.
+        unmapped_end: (B,) bool: the mapper did not see the place where the beam ended; None: it saw all. For the soft
+            vote.
     """
     answered = np.isfinite(measured_m)
     if vote.vote_mode == "paper":
         share = _paper_votes(measured_m, expected, residuals, vote)  # (5, B), column sums 1
     else:
-        prior = _priors(_inside_walls(_of_sample_0(expected), residuals), glass, max_range_m, vote)
-        share = _pulled(_soft_votes(measured_m, expected, residuals, vote, prior), answered, vote.neighbour_pull)
+        if unmapped_end is None:
+            unmapped_end = np.zeros(len(measured_m), bool)
+        at_pose = _inside_walls(_of_sample_0(expected), residuals)
+        prior = _priors(measured_m, at_pose, residuals, glass, max_range_m, unmapped_end, vote)
+        alone = _soft_votes(measured_m, expected, residuals, vote, prior)
+        share = _pulled(alone, answered, vote.neighbour_pull)
+        doubtful = alone[BeamCase.SPECULAR] < _MIRROR_MIN_SHARE  # and neighbours would only repeat it
+        share[BeamCase.UNCERTAIN, doubtful] += share[BeamCase.SPECULAR, doubtful]
+        share[BeamCase.SPECULAR, doubtful] = 0.0
     share[:, ~answered] = np.array([1.0, 0.0, 0.0, 0.0, 0.0])[:, None]
     won, beam = _winner(share), np.arange(len(measured_m))
     case = np.where(answered & (share[won, beam] >= vote.case_min_share), won, BeamCase.UNCERTAIN)
@@ -177,7 +187,7 @@ def _inside_walls(expected: ExpectedRanges, residuals: RangeResiduals) -> Expect
     depth = residuals.depth_share * expected.thickness_m
     shift = depth / np.maximum(expected.cos_incidence, MIN_COS)
     mirror = BeamCase.DIFFUSE - 1
-    shift[BeamCase.SPECULAR - 1] += 2.0 * depth[mirror] * expected.cos_incidence[mirror]  # it lies so much deeper
+    shift[_MIRRORED] += 2.0 * depth[mirror] * expected.cos_incidence[mirror]  # it lies so much deeper
     return replace(expected, range_m=expected.range_m + shift)
 
 
@@ -208,7 +218,7 @@ def _soft_votes(
     """(5, B) posterior over the cases; samples are weighted by how well each explains the scan.
 
     The density around an expected range is normal of width residuals.sigma_m, cut at the gate, across the surface; each
-    case has its prior, (5, B) of _priors(), times that density. The samples are summed before the cases compete: a
+    case has its prior, (6, B) of _priors(), times that density. The samples are summed before the cases compete: a
     corner that some of them graze and others miss is no surface to explain the beam by, if without it a likelier case
     does. The evidence of a sample is the product over the beams that answered, to the power of _TEMPER over the root of
     their number.
@@ -239,8 +249,17 @@ def gate_m(residuals: RangeResiduals, vote: CaseVote) -> float:
     return max(vote.case_gate_m, _GATE_SIGMAS * residuals.sigma_m)
 
 
-def _priors(expected: ExpectedRanges, glass: np.ndarray, max_range_m: float, vote: CaseVote) -> np.ndarray:
-    """(5, B) prior of cases 1 to 4, and last of an end at the second surface where the first is gone (case 0).
+def _priors(
+    measured_m: np.ndarray,
+    expected: ExpectedRanges,
+    residuals: RangeResiduals,
+    glass: np.ndarray,
+    max_range_m: float,
+    unmapped_end: np.ndarray,
+    vote: CaseVote,
+) -> np.ndarray:
+    """(6, B) prior of cases 1 to 4, then of the ends that are case 0: at the second surface where the first is gone, and
+    behind a pane at something that no map shows, as a density on the scale of those of the cases.
 
     From the probability of glass and the glass return model at that incidence.
     """
@@ -248,36 +267,18 @@ def _priors(expected: ExpectedRanges, glass: np.ndarray, max_range_m: float, vot
     (first, second), (there, _) = glass
     first = np.clip(first, _MIN_SEEN_THROUGH, 1.0)
     passes = first * there * (1.0 - glass_return_model.min_share(incidence))
-    mirrored = passes * _chance_of_a_mirror(expected, max_range_m, vote.mirror_gain)
+    echoes = behind_panes.of(measured_m, expected, residuals.sigma_m, max_range_m, vote.mirror_gain, unmapped_end)
+    mirrored = passes * echoes.mirrored
     behind = (passes - mirrored) * (1.0 - vote.prior_uncertain_behind)
     passes_again = second * (1.0 - glass_return_model.min_share(np.full(len(first), np.nan)))
     gone = first * (1.0 - there)
-    prior = np.stack([1.0 - passes - gone, mirrored, behind * (1.0 - passes_again), behind * passes_again, gone])
+    peak_m = np.sqrt(2.0 * np.pi) * residuals.sigma_m / np.maximum(expected.cos_incidence[_MIRRORED, 0], MIN_COS)
+    unmapped = passes * echoes.unmapped * peak_m
+    prior = np.stack(
+        [1.0 - passes - gone, mirrored, behind * (1.0 - passes_again), behind * passes_again, gone, unmapped]
+    )
     prior[1:4] *= np.where(expected.seen_side[1:], 1.0, _UNSEEN_SIDE)
     return (1.0 - vote.prior_uncertain) * prior
-
-
-def _chance_of_a_mirror(expected: ExpectedRanges, max_range_m: float, gain: float) -> np.ndarray:
-    """(B,) probability that a mirrored echo is the strongest one, at sample 0; 0 where nothing can mirror.
-
-    Echo powers as in the lidar equation for diffuse targets: T^2 / d3^2 behind the pane, R^2 / d2^2 along the path
-    over the mirror (Fresnel, unpolarised, two surfaces); one must be above what the lidar still sees of a dark wall at its
-    largest range. Reflectances of walls differ by factors: the probability rises over one decade.
-    """
-    incidence = np.nan_to_num(expected.pane_incidence[0])
-    inside = np.arcsin(np.sin(incidence) / _PANE_INDEX)
-    parallel, across = np.cos(incidence), np.cos(inside)
-    r_s = ((parallel - _PANE_INDEX * across) / (parallel + _PANE_INDEX * across)) ** 2
-    r_p = ((across - _PANE_INDEX * parallel) / (across + _PANE_INDEX * parallel)) ** 2
-    surface = 0.5 * (r_s + r_p)
-    reflected = np.minimum(gain * 2.0 * surface / (1.0 + surface), 0.9)
-    behind_m = expected.range_m[BeamCase.FIRST_PENETRATION - 1, 0]
-    mirrored_m = expected.range_m[BeamCase.SPECULAR - 1, 0]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        wins = (reflected * behind_m / ((1.0 - reflected) * mirrored_m)) ** 2
-        seen = (reflected * max_range_m / mirrored_m) ** 2 * _WALL_OVER_DARK
-        chance = 1.0 / (1.0 + 1.0 / wins) / (1.0 + 1.0 / seen)
-    return np.where(np.isfinite(mirrored_m), np.nan_to_num(chance, nan=0.0), 0.0)
 
 
 def _pulled(share: np.ndarray, answered: np.ndarray, pull: float) -> np.ndarray:

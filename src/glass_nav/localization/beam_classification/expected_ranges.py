@@ -49,6 +49,7 @@ def of(
     max_thickness_m: float,
     min_linearity: float,
     behind_m: float = np.inf,
+    mirrored_by_line: bool = True,
 ) -> ExpectedRanges:
     """Expected ranges of every beam of the scan from every sample.
 
@@ -61,6 +62,7 @@ def of(
         min_linearity: below it a surface has no normal: no mirrored range.
         behind_m: all samples but the first look no farther behind the end of a beam than that, and nowhere where a beam
             did not return; inf: everywhere.
+        mirrored_by_line: the mirrored ranges are those by the lines of the walls; else by their cells.
     """
     from_laser = se2.compose(samples, scan.base_from_laser)
     paths = caster.cast_paths(from_laser, scan.angles_rad, _reach_m(scan, behind_m), max_thickness_m, min_linearity)
@@ -74,6 +76,10 @@ def of(
     range_m[:, 0] = np.concatenate([hits.first_m, hits.mirrored_m, hits.second_m, hits.third_m])
     cell[:, 0] = np.concatenate([hits.first_cell, hits.mirrored_cell, hits.second_cell, hits.third_cell])
     cos[:, 0] = cos_incidence(caster, np.stack([beam_rad, mirrored_rad, beam_rad, beam_rad]), cell[:, 0], min_linearity)
+    if mirrored_by_line:
+        range_m[1] = _mirrored_by_line(
+            caster, thickness_m, from_laser, scan.angles_rad, range_m[1], cell[:2], min_linearity
+        )
     has_normal = hits.linearity >= min_linearity
     incidence = np.where(has_normal, np.arccos(np.clip(cos[0, :1], 0.0, 1.0)), np.nan)
     normal_rad, linearity = caster.normals()
@@ -166,6 +172,59 @@ def _by_line(
             line_m,
             range_m + half_m / np.where(np.isnan(cos), 1.0, np.maximum(np.abs(cos), MIN_COS)),
         )
+
+
+def _mirrored_by_line(
+    caster: RayCaster,
+    thickness_m: np.ndarray,
+    from_laser: np.ndarray,
+    angles_rad: np.ndarray,
+    range_m: np.ndarray,
+    cell: np.ndarray,
+    min_linearity: float,
+) -> np.ndarray:
+    """(N, B) mirrored ranges to the near faces by the lines of both walls; range_m (N, B) where there is no line.
+
+    The steps of a slanted mirror move the image by up to two cells.
+
+    Args:
+        from_laser: (N, 3) poses of the laser in map.
+        cell: (2, N, B) that mirror and that return the beam.
+    """
+    normal_rad, linearity = caster.normals()
+    at = np.nonzero((cell >= 0).all(axis=0) & (linearity[cell] >= min_linearity).all(axis=0))
+    mirror, target = cell[:, at[0], at[1]]
+    beam_rad = from_laser[at[0], 2] + angles_rad[at[1]]
+    half_m = 0.5 * caster.grid_map.resolution_m
+    to_mirror, to_mirror_m = _to_line(caster, thickness_m, from_laser[at[0], :2], mirror)
+    image_m = from_laser[at[0], :2] + 2.0 * to_mirror_m[:, None] * to_mirror
+    turned_rad = 2.0 * normal_rad[mirror] + np.pi - beam_rad
+    to_target, to_target_m = _to_line(caster, thickness_m, image_m, target)
+    cos_mirror = np.abs(np.cos(beam_rad - normal_rad[mirror]))
+    cos = np.cos(turned_rad) * to_target[:, 0] + np.sin(turned_rad) * to_target[:, 1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        line_m = to_target_m / cos - half_m / np.maximum(np.abs(cos), MIN_COS) - 2.0 * half_m * cos_mirror
+        near_m = _LINE_CELLS * caster.grid_map.resolution_m * (1.0 + 2.0 * cos_mirror)
+        holds = (np.abs(line_m - range_m[at]) * np.abs(cos) <= near_m) & (np.abs(cos) >= _GRAZING_COS)
+    by_line_m = range_m.copy()
+    by_line_m[at] = np.where(holds, line_m, range_m[at])
+    return by_line_m
+
+
+def _to_line(
+    caster: RayCaster, thickness_m: np.ndarray, from_m: np.ndarray, cell: np.ndarray
+) -> Tuple[np.ndarray, np.ndarray]:
+    """Normals (M, 2) of the walls of cells (M,), and along them the distances [m] from points (M, 2) to the walls' lines,
+    half a cell behind the faces on the side of the points.
+    """
+    grid_map = caster.grid_map
+    normal_rad = caster.normals()[0][cell]
+    normal = np.stack([np.cos(normal_rad), np.sin(normal_rad)], axis=-1)
+    centre = grid_map.centres(*np.divmod(cell, grid_map.occupancy.shape[1]))
+    distance_m = np.sum((centre - from_m) * normal, axis=-1) + caster.wall_offsets_m()[cell]
+    cells = thickness_m[cell] / grid_map.resolution_m
+    middle = np.where(cells <= _BOTH_FACES_CELLS, 0.5 * (cells - 1.0), 0.0)  # a thicker wall has a line for each face
+    return normal, distance_m - np.sign(distance_m) * np.maximum(middle, 0.0) * grid_map.resolution_m
 
 
 def cos_incidence(caster: RayCaster, beam_rad: np.ndarray, cell: np.ndarray, min_linearity: float) -> np.ndarray:

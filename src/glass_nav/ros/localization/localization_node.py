@@ -56,6 +56,7 @@ from glass_nav.ros.localization.map_source import MapSource
 from glass_nav.ros.localization.publishers import Publishers
 from glass_nav.ros.localization.reconfigure import ReconfigureServer
 from glass_nav.ros.localization.segment_service import SegmentService
+from glass_nav.ros.localization.sender_watch import SenderWatch
 from glass_nav.ros.localization.shown_parameters import ShownParameters
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
@@ -114,6 +115,7 @@ class LocalizationNode:
         )
         # Subscribers last: they may fire at once.
         self._listener = tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
+        self._sender_watch = SenderWatch(p.node, self._log)
         self._scans.subscribe(self._take_scan)
         self._bearings.subscribe(self._command(self._bearings.receive))
         rospy.Subscriber("initialpose", PoseWithCovarianceStamped, self._command(self._take_guess), queue_size=2)
@@ -152,7 +154,11 @@ class LocalizationNode:
 
     def _take_scan(self, msg: LaserScan) -> None:
         self._inbox.put("scans", msg)
-        self._outputs.send_transform_again(conversions.ns_from_stamp(msg.header.stamp), rospy.Time.now().to_nsec())
+        try:
+            self._outputs.send_transform_again(conversions.ns_from_stamp(msg.header.stamp), rospy.Time.now().to_nsec())
+        except rospy.ROSException:  # the topic was closed meanwhile
+            if not rospy.is_shutdown():
+                raise
 
     def _command(self, handle: Callable[[Any], None]) -> Callable[[Any], None]:
         return lambda msg: self._inbox.put("commands", lambda: handle(msg))

@@ -117,7 +117,7 @@ class Publishers:
         return round(self._p.transform_tolerance * 1e9)
 
     def _send(self, transform: Optional[StampedTransform]) -> None:
-        if transform is not None:
+        if transform is not None and not rospy.is_shutdown():
             self._broadcaster.sendTransform(
                 conversions.transform_stamped(
                     transform.stamp_ns, self._frame, self._p.odom_frame_id, transform.map_from_odom

@@ -519,7 +519,7 @@ def test_the_soft_vote_is_the_posterior_over_the_cases(seed):
     near_m = np.where(np.isfinite(measured_m), measured_m, 1.0) + rng.normal(0.0, 0.1, (4, samples, beams))
     range_m = np.where(rng.random(near_m.shape) < 0.3, np.inf, near_m)
     cos, thickness_m = rng.uniform(0.05, 1.0, near_m.shape), rng.integers(0, 5, near_m.shape) / 32
-    prior = rng.dirichlet(np.ones(5), beams).T
+    prior = rng.dirichlet(np.ones(6), beams).T
     share = _beam_vote.case_votes(
         measured_m, range_m, cos, thickness_m, prior, uncertain, depth_share, sigma_m, gate_m, min_cos, temper
     )
@@ -529,8 +529,11 @@ def test_the_soft_vote_is_the_posterior_over_the_cases(seed):
     end_m = range_m + depth_share * thickness_m / steep
     end_m[1] += 2.0 * depth_share * thickness_m[0] * cos[0]
     across_m = (np.where(answered, measured_m, 0.0) - end_m) * steep
-    density = np.where(np.abs(across_m) <= gate_m, np.exp(-0.5 * np.minimum((across_m / sigma_m) ** 2, 100.0)), 0.0)
-    nothing = uncertain * np.exp(-0.25 * (gate_m / sigma_m) ** 2) + prior[4] * density[2]
+    widening = np.ones(range_m.shape)
+    widening[1] = np.hypot(1.0, 2.0 * cos[0])  # the image of a mirror that is off is off twice as much
+    density = np.exp(-0.5 * np.minimum((across_m / (sigma_m * widening)) ** 2, 100.0)) / widening
+    density = np.where(np.abs(across_m) <= gate_m, density, 0.0)
+    nothing = uncertain * np.exp(-0.25 * (gate_m / sigma_m) ** 2) + prior[4] * density[2] + prior[5]
     joint = np.concatenate([nothing[None], prior[:4, None] * density])
     evidence = np.exp(temper * (np.log(joint.sum(axis=0)) @ answered))
     expected = np.einsum("n,cnb->cb", evidence, joint)[:, answered]
@@ -544,7 +547,7 @@ def test_the_soft_vote_is_the_posterior_over_the_cases(seed):
         (dict(measured_m=np.zeros((1, 3))), "measured must be (B,)"),
         (dict(cos=np.ones((4, 2, 2))), "ranges, cosines and thicknesses must be (4, N, B)"),
         (dict(range_m=np.ones((4, 0, 3))), "ranges, cosines and thicknesses must be (4, N, B)"),
-        (dict(prior=np.ones((4, 3))), "priors must be (5, B)"),
+        (dict(prior=np.ones((4, 3))), "priors must be (6, B)"),
     ],
 )
 def test_case_votes_of_other_shapes_are_refused(wrong, text):
@@ -553,7 +556,7 @@ def test_case_votes_of_other_shapes_are_refused(wrong, text):
         range_m=np.ones((4, 2, 3)),
         cos=np.ones((4, 2, 3)),
         thickness_m=np.ones((4, 2, 3)),
-        prior=np.ones((5, 3)),
+        prior=np.ones((6, 3)),
     )
     with pytest.raises(ValueError) as err:
         _beam_vote.case_votes(

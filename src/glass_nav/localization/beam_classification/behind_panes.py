@@ -1,0 +1,111 @@
+"""Expected ranges -> which echo comes back from a pane: mirrored, from behind it, or from what no map shows?
+
+Echo powers as in the lidar equation for diffuse targets: T^2 / d^2 from a surface at the range d behind the pane,
+R^2 / d^2 along the path over the mirror, with R and T by Fresnel. The strongest echo is reported. Behind a pane the map
+often ends: outdoors, or in a room that the mapper did not enter. What stands there is unknown, but something mostly
+does, and its echo competes. One thing can be said of it: walls go on. The mirror image of a wall that is perpendicular
+to the pane lies where the same wall would go on behind it, so both give the same range. The formulation is ours. B
+beams; expected ranges are those of sample 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, ExpectedRanges
+from glass_nav.vocabulary import BeamCase
+
+_PANE_INDEX = 1.51  # of soda-lime glass
+_COATINGS = ((0.5, 0.5), (1.0, 0.25), (2.0, 0.25))  # times the usual reflectance, and how frequent: it is not known
+_MOST_REFLECTED = 0.9
+_WALL_OVER_DARK = 5.0  # reflectance of a wall over that of the darkest one seen at the largest range
+_UNMAPPED_PER_M = 0.2  # things that end a beam where the map knows nothing
+_NEW_PER_M = 0.02  # the same where it knows something: people, new furniture
+_FACE_M = 0.5  # a wall drawn from its other side has its near face at most so far in front of the drawn one
+_WALL_GOES_ON = 0.5  # probability that a wall which a pane adjoins goes on behind it, where the map knows nothing
+_GOES_ON_SIGMAS, _PERPENDICULAR_RAD = 2.0, np.radians(10.0)  # how straight it does
+_FIRST, _MIRRORED, _SECOND = BeamCase.DIFFUSE - 1, BeamCase.SPECULAR - 1, BeamCase.FIRST_PENETRATION - 1
+
+
+@dataclass(frozen=True)
+class PaneEchoes:
+    """What comes back of the beams that a pane does not return itself; (B,) each."""
+
+    mirrored: np.ndarray  # probability that it is a mirrored echo; 0 where nothing mirrors
+    unmapped: np.ndarray  # density [1/m] at the measured range of ends behind the pane at what no map shows
+
+
+def of(
+    measured_m: np.ndarray,
+    expected: ExpectedRanges,
+    sigma_m: float,
+    max_range_m: float,
+    gain: float,
+    unmapped_end: np.ndarray,
+) -> PaneEchoes:
+    """The chances of each beam if the first surface along it is a pane.
+
+    Args:
+        measured_m: (B,) ranges by REP 117.
+        expected: with ranges where beams end.
+        sigma_m: spread of beams around walls, across them.
+        max_range_m: at which the lidar still sees a dark wall, face on.
+        gain: how much more light panes mirror than clear glass does, on average.
+        unmapped_end: (B,) bool: the mapper did not see the place where the beam ended.
+    """
+    first_m, mirrored_m, behind_m, third_m = expected.range_m[:, 0]
+    goes_on = np.where(unmapped_end & _is_perpendicular(expected), _WALL_GOES_ON, 0.0)
+    clear = _reflectance(np.nan_to_num(expected.pane_incidence[0]))
+    mirrored, loses = np.zeros((2, len(clear)))
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        for coating, frequency in _COATINGS:
+            reflected = np.minimum(gain * coating * clear, _MOST_REFLECTED)
+            over = reflected / (1.0 - reflected)
+            seen = 1.0 / (1.0 + 1.0 / ((reflected * max_range_m / mirrored_m) ** 2 * _WALL_OVER_DARK))
+            # Up to this range whatever stands behind the pane is brighter than the mirrored echo.
+            reach_m = np.minimum(np.minimum(mirrored_m / over, behind_m), max_range_m)
+            nothing_there = np.where(unmapped_end, np.exp(-_UNMAPPED_PER_M * np.maximum(reach_m - first_m, 0.0)), 1.0)
+            over_wall = _wins(over)
+            wins = goes_on * over_wall + (1.0 - goes_on) * nothing_there * _wins(over * behind_m / mirrored_m)
+            mirrored += frequency * seen * np.nan_to_num(wins)
+            loses += frequency * (1.0 - over_wall)
+        mirrored = np.where(np.isfinite(mirrored_m), mirrored, 0.0)
+        past_m = measured_m - first_m
+        reached = np.where(unmapped_end, np.exp(-_UNMAPPED_PER_M * np.maximum(past_m, 0.0)), 1.0)
+        density = np.where(unmapped_end, _UNMAPPED_PER_M, _NEW_PER_M)
+        for range_m, seen_side in zip((behind_m, third_m), expected.seen_side[_SECOND:]):
+            at_face = (measured_m <= range_m) & (measured_m >= range_m - _FACE_M) & ~seen_side
+            density = np.where(at_face, 1.0 / _FACE_M, density)
+        sigma_m = _GOES_ON_SIGMAS * sigma_m / np.maximum(expected.cos_incidence[_MIRRORED, 0], MIN_COS)
+        off = np.where(np.isfinite(mirrored_m), (measured_m - mirrored_m) / sigma_m, np.inf)
+        wall = goes_on * loses * np.exp(-0.5 * off**2) / (np.sqrt(2.0 * np.pi) * sigma_m)
+        behind = np.isfinite(measured_m) & (past_m > 0.0)
+    return PaneEchoes(mirrored, np.where(behind, reached * density + np.nan_to_num(wall), 0.0))
+
+
+def _wins(over: np.ndarray) -> np.ndarray:
+    """(B,) probability that an echo of that amplitude over another is the stronger one: reflectances of walls differ by
+    factors, so it rises over one decade of power.
+    """
+    return 1.0 / (1.0 + over**-4.0)
+
+
+def _is_perpendicular(expected: ExpectedRanges) -> np.ndarray:
+    """(B,) bool: the wall that the mirrored path ends at may be perpendicular to the mirror, so that its image has the same
+    line: it is, or it is met at a corner.
+    """
+    turned_rad = expected.axis_rad[_MIRRORED] - expected.axis_rad[_FIRST]  # of the image, as far as the wall itself
+    with np.errstate(invalid="ignore"):
+        return ~(np.abs(np.cos(turned_rad)) >= np.sin(_PERPENDICULAR_RAD))
+
+
+def _reflectance(incidence_rad: np.ndarray) -> np.ndarray:
+    """Share of the light that a sheet of clear glass mirrors: Fresnel, unpolarised, two surfaces."""
+    inside = np.arcsin(np.sin(incidence_rad) / _PANE_INDEX)
+    parallel, across = np.cos(incidence_rad), np.cos(inside)
+    r_s = ((parallel - _PANE_INDEX * across) / (parallel + _PANE_INDEX * across)) ** 2
+    r_p = ((across - _PANE_INDEX * parallel) / (across + _PANE_INDEX * parallel)) ** 2
+    surface = 0.5 * (r_s + r_p)
+    return 2.0 * surface / (1.0 + surface)

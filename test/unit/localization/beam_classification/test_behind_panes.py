@@ -1,0 +1,57 @@
+"""Which echo comes back from a pane, by the physics of glass and by what the map knows behind it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_expected_ranges import NEVER, expect
+
+from glass_nav.localization.beam_classification import behind_panes
+
+SIGMA_M, RANGE_MAX_M = 0.02, 25.0
+ALONG, ACROSS = 0.0, 0.5 * np.pi  # axis of the target's image: as of the mirror, perpendicular to it
+
+
+def echoes(measured_m=6.0, unmapped_end=False, target_rad=ALONG, **offered):
+    axis_rad = np.array([[0.0], [target_rad], [0.0], [0.0]])
+    expected = expect(**{"first": 2.0, "mirrored": 6.0, "axis_rad": axis_rad, **offered})
+    found = behind_panes.of(np.array([measured_m]), expected, SIGMA_M, RANGE_MAX_M, 2.0, np.array([unmapped_end]))
+    return float(found.mirrored[0]), float(found.unmapped[0])
+
+
+def test_the_flatter_a_beam_meets_the_pane_the_more_often_the_mirrored_echo_wins():
+    chances = [echoes(second=6.0, incidence=np.radians(degrees))[0] for degrees in (10, 50, 65, 75, 80, 85)]
+    assert chances == sorted(chances)
+    assert chances[0] < 0.02 and chances[-1] > 0.9
+
+
+def test_nothing_is_mirrored_where_the_mirrored_path_ends_nowhere():
+    assert echoes(mirrored=NEVER, second=6.0, incidence=np.radians(80.0))[0] == 0.0
+
+
+def test_where_the_map_ends_behind_the_pane_something_mostly_stands_there():
+    seen, unseen = (echoes(incidence=np.radians(45.0), unmapped_end=unmapped)[0] for unmapped in (False, True))
+    assert seen > 0.4 > 0.1 > unseen
+    assert echoes(unmapped_end=True)[1] > 2.0 * echoes(unmapped_end=False)[1] > 0.0
+
+
+def test_a_wall_that_may_go_on_behind_the_pane_explains_what_its_mirror_image_would():
+    other, same_line, corner = (
+        echoes(unmapped_end=True, target_rad=target_rad, incidence=np.radians(70.0))[1]
+        for target_rad in (ALONG, ACROSS, np.nan)
+    )
+    assert same_line > 10.0 * other and corner > 10.0 * other
+    away = echoes(measured_m=7.0, unmapped_end=True, target_rad=ACROSS, incidence=np.radians(70.0))[1]
+    assert away == pytest.approx(echoes(measured_m=7.0, unmapped_end=True, incidence=np.radians(70.0))[1])
+
+
+def test_in_front_of_a_wall_drawn_from_its_other_side_its_near_face_may_stand():
+    side = np.array([True, True, False, True])
+    near, far = (echoes(measured_m=z, second=9.0, seen_side=side)[1] for z in (8.7, 8.0))
+    assert near == pytest.approx(2.0) and far < 0.1
+    assert echoes(measured_m=8.7, second=9.0)[1] < 0.1
+
+
+@pytest.mark.parametrize("measured_m", [np.inf, np.nan, -np.inf, 1.5])
+def test_a_beam_that_did_not_return_from_behind_says_nothing_of_what_is_there(measured_m):
+    assert echoes(measured_m=measured_m)[1] == 0.0
