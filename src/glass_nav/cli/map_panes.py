@@ -10,10 +10,10 @@ from typing import List, Optional
 
 from glass_nav.cli import log_arguments, pane_files
 from glass_nav.cli.progress import Progress
-from glass_nav.panes.pane_finder import PaneFinderParams
-from glass_nav.replay import prepared_replay
+from glass_nav.replay import prepared_replay, replay_params
 from glass_nav.replay.replay_options import ReplayOptions
 from glass_nav.replay.replay_panes import PaneSearch
+from glass_nav.replay.replay_params import ReplayParams
 from glass_nav.world import map_file
 from glass_nav.world.pane import Pane
 
@@ -75,7 +75,8 @@ def main(arguments: argparse.Namespace) -> None:
     """
     grid_map = map_file.load(arguments.map)
     pane_files.check_folder(arguments.out)
-    search = PaneSearch(grid_map, PaneFinderParams())
+    settings = ReplayParams() if arguments.params is None else replay_params.load(arguments.params)[0]
+    search = PaneSearch(grid_map, settings.localizer.panes)
     for options in _options(arguments):
         _replay(options, search)
     candidates = [pane for pane in search.panes() if pane.probability >= _LISTED]

@@ -23,6 +23,7 @@ from glass_nav.localization.beam_classification.glass_map import GlassMap
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
 from glass_nav.localization.beam_classification.unmapped_panes import UnmappedPanes
 from glass_nav.localization.integrity import pose_state, protection_level
+from glass_nav.localization.integrity.dead_reckoning import DeadReckoning
 from glass_nav.localization.integrity.integrity_monitor import IntegrityMonitor
 from glass_nav.localization.integrity.kidnap_detector import KidnapDetector
 from glass_nav.localization.integrity.protection_level import ProtectionLevels
@@ -38,6 +39,7 @@ from glass_nav.world.landmark_map import LandmarkMap
 from glass_nav.world.pane import Pane
 
 _FOUND = np.array([0.1, 0.1, 0.05])  # deviations [m, m, rad] of a place that was found among all others
+_ASTRAY = 3.0  # deviations of dead reckoning from which a pose that scans do not support is given up
 _SHOWN = 500  # candidates drawn for particlecloud
 
 
@@ -90,6 +92,7 @@ class Localizer:
         self._schedule = UpdateSchedule()
         self._quality = pose_state.PoseQuality(params.quality)
         self._map_from_odom = np.zeros(3)  # since the last update of the particles
+        self._dead_reckoning: Optional[DeadReckoning] = None  # None: the pose has not been sure yet
         self._bearings: List[Tuple[LandmarkBearings, LandmarkMap, np.ndarray]] = []  # odom_from_base at their stamp
         self._look_at(grid_map, field)
 
@@ -256,13 +259,17 @@ class Localizer:
         step = self._schedule.step_to(odom_from_base)
         if step is not None:
             self._filter.predict(step)
+            if self._dead_reckoning is not None:
+                self._dead_reckoning = self._dead_reckoning.carried(step, self._params.odometry)
         taken = self._bearings_from(odom_from_base)
         for bearings, landmarks in taken:
             self._filter.weigh_by_bearings(bearings, landmarks)
         cases = self._correct(scan, odom_from_base, step)
         if taken:
             self._integrity.narrow(self._filter.best.covariance)
-        verdict = self._kidnap_detector.observe(scan, odom_from_base, self._filter.best.map_from_base)
+        verdict = self._kidnap_detector.observe(
+            scan, odom_from_base, self._filter.best.map_from_base, self._dead_reckoning
+        )
         self._quality.doubt(verdict)
         if verdict.found is not None:
             return self._settle(scan, odom_from_base, verdict.found, verdict.fit_there)
@@ -277,6 +284,8 @@ class Localizer:
         self._filter.weigh(scan, cases, registration, self._classifier)
         self._filter.estimate()
         self._filter.resample()
+        if not self._filter.has_evidence:
+            self._keep_to_odometry()
         suspect = self._filter.suspect
         self._integrity.update(
             scan,
@@ -287,6 +296,12 @@ class Localizer:
             None if suspect is None else se2.compose(suspect, odom_from_base),
         )
         return cases
+
+    def _keep_to_odometry(self) -> None:
+        """The scan says nothing about the place: where the scans before led the pose astray, odometry has it back."""
+        reckoned = self._dead_reckoning
+        if reckoned is not None and reckoned.mahalanobis(self._filter.best.map_from_base[None])[0] > _ASTRAY:
+            self._filter.move_to(reckoned.map_from_base)
 
     def _find(self, scan: Scan, odom_from_base: np.ndarray) -> BeamCases:
         """The pose is not known: follow all places where it may be. The particles are those places."""
@@ -325,6 +340,8 @@ class Localizer:
         covariance = self._integrity.at(step, self._params.odometry, self._filter.best.covariance)
         judgement = self._quality.judge(self._filter.best, covariance)
         trusted = judgement.state == LocalizationState.LOCALIZED
+        if updated and trusted and self._filter.fits:
+            self._dead_reckoning = DeadReckoning(map_from_base, covariance)
         return Estimate(
             scan.stamp_ns,
             map_from_base,
@@ -368,6 +385,7 @@ class Localizer:
         self._quality = pose_state.PoseQuality(self._params.quality)
         self._kidnap_detector = self._new_kidnap_detector(usual_fit)
         self._search = None
+        self._dead_reckoning = None
         self._bearings = []
 
     def _new_search(self, area: Optional[np.ndarray] = None) -> GlobalSearch:

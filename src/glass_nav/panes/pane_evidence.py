@@ -29,6 +29,7 @@ _TEMPER = 0.5  # scans from places next to each other are not independent
 _HALF_RAD = np.radians([2.5, 4.0, 6.5, 10.0, 15.0, 20.0])
 _PANE_HEAD_ON = (0.99, 0.95, 0.85, 0.7)
 _PANE_OBLIQUE = {0.02: 1.0, 0.06: 1.0, 0.15: 1.0, 0.3: 0.7, 0.5: 0.4, 0.7: 0.2, 0.82: 0.1}  # with its weight
+_DIRT_RAD = np.radians(30.0)  # of the share at oblique incidence half is lost there, if it is of dust and prints
 _PASSER_BY_HEAD_ON = (0.4, 0.2)  # of what stood there for a moment
 _FLAT = (0.99, 0.95, 0.9, 0.8, 0.6, 0.35, 0.2, 0.1, 0.03, 0.01)  # things, with gaps or without, and chance
 _LEAKS = (1.0, 0.95, 0.9)  # of things at oblique incidence: beams pass their edges
@@ -142,8 +143,10 @@ def _pane_shares() -> "Tuple[np.ndarray, np.ndarray]":
     for half_rad in _HALF_RAD:
         for head_on in _PANE_HEAD_ON:
             for ratio, weight in _PANE_OBLIQUE.items():
-                shares.append(head_on * (ratio + (1.0 - ratio) * _lobe(half_rad)))
-                weights.append(weight)
+                for oblique in (np.ones(INCIDENCES), 0.5 ** ((_MIDDLE_RAD / _DIRT_RAD) ** 2)):
+                    lobe = _lobe(half_rad)
+                    shares.append(head_on * (ratio * oblique * (1.0 - lobe) + lobe))
+                    weights.append(weight)
     return np.clip(np.array(shares), 0.01, 0.99), np.log(np.array(weights) / np.sum(weights))
 
 

@@ -1162,6 +1162,37 @@ def test_bearings_that_cannot_be_used_are_refused_and_change_nothing(drive):
     same(localizer.update(drive.scans[0], drive.odometry[0]), other.update(drive.scans[0], drive.odometry[0]))
 
 
+# -- it keeps to odometry where scans say nothing
+
+
+def test_where_the_map_lacks_what_is_around_the_robot_odometry_carries_the_pose():
+    """A hall with a door to a place that is not drawn: beams end far from any wall, ever other ones."""
+    drive = Drive(steps=14)
+    localizer = started(update_min_d=0.05)
+    drive.through(localizer)
+    rng = np.random.default_rng(3)
+    true, odom, last = drive.true[-1], drive.odometry[-1], drive.scans[-1]
+    step = np.array([0.15, 0.0, 0.02])
+    for number in range(1, 60):
+        true, odom = se2.compose(true, step), se2.compose(odom, step)
+        ranges_m = rng.uniform(3.0, 11.0, len(last))
+        estimate = localizer.update(replace(last, stamp_ns=last.stamp_ns + number * SECOND_NS, ranges_m=ranges_m), odom)
+        away_m, away_rad = off(estimate.map_from_base, true)
+        assert away_m < 0.05 + 0.02 * 0.15 * number and away_rad < np.radians(3.0)
+    assert estimate.state != "LOCALIZED"
+
+
+def test_a_pose_that_scans_led_astray_goes_back_to_dead_reckoning_when_they_say_nothing():
+    drive = Drive(steps=14)
+    localizer = started(update_min_d=0.05)
+    drive.through(localizer, last=12)
+    localizer._filter.move_to(drive.true[11] + [0.6, 0.4, 0.8])
+    outside = replace(drive.scans[12], ranges_m=np.full(len(drive.scans[12]), 9.0))
+    estimate = localizer.update(outside, drive.odometry[12])
+    away_m, away_rad = off(estimate.map_from_base, drive.true[12])
+    assert away_m < 0.05 and away_rad < np.radians(2.0)
+
+
 # -- glass that the map lacks
 
 

@@ -137,9 +137,30 @@ class ParticleFilter:
 
     # -- one scan
 
+    @property
+    def fits(self) -> bool:
+        """The last scan that was registered fitted about as well as scans usually do."""
+        return self._registration.fits
+
+    @property
+    def has_evidence(self) -> bool:
+        """The last scan that was registered says something about where the robot is; else odometry carries the pose."""
+        return self._registration.is_evidence
+
     def predict(self, step: np.ndarray) -> None:
-        """Move all particles by a step (3,) of odometry, in the robot's frame before it."""
+        """Move all particles by a step (3,) of odometry, in the robot's frame before it.
+
+        Without evidence they move as one: noise that no scan weighs would only lead their mean astray.
+        """
+        if not self.has_evidence:
+            self.particles = se2.compose(self.particles, step)
+            return
         self.particles = motion.sample(self.particles, step, self._params.odometry, self._rng)
+
+    def move_to(self, map_from_base: np.ndarray) -> None:
+        """Put all particles elsewhere as one, the best cluster's mean at a pose (3,)."""
+        self.particles = se2.compose(map_from_base, se2.compose(se2.inverse(self.best.map_from_base), self.particles))
+        self.estimate()
 
     def weigh_by_bearings(self, bearings: LandmarkBearings, landmarks: LandmarkMap) -> None:
         """Bearings taken where the particles are now."""
@@ -160,6 +181,8 @@ class ParticleFilter:
             return Registration(best.map_from_base, best.covariance, best, None, 0, False)
         finder = self._registration
         found = finder.find(best.map_from_base, best.covariance, odom_from_base, points)
+        if not finder.is_evidence:
+            return Registration(best.map_from_base, np.zeros((3, 3)), best, None, 0, False)
         return Registration(
             found.poses[0], np.zeros((3, 3)), best, found, len(beams), finder.fits, finder.contradicts_odometry
         )
@@ -198,6 +221,8 @@ class ParticleFilter:
 
     def resample(self) -> None:
         """Draw as many particles as the spread of the cloud needs, where they are due."""
+        if not self.has_evidence and not np.ptp(self._weights):  # nothing to choose between
+            return
         self._updates += 1
         if self._updates % self._params.resample_interval:
             return

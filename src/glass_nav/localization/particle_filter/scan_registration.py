@@ -8,6 +8,9 @@ crowd around the robot may look like another room once.
 
 Where the scan leaves a direction free, as in a hall whose ends are out of sight, odometry is the evidence along it. That
 a wheel slipped is considered only if the scan says so: it does not fit where odometry leads, and does nearby.
+
+A scan that hardly fits at all, as where the map lacks what is around the robot, fits best at walls that have nothing to
+do with it: it is no evidence, until a scan fits about as well as scans have fitted on the whole.
 """
 
 from __future__ import annotations
@@ -45,7 +48,8 @@ _POOR_FIT = 0.75  # of the usual fit: odometry is not trusted
 _REACH = 3.0  # deviations
 _MIN_DEVIATION = np.array([0.01, 0.01, np.radians(0.2)])  # of odometry: m, m, rad
 _CONVINCING_FIT = 0.9  # of the usual fit: a place that odometry did not lead to
-_MEMORY = 0.9
+_NO_EVIDENCE_FIT = 0.4  # of the lasting fit: nothing can be said about the place
+_MEMORY, _LASTING_MEMORY = 0.9, 0.995  # weight of the past per scan
 _MIN_SCALE_M, _MAX_SCALE_M = 0.06, 0.3  # of the kernel; follows how well the map fits
 _SCALE_MEDIANS = 2.0
 
@@ -56,8 +60,10 @@ class ScanRegistration:
     def __init__(self, field: DistanceField) -> None:
         self.fits = True  # the last scan fitted about as well as scans usually do
         self.contradicts_odometry = False  # the last scan fitted beside the place that odometry led to, and not there
+        self.is_evidence = True  # the last scan says something about where the robot is
         self._field = field
-        self._usual_fit = float("nan")
+        self._usual_fit = float("nan")  # of the last scans
+        self._lasting_fit, self._remembered = float("nan"), 0  # over many scans, and how many they were
         self._scale_m = _MIN_SCALE_M
         self._suspect: Optional[np.ndarray] = None  # (3,) map_from_odom of a place that needs a second scan
 
@@ -80,14 +86,15 @@ class ScanRegistration:
         suspect, self._suspect = self._suspect, None
         self.fits = not found.fit[0] < _POOR_FIT * self._usual_fit
         self.contradicts_odometry = self._contradicts(found, mean, covariance, points_m)
+        self.is_evidence = not found.fit[0] < _NO_EVIDENCE_FIT * self._lasting_fit
         if not self.fits:
             farther = self._confirmed(suspect, odom_from_base, points_m)
             if farther is not None:
-                self.fits = self.contradicts_odometry = True
+                self.fits = self.contradicts_odometry = self.is_evidence = True
                 return farther
             self._suspect = self._search(mean, covariance, odom_from_base, points_m)
             near = _within(found.poses, mean, _spread(covariance, _LEVELS[0]))
-            if not near.any():  # the scan is no evidence about the place that odometry leads to
+            if not self.is_evidence or not near.any():
                 return Alignment(mean[None], np.zeros((1, 3, 3)), scan_alignment.fit(self._field, points_m, mean[None]))
             found = Alignment(found.poses[near], found.information[near], found.fit[near])
         self._remember(found, points_m)
@@ -97,7 +104,12 @@ class ScanRegistration:
         """The scan fits at an aligned pose as scans usually do, but at none that odometry explains."""
         near = found.poses[_within(found.poses, mean, np.sqrt(np.diag(covariance) + _MIN_DEVIATION**2))]
         fit_near = scan_alignment.fit(self._field, points_m, np.vstack([mean, near])).max()
-        return bool(fit_near < _POOR_FIT * self._usual_fit and found.fit[0] > _CONVINCING_FIT * self._usual_fit)
+        return bool(fit_near < _POOR_FIT * self._usual_fit and found.fit[0] > self._convincing_fit)
+
+    @property
+    def _convincing_fit(self) -> float:
+        """Of a place that odometry did not lead to: what fits badly on the way there does not lower it much."""
+        return _CONVINCING_FIT * max(self._usual_fit, _POOR_FIT * self._lasting_fit)
 
     def _confirmed(
         self, suspect: Optional[np.ndarray], odom_from_base: np.ndarray, points_m: np.ndarray
@@ -106,7 +118,7 @@ class ScanRegistration:
         if suspect is None:
             return None
         again = self._align_around(se2.compose(suspect, odom_from_base), np.zeros((3, 3)), _LEVELS[0], points_m)
-        return again if again.fit[0] > _CONVINCING_FIT * self._usual_fit else None
+        return again if again.fit[0] > self._convincing_fit else None
 
     def _search(
         self, mean: np.ndarray, covariance: np.ndarray, odom_from_base: np.ndarray, points_m: np.ndarray
@@ -114,13 +126,16 @@ class ScanRegistration:
         """map_from_odom of a farther place where the scan fits as scans usually do."""
         for level in _LEVELS[1:]:
             farther = self._align_around(mean, covariance, level, points_m)
-            if farther.fit[0] > _CONVINCING_FIT * self._usual_fit:
+            if farther.fit[0] > self._convincing_fit:
                 return se2.compose(farther.poses[0], se2.inverse(odom_from_base))
         return None
 
     def _remember(self, found: Alignment, points_m: np.ndarray) -> None:
-        past = found.fit[0] if np.isnan(self._usual_fit) else self._usual_fit
-        self._usual_fit = _MEMORY * past + (1.0 - _MEMORY) * float(found.fit[0])
+        fit = float(found.fit[0])
+        past, lasting = (fit, fit) if np.isnan(self._usual_fit) else (self._usual_fit, self._lasting_fit)
+        self._usual_fit = _MEMORY * past + (1.0 - _MEMORY) * fit
+        self._remembered += 1
+        self._lasting_fit = lasting + max(1.0 - _LASTING_MEMORY, 1.0 / self._remembered) * (fit - lasting)
         scale = _SCALE_MEDIANS * scan_alignment.median_distance(self._field, points_m, found.poses[0])
         self._scale_m = float(np.clip(_MEMORY * self._scale_m + (1.0 - _MEMORY) * scale, _MIN_SCALE_M, _MAX_SCALE_M))
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from buildings import L_ROOM, off
 
+from glass_nav.geometry import se2
 from glass_nav.localization.beam_classification.beam_classifier import BeamClassifier
 from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.particle_filter.importance_weights import BeamMixture
@@ -115,3 +116,30 @@ def test_another_map_and_other_parameters_leave_the_particles_where_they_are():
     np.testing.assert_array_equal(particles.particles, before)
     particles.resample()
     assert len(particles.particles) == 100
+
+
+def test_without_evidence_the_particles_move_as_one_and_keep_their_weights():
+    particles = started()
+    for _ in range(5):
+        updated(particles, L_ROOM.scan(TRUE, rng=np.random.default_rng(1)))
+        particles.resample()
+    assert particles.has_evidence and particles.fits
+    before, best = particles.particles.copy(), particles.best.map_from_base
+    outside = replace(L_ROOM.scan(TRUE), ranges_m=np.full(180, 9.0))  # behind all walls
+    assert updated(particles, outside).alignment is None
+    assert not particles.has_evidence and not particles.fits
+    particles.resample()
+    step = np.array([0.3, 0.0, 0.2])
+    particles.predict(step)
+    np.testing.assert_allclose(particles.particles, se2.compose(before, step))
+    particles.estimate()
+    np.testing.assert_allclose(particles.best.map_from_base, se2.compose(best, step), atol=1e-3)
+
+
+def test_the_particles_may_be_moved_elsewhere_as_one():
+    particles = started()
+    particles.estimate()
+    covariance = particles.best.covariance
+    particles.move_to(np.array([4.0, 1.0, -2.0]))
+    np.testing.assert_allclose(particles.best.map_from_base, [4.0, 1.0, -2.0], atol=0.01)
+    np.testing.assert_allclose(np.linalg.eigvalsh(particles.best.covariance), np.linalg.eigvalsh(covariance), rtol=0.05)

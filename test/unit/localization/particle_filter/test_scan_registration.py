@@ -194,3 +194,32 @@ def test_a_spin_that_is_believed_at_the_second_scan_contradicts_odometry(l_room)
     assert not robot.anchor.contradicts_odometry
     robot.find(odometry_at(true), robot.points(spun))
     assert robot.anchor.contradicts_odometry
+
+
+# -- when a scan is no evidence
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_scan_of_things_that_the_map_lacks_leaves_the_pose_to_odometry(l_room, seed):
+    """It would fit a little better at some wall nearby, and more so scan by scan."""
+    true = np.array([2.0, 1.6, 0.7])
+    robot = Robot(l_room, true, seed)
+    predicted = se2.compose(robot.map_from_odom, odometry_at(true))
+    for _ in range(30):
+        found = robot.find(odometry_at(true), robot.rng.uniform(-8.0, 8.0, (90, 2)))
+        assert not robot.anchor.is_evidence
+        np.testing.assert_allclose(found.poses, predicted[None], atol=1e-9)
+        assert not found.information.any()
+    way_m, _ = off(robot.find(odometry_at(true), robot.points(true)).poses[0], true)
+    assert robot.anchor.is_evidence and way_m < 0.01
+
+
+def test_scans_that_fit_ever_worse_do_not_make_a_bad_fit_convincing(l_room):
+    true = np.array([2.0, 1.6, 0.7])
+    robot = Robot(l_room, true, 0)
+    for share in np.linspace(0.9, 0.3, 40):
+        points = robot.points(true)
+        elsewhere = robot.rng.random(len(points)) > share
+        points[elsewhere] = robot.rng.uniform(-8.0, 8.0, (elsewhere.sum(), 2))
+        way_m, turn_rad = off(robot.find(odometry_at(true), points).poses[0], true)
+        assert way_m < 0.05 and turn_rad < np.radians(2.0)
