@@ -82,15 +82,15 @@ def test_headings_go_round():
     "values, text",
     [
         (dict(sample_count=0), "~sample_count must be >= 1, got 0"),
-        (dict(sample_min_radius_m=0.0), "~sample_min_radius_m must be in (0, sample_max_radius_m = 0.5] m, got 0.0"),
-        (dict(sample_min_radius_m=0.6), "~sample_min_radius_m must be in (0, sample_max_radius_m = 0.5] m, got 0.6"),
+        (dict(sample_min_radius_m=0.0), "~sample_min_radius_m must be in (0, ~sample_max_radius_m = 0.5] m, got 0.0"),
+        (dict(sample_min_radius_m=0.6), "~sample_min_radius_m must be in (0, ~sample_max_radius_m = 0.5] m, got 0.6"),
         (
             dict(sample_min_heading_rad=0.0),
-            "~sample_min_heading_rad must be in (0, sample_max_heading_rad = 0.35] rad, got 0.0",
+            "~sample_min_heading_rad must be in (0, ~sample_max_heading_rad = 0.35] rad, got 0.0",
         ),
         (
             dict(sample_max_heading_rad=0.001),
-            "~sample_min_heading_rad must be in (0, sample_max_heading_rad = 0.001] rad, got 0.005",
+            "~sample_min_heading_rad must be in (0, ~sample_max_heading_rad = 0.001] rad, got 0.005",
         ),
     ],
 )
