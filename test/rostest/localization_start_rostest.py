@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import tempfile
@@ -265,10 +266,12 @@ class LocalizationStart(unittest.TestCase):
         self.assertFalse(rospy.has_param("/under_test/min_particles"), "the next start would take it as given")
 
     def check_dynparam(self, client: Client) -> None:
-        """The command that doc/localization.md names."""
-        program = "/usr/lib/dynamic_reconfigure/dynparam"
-        command = [program] if Path(program).is_file() else ["rosrun", "dynamic_reconfigure", "dynparam"]
-        subprocess.run([*command, "set", "/under_test", "update_min_d", "0.2"], check=True, timeout=60.0)
+        """The command that doc/localization.md names for Debian."""
+        page = (Path(__file__).resolve().parents[2] / "doc" / "localization.md").read_text(encoding="utf-8")
+        named = re.search(r'`python3 -c "(.*?)"`', page)
+        assert named is not None
+        command = named.group(1).replace("/amcl", "/under_test")
+        subprocess.run([sys.executable, "-c", command], check=True, timeout=60.0)
         self.assertEqual(client.get_configuration(timeout=10.0)["update_min_d"], 0.2)
 
     def check_many_at_once(self, client: Client) -> None:

@@ -80,4 +80,4 @@ def picture(image: Image.Image) -> Image.Image:
 
 if __name__ == "__main__":
     with Image.open(sys.argv[1]) as shown:
-        picture(shown).quantize(128).save(Path(sys.argv[2]), optimize=True)
+        picture(shown).quantize(256, kmeans=3).save(Path(sys.argv[2]), optimize=True)

@@ -12,9 +12,9 @@ from glass_nav.vocabulary import PLACE_RGB, LocalizationState
 PLACES_NAMESPACE = "places"
 MAX_PLACES = 10  # that are drawn, the most probable first
 
-_APART_M = 1.0  # poses nearer than that are one place
+_APART_M = 2.0  # poses nearer than that are one place
 _RING_M = 0.6  # radius: to be seen when all of a floor is
-_LINE_M, _LETTER_M = 0.1, 0.7
+_LINE_M, _LETTER_M = 0.1, 0.6
 _CORNERS = 24
 _HEIGHT_M = 0.05
 
@@ -34,7 +34,7 @@ def place_shapes(state: str, particles: np.ndarray) -> List[Union[Shape, Text]]:
     for number in range(MAX_PLACES):
         known = number < len(poses)
         words = f"{100.0 * shares[number]:.0f} %" if known else ""
-        at_m = np.append(poses[number, :2] + [0.0, _RING_M + _LETTER_M], _HEIGHT_M) if known else np.zeros(3)
+        at_m = np.append(poses[number, :2] + [0.0, -_RING_M - _LETTER_M], _HEIGHT_M) if known else np.zeros(3)
         texts.append(Text(PLACES_NAMESPACE, 1 + number, words, at_m, _LETTER_M, PLACE_RGB))
     return [ring, *texts]
 

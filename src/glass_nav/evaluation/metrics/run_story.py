@@ -13,10 +13,15 @@ import numpy as np
 from glass_nav.evaluation.metrics import relative_errors
 from glass_nav.evaluation.metrics.pose_errors import LOST_M, RIGHT_M, RIGHT_RAD, PoseErrors
 from glass_nav.evaluation.metrics.replay_result import NO_BEAM, ReplayResult
+from glass_nav.geometry import angles
 from glass_nav.vocabulary import BeamCase, LocalizationState
 
 SEARCHING = (LocalizationState.GLOBAL_SEARCH, LocalizationState.UNKNOWN)  # states without a pose to rely on
 GOOD, FAIR, BAD = "good", "fair", "bad"
+SPIKE, SPIKE_RAD = 4.0, np.radians(1.0)  # see yaw_spikes()
+_AROUND = 5  # scans to each side of a spike
+_FAST_DEG_S = 20.0
+_FEW_EXPLAINED = 0.5
 _MANY, _FEW = 0.95, 0.01  # shares of the scans
 
 
@@ -109,6 +114,54 @@ def right(errors: PoseErrors) -> np.ndarray:
     """(S,) bool: the pose is the right place. False without a reference."""
     with np.errstate(invalid="ignore"):
         return (errors.position_m <= RIGHT_M) & (errors.yaw_rad <= RIGHT_RAD)
+
+
+@dataclass(frozen=True)
+class YawSpike:
+    """One scan, or two, whose heading error stands out from its neighbours'."""
+
+    row: int
+    yaw_rad: float
+    why: str
+
+
+def yaw_spikes(result: ReplayResult, most: int = 3) -> List[YawSpike]:
+    """The largest lone spikes of the heading error, the largest first, each with its likely cause.
+
+    A spike is SPIKE times the median of the errors around it, and at least SPIKE_RAD.
+    """
+    yaw_rad = np.where(result.errors.matched, result.errors.yaw_rad, 0.0)
+    if len(yaw_rad) < 2 * _AROUND + 1:
+        return []
+    around = np.lib.stride_tricks.as_strided(
+        np.pad(yaw_rad, _AROUND, mode="edge"), (len(yaw_rad), 2 * _AROUND + 1), yaw_rad.strides * 2
+    )
+    usual = np.median(around, axis=1)
+    lone = (yaw_rad >= np.maximum(SPIKE * usual, SPIKE_RAD)) & (yaw_rad >= around.max(axis=1))
+    rows = np.nonzero(lone)[0]
+    rows = rows[np.argsort(-yaw_rad[rows], kind="stable")][:most]
+    return [YawSpike(int(row), float(yaw_rad[row]), _why_off(result, int(row))) for row in rows]
+
+
+def _why_off(result: ReplayResult, row: int) -> str:
+    """What was special about a scan, in a few words."""
+    rate_deg_s = _turning_rate_deg_s(result)[row]
+    if rate_deg_s > _FAST_DEG_S:
+        return f"turning {rate_deg_s:.0f}°/s: a stamp 10 ms off is {rate_deg_s / 100.0:.1f}°"
+    if result.states[row] != LocalizationState.LOCALIZED:
+        return f"{result.states[row]}: {result.reasons[row]}"
+    if np.isfinite(result.used_share[row]) and result.used_share[row] < _FEW_EXPLAINED:
+        return f"the map explains {percent(float(result.used_share[row]))} of the beams"
+    if not result.updated[row]:
+        return "between two updates, by odometry"
+    return "one scan alone"
+
+
+def _turning_rate_deg_s(result: ReplayResult) -> np.ndarray:
+    """(S,) by odometry, the faster of the step before and the one after."""
+    steps_rad = np.abs(angles.wrap(np.diff(result.odom_from_base[:, 2])))
+    rates = np.degrees(steps_rad) / np.maximum(np.diff(result.stamps_ns) * 1e-9, 1e-3)
+    return np.maximum(np.append(rates, 0.0), np.insert(rates, 0, 0.0))
 
 
 def scan_period_s(result: ReplayResult) -> Optional[float]:

@@ -6,6 +6,7 @@ from typing import Any, Optional
 
 import numpy as np
 
+from glass_nav.evaluation.metrics import run_story
 from glass_nav.evaluation.metrics.pose_errors import LOST_M
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.vocabulary import SERIES_COLOURS, state_colour, state_hatch, states_in_order
@@ -13,6 +14,7 @@ from glass_nav.vocabulary import SERIES_COLOURS, state_colour, state_hatch, stat
 SCALE_FLOOR_M = 0.2  # errors below it shall not look like large ones
 ESTIMATE_COLOUR, YAW_COLOUR = SERIES_COLOURS[0], "#8a8a8a"
 HATCH_COLOUR = "#00000050"
+MAX_SPIKES = 3  # of the heading that get a mark
 RIBBON = 0.08  # share of the error axis below 0, for the states
 
 
@@ -49,6 +51,8 @@ def draw_errors(axes: Any, result: ReplayResult) -> None:
             fontsize=8,
             color=ESTIMATE_COLOUR,
         )
+    for spike in run_story.yaw_spikes(result, MAX_SPIKES):
+        turned.plot(seconds[spike.row], np.degrees(spike.yaw_rad), "v", color=YAW_COLOUR, markersize=5)
     axes.set_xlim(seconds[0], max(seconds[-1], seconds[0] + 1e-3))
     axes.set_ylim(-RIBBON * top, top)
     axes.set_xlabel("time since the first scan [s]")

@@ -21,6 +21,7 @@ from glass_nav.localization.beam_classification import (
     surface_scan,
 )
 from glass_nav.localization.beam_classification.beam_evidence import BeamEvidence
+from glass_nav.localization.beam_classification.behind_panes import UNKNOWN_COATINGS
 from glass_nav.localization.beam_classification.case_votes import BeamCases, CaseVote
 from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, ExpectedRanges
 from glass_nav.localization.beam_classification.glass_map import GlassEvidence, GlassMap
@@ -62,6 +63,7 @@ class BeamClassifier:
         self.thickness_m = wall_thickness.wall_thickness(grid_map)  # (H * W,)
         self.residuals = RangeResiduals(_DEPTH_SHARE, params.min_sigma_m)
         self.glass_map = GlassMap(grid_map, params.glass)
+        self._coatings = UNKNOWN_COATINGS
 
     def reconfigure(self, params: BeamClassifierParams) -> None:
         """Other parameters from the next scan on; what was learnt stays."""
@@ -108,6 +110,7 @@ class BeamClassifier:
             glass,
             scan.range_max_m,
             self._at_ends(self.known_area.is_unmapped, scan, map_from_base),
+            self._coatings,
         )
         return cases, expected
 
@@ -126,6 +129,9 @@ class BeamClassifier:
         met = np.isfinite(across)
         self.residuals = self.residuals.learn(
             across[met], expected.thickness_m[0, 0][met], self._params.min_sigma_m, self._params.max_sigma_m
+        )
+        self._coatings = case_votes.learn_coatings(
+            self._coatings, scan.ranges_m, expected, self.residuals, self._params.vote
         )
         self.glass_map.learn(*glass_map.crossings(scan.ranges_m, expected, self.residuals))
 

@@ -18,15 +18,63 @@ from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, 
 from glass_nav.vocabulary import BeamCase
 
 _PANE_INDEX = 1.51  # of soda-lime glass
-_COATINGS = ((0.5, 0.5), (1.0, 0.25), (2.0, 0.25))  # times the usual reflectance, and how frequent: it is not known
+_COATINGS = np.array([0.5, 1.0, 2.0])  # times the usual reflectance; which it is, is learnt while driving
+_FREQUENT = np.array([0.5, 0.25, 0.25])  # until then
+_WRONG = 0.05  # share of the echoes that are told wrongly, whatever the coating
+_SCAN_SHARE, _SCAN_BEAMS, _MOST_LOG = 0.5, 5.0, 4.0  # beams of one scan are one piece of evidence; it is bounded
 _MOST_REFLECTED = 0.9
 _WALL_OVER_DARK = 5.0  # reflectance of a wall over that of the darkest one seen at the largest range
 _UNMAPPED_PER_M = 0.2  # things that end a beam where the map knows nothing
 _NEW_PER_M = 0.02  # the same where it knows something: people, new furniture
 _FACE_M = 0.5  # a wall drawn from its other side has its near face at most so far in front of the drawn one
+_OTHER_WALL, _SAME_WALL = 2.0, 4.0  # steepness of a victory: reflectances of other walls differ by factors
 _WALL_GOES_ON = 0.5  # probability that a wall which a pane adjoins goes on behind it, where the map knows nothing
 _GOES_ON_SIGMAS, _PERPENDICULAR_RAD = 2.0, np.radians(10.0)  # how straight it does
 _FIRST, _MIRRORED, _SECOND = BeamCase.DIFFUSE - 1, BeamCase.SPECULAR - 1, BeamCase.FIRST_PENETRATION - 1
+
+
+@dataclass(frozen=True)
+class Coatings:
+    """How much the panes of this map mirror, learnt from beams whose echo is not in doubt."""
+
+    log_odds: np.ndarray  # (C,) of each coating, up to a constant
+
+    def frequencies(self) -> np.ndarray:
+        """(C,) probabilities, sum 1."""
+        chances = np.exp(self.log_odds - self.log_odds.max())
+        return chances / chances.sum()
+
+    def learn(
+        self, measured_m: np.ndarray, expected: ExpectedRanges, sigma_m: float, gate_m: float, gain: float
+    ) -> "Coatings":
+        """After one more scan at a trusted pose; arguments as for of().
+
+        Args:
+            gate_m: across a surface; where both echoes are expected farther apart, the range tells which it was.
+        """
+        mirrored_m, behind_m = expected.range_m[_MIRRORED, 0], expected.range_m[_SECOND, 0]
+        cos = np.maximum(expected.cos_incidence[[_MIRRORED, _SECOND], 0], MIN_COS)
+        with np.errstate(invalid="ignore"):
+            at_mirrored, at_behind = (
+                np.abs(measured_m - expected.range_m[[_MIRRORED, _SECOND], 0]) * cos <= 3.0 * sigma_m
+            )
+            apart = np.abs(mirrored_m - behind_m) * cos.min(axis=0) > 2.0 * gate_m
+            past = measured_m - expected.range_m[_FIRST, 0] > 2.0 * gate_m / MIN_COS
+        told = apart & past & (at_mirrored != at_behind) & expected.seen_side[[_MIRRORED, _SECOND]].all(axis=0)
+        told &= np.isfinite(mirrored_m) & np.isfinite(behind_m)
+        if not told.any():
+            return self
+        clear = _reflectance(np.nan_to_num(expected.pane_incidence[0][told]))
+        reflected = np.minimum(gain * _COATINGS[:, None] * clear, _MOST_REFLECTED)  # (C, told)
+        wins = _wins(reflected / (1.0 - reflected) * behind_m[told] / mirrored_m[told], _OTHER_WALL)
+        likelihood = _WRONG + (1.0 - 2.0 * _WRONG) * np.where(at_mirrored[told], wins, 1.0 - wins)
+        count = np.count_nonzero(told)
+        added = _SCAN_SHARE * min(count / _SCAN_BEAMS, 1.0) * np.log(likelihood).mean(axis=1)
+        log_odds = self.log_odds + added
+        return Coatings(np.maximum(log_odds - log_odds.max(), -_MOST_LOG))
+
+
+UNKNOWN_COATINGS = Coatings(np.log(_FREQUENT))
 
 
 @dataclass(frozen=True)
@@ -44,6 +92,7 @@ def of(
     max_range_m: float,
     gain: float,
     unmapped_end: np.ndarray,
+    coatings: Coatings = UNKNOWN_COATINGS,
 ) -> PaneEchoes:
     """The chances of each beam if the first surface along it is a pane.
 
@@ -54,21 +103,24 @@ def of(
         max_range_m: at which the lidar still sees a dark wall, face on.
         gain: how much more light panes mirror than clear glass does, on average.
         unmapped_end: (B,) bool: the mapper did not see the place where the beam ended.
+        coatings: what is known of them.
     """
     first_m, mirrored_m, behind_m, third_m = expected.range_m[:, 0]
     goes_on = np.where(unmapped_end & _is_perpendicular(expected), _WALL_GOES_ON, 0.0)
     clear = _reflectance(np.nan_to_num(expected.pane_incidence[0]))
     mirrored, loses = np.zeros((2, len(clear)))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        for coating, frequency in _COATINGS:
+        for coating, frequency in zip(_COATINGS, coatings.frequencies()):
             reflected = np.minimum(gain * coating * clear, _MOST_REFLECTED)
             over = reflected / (1.0 - reflected)
             seen = 1.0 / (1.0 + 1.0 / ((reflected * max_range_m / mirrored_m) ** 2 * _WALL_OVER_DARK))
             # Up to this range whatever stands behind the pane is brighter than the mirrored echo.
             reach_m = np.minimum(np.minimum(mirrored_m / over, behind_m), max_range_m)
             nothing_there = np.where(unmapped_end, np.exp(-_UNMAPPED_PER_M * np.maximum(reach_m - first_m, 0.0)), 1.0)
-            over_wall = _wins(over)
-            wins = goes_on * over_wall + (1.0 - goes_on) * nothing_there * _wins(over * behind_m / mirrored_m)
+            over_wall = _wins(over, _SAME_WALL)
+            wins = goes_on * over_wall + (1.0 - goes_on) * nothing_there * _wins(
+                over * behind_m / mirrored_m, _OTHER_WALL
+            )
             mirrored += frequency * seen * np.nan_to_num(wins)
             loses += frequency * (1.0 - over_wall)
         mirrored = np.where(np.isfinite(mirrored_m), mirrored, 0.0)
@@ -85,11 +137,9 @@ def of(
     return PaneEchoes(mirrored, np.where(behind, reached * density + np.nan_to_num(wall), 0.0))
 
 
-def _wins(over: np.ndarray) -> np.ndarray:
-    """(B,) probability that an echo of that amplitude over another is the stronger one: reflectances of walls differ by
-    factors, so it rises over one decade of power.
-    """
-    return 1.0 / (1.0 + over**-4.0)
+def _wins(over: np.ndarray, steepness: float) -> np.ndarray:
+    """(B,) probability that an echo of that amplitude over another is the stronger one."""
+    return 1.0 / (1.0 + over**-steepness)
 
 
 def _is_perpendicular(expected: ExpectedRanges) -> np.ndarray:

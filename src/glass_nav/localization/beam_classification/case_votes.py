@@ -17,6 +17,7 @@ import numpy as np
 
 from glass_nav import _beam_vote
 from glass_nav.localization.beam_classification import behind_panes, glass_return_model
+from glass_nav.localization.beam_classification.behind_panes import UNKNOWN_COATINGS, Coatings
 from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, ExpectedRanges
 from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
 from glass_nav.params import choice, number
@@ -29,7 +30,7 @@ _OTHER_SURFACE_M = 0.3  # between two expected ranges: an edge lies between them
 _REPORTED_GATES = 2.0  # the samples that won the vote may be one gate away from the reported pose
 _UNSEEN_SIDE = 0.002  # probability that a beam meets a wall from an unmapped side, over that from the mapped side
 _MIN_SEEN_THROUGH = 0.05  # a cell may hold a post and the edge of the pane beside it
-_MIRROR_MIN_SHARE = 0.78  # of the vote: a beam that is called mirrored wrongly costs more than an uncertain one
+_MIRROR_MIN_SHARE = 0.7  # of the vote: a beam that is called mirrored wrongly costs more than an uncertain one
 _TEMPER = 0.2  # of a sample's evidence: the errors of beams are correlated, and the best sample shall not vote alone
 _REACH, _ROUNDS = 2, 3  # of the pull between neighbouring beams
 _MIRRORED = BeamCase.SPECULAR - 1  # row of the expected ranges
@@ -91,6 +92,7 @@ def classify(
     glass: np.ndarray,
     max_range_m: float,
     unmapped_end: Optional[np.ndarray] = None,
+    coatings: Coatings = UNKNOWN_COATINGS,
 ) -> BeamCases:
     """Cases of the beams of one scan.
 
@@ -105,6 +107,7 @@ def classify(
         max_range_m: of the lidar; for the soft vote.
         unmapped_end: (B,) bool: the mapper did not see the place where the beam ended; None: it saw all. For the soft
             vote.
+        coatings: of the panes, as far as they are known; for the soft vote.
     """
     answered = np.isfinite(measured_m)
     if vote.vote_mode == "paper":
@@ -113,7 +116,7 @@ def classify(
         if unmapped_end is None:
             unmapped_end = np.zeros(len(measured_m), bool)
         at_pose = _inside_walls(_of_sample_0(expected), residuals)
-        prior = _priors(measured_m, at_pose, residuals, glass, max_range_m, unmapped_end, vote)
+        prior = _priors(measured_m, at_pose, residuals, glass, max_range_m, unmapped_end, coatings, vote)
         alone = _soft_votes(measured_m, expected, residuals, vote, prior)
         share = _pulled(alone, answered, vote.neighbour_pull)
         doubtful = alone[BeamCase.SPECULAR] < _MIRROR_MIN_SHARE  # and neighbours would only repeat it
@@ -146,6 +149,14 @@ def as_seen_from(
     return _beam_cases(
         cases.case, cases.weight, measured_m, np.where(fits, expected_m[0], cases.expected_m), fits | other
     )
+
+
+def learn_coatings(
+    coatings: Coatings, measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote
+) -> Coatings:
+    """What sample 0 of `expected`, a trusted pose, says of the panes' coatings."""
+    at_pose = _inside_walls(_of_sample_0(expected), residuals)
+    return coatings.learn(measured_m, at_pose, residuals.sigma_m, gate_m(residuals, vote), vote.mirror_gain)
 
 
 def _of_sample_0(expected: ExpectedRanges) -> ExpectedRanges:
@@ -256,6 +267,7 @@ def _priors(
     glass: np.ndarray,
     max_range_m: float,
     unmapped_end: np.ndarray,
+    coatings: Coatings,
     vote: CaseVote,
 ) -> np.ndarray:
     """(6, B) prior of cases 1 to 4, then of the ends that are case 0: at the second surface where the first is gone, and
@@ -267,7 +279,9 @@ def _priors(
     (first, second), (there, _) = glass
     first = np.clip(first, _MIN_SEEN_THROUGH, 1.0)
     passes = first * there * (1.0 - glass_return_model.min_share(incidence))
-    echoes = behind_panes.of(measured_m, expected, residuals.sigma_m, max_range_m, vote.mirror_gain, unmapped_end)
+    echoes = behind_panes.of(
+        measured_m, expected, residuals.sigma_m, max_range_m, vote.mirror_gain, unmapped_end, coatings
+    )
     mirrored = passes * echoes.mirrored
     behind = (passes - mirrored) * (1.0 - vote.prior_uncertain_behind)
     passes_again = second * (1.0 - glass_return_model.min_share(np.full(len(first), np.nan)))

@@ -21,7 +21,7 @@ from glass_nav.sensing.scan import Scan, spread_evenly
 _BEAMS = 90  # looked at
 _MIN_BEAMS = 10
 _BESIDE = 3.0  # deviations between the pose and the best fit: the scan no longer fits
-_FARTHER = 2.0  # times as far as after the last update
+_FARTHER = 3.0  # times as far as after the last update
 _LESS = 0.15  # share of the beams at walls, below that at the last update: the scan no longer fits
 
 

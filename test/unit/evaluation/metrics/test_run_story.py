@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -186,3 +187,41 @@ def test_durations_are_read_aloud(seconds, text):
 )
 def test_nearly_all_is_not_all(share, text):
     assert run_story.percent(share) == text
+
+
+@pytest.mark.parametrize(
+    "changes, why",
+    [
+        ({}, "one scan alone"),
+        ({"turn": np.radians(50.0)}, "turning 50°/s: a stamp 10 ms off is 0.5°"),
+        ({"state": "UNCERTAIN"}, "UNCERTAIN: why"),
+        ({"used_share": 0.3}, "the map explains 30.0 % of the beams"),
+        ({"updated": False}, "between two updates, by odometry"),
+    ],
+)
+def test_a_lone_spike_of_the_heading_is_explained(changes, why):
+    run = a_run()
+    poses, odometry = run.map_from_base.copy(), run.odom_from_base.copy()
+    poses[40, 2] += 0.1
+    odometry[41:, 2] += changes.get("turn", 0.0)
+    states, reasons, share, updated = list(run.states), list(run.reasons), run.used_share.copy(), run.updated.copy()
+    states[40], reasons[40] = changes.get("state", "LOCALIZED"), "why"
+    share[40], updated[40] = changes.get("used_share", 0.9), changes.get("updated", True)
+    run = replace(
+        run,
+        map_from_base=poses,
+        odom_from_base=odometry,
+        states=states,
+        reasons=reasons,
+        used_share=share,
+        updated=updated,
+    )
+    (spike,) = run_story.yaw_spikes(run)
+    assert (spike.row, spike.why) == (40, why)
+    assert spike.yaw_rad == pytest.approx(0.1, abs=1e-6)
+
+
+def test_a_heading_that_is_off_for_long_is_no_spike():
+    poses = a_run().map_from_base.copy()
+    poses[30:60, 2] += 0.1
+    assert run_story.yaw_spikes(replace(a_run(), map_from_base=poses)) == []

@@ -1,17 +1,19 @@
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from made_results import GRID, a_result
+from matplotlib.figure import Figure
 from PIL import Image
 
 from glass_nav.evaluation.metrics import replay_result, run_story
 from glass_nav.evaluation.metrics.replay_result import NO_BEAM, KeptScan
 from glass_nav.evaluation.pages import report_page
 from glass_nav.evaluation.plots import report_pictures
-from glass_nav.evaluation.plots.report import cases_over_time, driven_path, reliability
+from glass_nav.evaluation.plots.report import cases_over_time, driven_path, reliability, worst_scans
 from glass_nav.evaluation.plots.report.ground import Ground
 from glass_nav.vocabulary import BeamCase
 from glass_nav.world.grid_map import GridMap
@@ -162,3 +164,34 @@ def test_a_kept_scan_comes_back_as_it_was(tmp_path):
     np.testing.assert_allclose(kept[0].points_m, KEPT[0].points_m)
     np.testing.assert_allclose(kept[1].points_m, [[0.0, 1.0], [np.nan, np.nan]])
     np.testing.assert_array_equal(kept[0].base_from_laser, [0.1, 0.0, 0.0])
+
+
+NAMED = re.compile(r".+ \[.+\]$")
+
+
+def test_every_axis_of_a_report_has_a_name_and_a_unit(tmp_path, monkeypatch):
+    figures = []
+    made = Figure.__init__
+
+    def remember(self, *args, **kwargs):
+        made(self, *args, **kwargs)
+        figures.append(self)
+
+    monkeypatch.setattr(Figure, "__init__", remember)
+    report_pictures.draw_all(tmp_path, a_result(worst=KEPT[:1]), Ground(GRID, None), None)
+    assert len(figures) >= 6
+    for figure in figures:
+        for axes in figure.axes:
+            labels = [axes.get_ylabel()] if axes.get_xlabel() == "" else [axes.get_xlabel(), axes.get_ylabel()]
+            assert all(NAMED.match(label.replace("\n", " ")) for label in labels), labels
+
+
+def test_the_worst_scan_is_laid_over_itself_at_the_true_pose(tmp_path):
+    empty = GridMap(np.zeros((100, 100), np.int8), 0.1, np.array([-5.0, -5.0, 0.0]))
+    result = a_result(
+        cases=np.full((4, 1), 4, np.uint8),
+        worst=[KeptScan(1, np.zeros(3), np.array([[2.0, 0.0]]))],
+        map_from_base=np.array([[i, 1.0, 0.0] for i in range(4)], float),
+    )
+    picture = worst_scans.draw(tmp_path, result, Ground(empty, None), 1, result.worst[0])
+    assert "where the same beams end at the true pose" in picture.caption

@@ -56,8 +56,8 @@ def test_a_cloud_everywhere_takes_the_most():
 @pytest.mark.parametrize(
     "values, text",
     [
-        (dict(min_particles=10, max_particles=5), "~min_particles must be in [1, max_particles = 5], got 10"),
-        (dict(min_particles=0), "~min_particles must be in [1, max_particles = 5000], got 0"),
+        (dict(min_particles=10, max_particles=5), "~min_particles must be in [1, ~max_particles = 5], got 10"),
+        (dict(min_particles=0), "~min_particles must be in [1, ~max_particles = 5000], got 0"),
         (dict(kld_err=0.0), "~kld_err must be > 0, got 0.0"),
         (dict(kld_z=-1.0), "~kld_z must be >= 0, got -1.0"),
     ],

@@ -7,10 +7,11 @@ from typing import Optional
 
 import numpy as np
 
+from glass_nav.evaluation.metrics import run_story
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.evaluation.metrics.run_story import metres
 from glass_nav.evaluation.plots.canvas import Picture, new_figure, save
-from glass_nav.evaluation.plots.error_curve import ESTIMATE_COLOUR, draw_errors
+from glass_nav.evaluation.plots.error_curve import ESTIMATE_COLOUR, MAX_SPIKES, draw_errors
 from glass_nav.evaluation.plots.report.ground import Ground
 
 MIN_M = 1e-3  # errors below are drawn there, on a logarithmic axis
@@ -48,5 +49,15 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
         f"Position and heading error over time; median {metres(float(np.median(off)))}, at most "
         f"{metres(float(off.max()))}.",
         "Left: errors against the ground truth over time, and the state. Right: for how many scans the error "
-        "was below a distance.",
+        "was below a distance." + _spikes(result),
     )
+
+
+def _spikes(result: ReplayResult) -> str:
+    """What lone spikes of the heading are due to."""
+    spikes = run_story.yaw_spikes(result, MAX_SPIKES)
+    if not spikes:
+        return ""
+    seconds = run_story.seconds_of(result)
+    words = "; ".join(f"{np.degrees(each.yaw_rad):.1f}° at {seconds[each.row]:.1f} s ({each.why})" for each in spikes)
+    return f" Lone spikes of the heading, marked by triangles: {words}."

@@ -26,7 +26,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground, number: int, kept: 
     if errors.matched[row]:
         assert result.reference is not None
         poses.append(("true pose", result.reference.at(result.stamps_ns[row])))
-    figure = new_figure(4.6 * len(poses), 4.8)
+    figure = new_figure(4.6 * len(poses), 5.4)
     cases = result.cases[row, : len(kept.points_m)]
     answered = np.isfinite(kept.points_m).all(axis=1) & (cases < len(BeamCase))
     for axes, (name, pose) in zip(figure.subplots(1, len(poses), squeeze=False)[0], poses):
