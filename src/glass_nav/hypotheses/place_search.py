@@ -19,6 +19,7 @@ from glass_nav.sensing.distance_field import DistanceField
 _STARTS = 4000  # poses that the matcher proposes
 _SLIDE_M = 0.6  # that an alignment may move one; farther away it is another place
 _SLICE = 20_000_000  # look-ups of the matcher: about 40 ms
+_CACHED_CELLS = 1_000_000  # a look-up in a larger map takes about three times as long
 _LOOK_UPS_PER_BEAM = 75  # that the alignment of one beam costs as much as
 
 
@@ -37,6 +38,7 @@ class PlaceSearch:
         """
         self._field, self._points_m = field, points_m
         self._odom_from_base = np.array(odom_from_base, float)
+        self._slice = _SLICE if matcher.cell_count <= _CACHED_CELLS else _SLICE // 3
         self._matching = matcher.begin(points_m, _STARTS)
         self._matched = False
         self._starts = np.zeros((0, 3))  # still to be aligned
@@ -45,7 +47,7 @@ class PlaceSearch:
 
     def advance(self) -> bool:
         """One slice; whether the search is complete."""
-        left = _SLICE
+        left = self._slice
         if not self._matched:
             before = self._matching.look_ups
             self._matched = self._matching.advance(left)

@@ -32,8 +32,8 @@ def complete(search):
 @pytest.mark.parametrize("slice_size", [200_000, 3_000_000])
 def test_the_size_of_the_slices_does_not_change_the_places(monkeypatch, slice_size):
     true = loop_drive(3)[-1]
-    at_once = search_from(true, np.zeros(3))
     monkeypatch.setattr(place_search, "_SLICE", 10**12)
+    at_once = search_from(true, np.zeros(3))
     assert complete(at_once) == 1
     monkeypatch.setattr(place_search, "_SLICE", slice_size)
     sliced = search_from(true, np.zeros(3))
