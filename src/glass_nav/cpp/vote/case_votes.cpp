@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t kFirst = 0, kMirrored = 1, kSecond = 2;
 constexpr std::size_t kGone = kPaths, kElsewhere = kPaths + 1;  // rows of the priors
-constexpr double kMostSquare = 100.0;  // of a residual in sigmas
+constexpr double kMostSquare = 100.0;                           // of a residual in sigmas
 
 /// Weights of the samples, sum 1, from their log evidence.
 void weigh(std::vector<double>& log_evidence, double temper) {
@@ -43,8 +43,7 @@ void count_case_votes(const Offers& offers, const Chances& chances, double* shar
         const double across = (z - end_m) * cos;
         if (!(std::abs(across) <= chances.gate_m)) continue;
         // An error of the mirror's own place counts twice, along its normal.
-        const double widening =
-            path == kMirrored ? std::hypot(1.0, 2.0 * offers.cos[kFirst * plane + i]) : 1.0;
+        const double widening = path == kMirrored ? std::hypot(1.0, 2.0 * offers.cos[kFirst * plane + i]) : 1.0;
         const double sigmas = across / (chances.sigma_m * widening);
         const double density = std::exp(-0.5 * std::min(sigmas * sigmas, kMostSquare)) / widening;
         const double of_path = chances.prior[path * beams + b] * density;

@@ -31,8 +31,8 @@ struct Chances {
 };
 
 /// Writes shares of the vote, (kPaths + 1) * beams: nothing on the map, then the cases in the order of the paths; the
-/// shares of each beam add up to 1. The prior of an end anywhere else is a density on the scale of the others, which are
-/// 1 at the peak: it does not depend on the sample.
+/// shares of each beam add up to 1. The prior of an end anywhere else is a density on the scale of the others, which
+/// are 1 at the peak: it does not depend on the sample.
 void count_case_votes(const Offers& offers, const Chances& chances, double* share);
 
 }  // namespace glass_nav

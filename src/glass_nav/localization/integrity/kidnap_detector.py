@@ -8,7 +8,9 @@ robot is there. The formulation is ours.
 
 Once the pose was sure, dead reckoning since then is a prior over places, with a heavy tail: the robot may have been
 carried away. Of two halls that look alike the one that odometry leads to is right, and a tracked pose that the scans
-dragged away from it has no advantage.
+dragged away from it has no advantage. But when the scans say that the robot was moved without driving
+(scan_continuity.py), neither odometry nor the tracked pose says anything about where it is: then the pose is contested
+until it is ahead of all other places.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from glass_nav.hypotheses import global_search, pose_tracker
 from glass_nav.hypotheses.global_search import Candidates, GlobalSearch, SearchParams
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.localization.integrity.dead_reckoning import DeadReckoning
+from glass_nav.localization.integrity.scan_continuity import ScanContinuity
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.known_area import KnownArea
 from glass_nav.sensing.scan import Scan
@@ -41,6 +44,9 @@ _HEAD_START = 3.0  # log likelihood ratio of the tracked pose, or of where odome
 _CARRIED_AWAY = -10.0  # log likelihood ratio of any other place to where odometry leads: for a new pose
 _SETTLED_M = 6.0  # after this distance as the best candidate, the fit at the tracked pose is the usual one
 _CALM_M = 2.0  # after this distance of usual fits nothing was wrong
+_CLEAR = (
+    3.0  # log likelihood ratio of the tracked pose to all others from which it is trusted though the robot was moved
+)
 _CLOSE = -1.0  # log likelihood ratio of another place to the tracked pose from which it may be the right one
 
 
@@ -55,6 +61,7 @@ class Verdict:
     found: Optional[np.ndarray]  # (3,) the pose where the robot is instead
     candidates: Optional[Candidates]  # during a search
     elsewhere: Optional[np.ndarray] = None  # (3,) the best place that is not the tracked one, during a search
+    moved: bool = False  # the robot was moved without driving, and is not known to be at the tracked pose again
 
     @property
     def fit_there(self) -> float:
@@ -68,8 +75,8 @@ class Verdict:
 
     @property
     def contested(self) -> bool:
-        """The scans fit worse than they used to, and about as well or better elsewhere."""
-        return self.doubted and self.log_ratio > _CLOSE
+        """The scans fit worse than they used to, or the robot was moved, and they fit about as well or better elsewhere."""
+        return self.moved or (self.doubted and self.log_ratio > _CLOSE)
 
 
 class KidnapDetector:
@@ -101,6 +108,8 @@ class KidnapDetector:
         self._search_m = self._calm_m = 0.0
         self._search_fit_m = 0.0  # sum of fit times distance during the search
         self._odom_from_base: Optional[np.ndarray] = None
+        self._continuity = ScanContinuity()
+        self._moved = False  # without driving, since the last search that found the tracked pose right
         self._verdict = Verdict(float("nan"), self._usual, -np.inf, False, None, None)
 
     def decide_by(self, params: SearchParams) -> None:
@@ -134,8 +143,13 @@ class KidnapDetector:
         fit = float(global_search.fit(self._field, known, map_from_base[None])[0])
         self._fit = fit if np.isnan(self._fit) else self._fit + (fit - self._fit) * -np.expm1(-step_m / _FORGET_M)
         doubted = self._usual - self._fit > max(_DOUBT[0], _DOUBT[1] * self._spread)
-        if self._search is None and doubted and self._params.recover_when_lost and self._matcher is not None:
-            self._begin_search(self._matcher, map_from_base, dead_reckoning)
+        matcher = self._matcher if self._params.recover_when_lost else None
+        if matcher is not None and self._continuity.observe(scan, odom_from_base):
+            self._moved, self._search = True, None  # what a search gathered before is about another place
+        if self._moved:
+            dead_reckoning = None
+        if matcher is not None and self._search is None and (doubted or self._moved):
+            self._begin_search(matcher, map_from_base, dead_reckoning)
         if self._search is None:
             if not doubted:
                 self._learn(fit, step_m)
@@ -155,7 +169,7 @@ class KidnapDetector:
         self._search = GlobalSearch(matcher, self._field, self._params, self._area)
         self._search_m = self._calm_m = self._search_fit_m = 0.0
         if dead_reckoning is None:
-            self._search.add(map_from_base, _HEAD_START)
+            self._search.add(map_from_base, 0.0 if self._moved else _HEAD_START)
         else:
             self._search.add(map_from_base, 0.0)
             self._search.add(dead_reckoning.map_from_base, 0.0)
@@ -171,7 +185,7 @@ class KidnapDetector:
     ) -> Verdict:
         """The tracked pose with the best place elsewhere."""
         if np.isnan(candidates.fit):  # the first scan has not been matched everywhere yet
-            return Verdict(self._fit, self._usual, -np.inf, doubted, None, None)
+            return Verdict(self._fit, self._usual, -np.inf, doubted, None, None, None, self._moved)
         here = pose_tracker.same_place(candidates.poses, map_from_base)
         with np.errstate(divide="ignore"):
             log_w = np.log(candidates.weights)
@@ -183,17 +197,19 @@ class KidnapDetector:
         log_ratio = float(log_there - log_w[here].max()) if here.any() else np.inf
         fit_during_search = self._search_fit_m / self._search_m
         steady = self._fit > fit_during_search - _DOUBT[0]
+        ahead = -_CLEAR if self._moved else 0.0
         best_here = steady and (
-            log_ratio < -self._params.search_margin or (log_ratio <= 0.0 and self._search_m > _SETTLED_M)
+            log_ratio < -self._params.search_margin or (log_ratio <= ahead and self._search_m > _SETTLED_M)
         )
-        calm = self._calm_m > _CALM_M and log_ratio < self._params.search_margin
+        calm = not self._moved and self._calm_m > _CALM_M and log_ratio < self._params.search_margin
         if best_here and doubted:  # scans fit like this here, until they fit better again
             self._usual, self._learnt_m = fit_during_search, _PRIOR_M
-        if best_here or calm or (log_ratio <= 0.0 and not doubted):
-            self._search = None
+        contested = self._moved and log_ratio > -_CLEAR
+        if best_here or calm or (log_ratio <= 0.0 and not doubted and not self._moved):
+            self._search, self._moved = None, False
         found = candidates.poses[0] if candidates.found and not here[0] else None
         there = None if elsewhere is None else candidates.poses[elsewhere]
-        return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates, there)
+        return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates, there, contested)
 
     def _learn(self, fit: float, step_m: float) -> None:
         """How well scans fit where the pose is right, and how much that varies."""

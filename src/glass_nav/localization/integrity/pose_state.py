@@ -168,6 +168,8 @@ def _elsewhere(verdict: Optional[Verdict]) -> Optional[str]:
     if verdict.contested and verdict.elsewhere is not None:
         x, y, yaw = verdict.elsewhere
         return f"the scans fit as well or better elsewhere, best at x {x:.1f} m, y {y:.1f} m, {np.degrees(yaw):.0f} deg"
+    if verdict.moved:
+        return "what the lidar sees changed at once, as if the robot had been carried away"
     if verdict.poor:
         return f"scan fit {verdict.fit:.0%}, usually {verdict.usual:.0%}"
     return None

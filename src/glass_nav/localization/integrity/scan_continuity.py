@@ -1,0 +1,118 @@
+"""Scan, the scan before it, odometry between them -> was the robot moved without driving?
+
+A robot that is carried to a place that looks like the one it left cannot tell from the map: among doors that look alike
+scans fit as well as they did. But what it sees changes at once. Where the lidar looked through a moment ago there is a
+surface now, and the other way round. A few beams contradict each other always, where people walk and at the edges of
+things, more in glass; how many is learnt. A break counts if the next scan contradicts the one before it as well: a person
+who steps before the lidar makes a single scan look like another place. The formulation is ours. B beams.
+"""
+
+from __future__ import annotations
+
+from typing import Optional, Tuple
+
+import numpy as np
+
+from glass_nav.geometry import se2
+from glass_nav.sensing.scan import Scan
+
+_TOLERANCE_M, _TOLERANCE_SHARE = 0.15, 0.03  # of a range: nearer than that to what was seen is no contradiction
+_TOLERANCE_RAD = 0.035  # of a bearing, odometry's error included
+_MIN_BEAMS = 20  # with fewer a scan is no evidence
+_MEMORY_SCANS = 20.0  # that what is usual is averaged over
+_MIN_SCANS = 5  # before anything is unusual
+_USUAL = (0.15, 4.0)  # above the usual share of contradictions, as such and in mean deviations: a break
+_TURNS_RAD = (0.0, -0.05, 0.05, -0.1, 0.1, -0.2, 0.2)  # that odometry may have missed
+_MAX_STEP_M = 1.0  # farther apart two scans need not have anything in common
+
+
+class ScanContinuity:
+    """Compares each scan with the one before it."""
+
+    def __init__(self) -> None:
+        self._last: Optional[Tuple[Scan, np.ndarray]] = None  # and the odometry at it
+        self._before: Optional[Tuple[Scan, np.ndarray]] = None  # the one before a break that the next scan may confirm
+        self._usual, self._deviation, self._scans = 0.0, 0.0, 0
+
+    def observe(self, scan: Scan, odom_from_base: np.ndarray) -> bool:
+        """Whether this scan and the last one both contradict the one before them far more than scans usually do.
+
+        Args:
+            scan: one revolution of a lidar.
+            odom_from_base: (3,) odometry at its stamp.
+        """
+        if np.count_nonzero(scan.answered) < _MIN_BEAMS:
+            return False
+        now = scan, np.array(odom_from_base, float)
+        before, last = self._before, self._last
+        self._before, self._last = None, now
+        excess = -np.inf if last is None else self._excess(last, now)
+        confirmed = before is not None and self._excess(before, now) > self._limit
+        if (
+            before is None and excess > self._limit
+        ):  # else the last scan was the odd one, and contradicts both its sides
+            self._before = last
+        if np.isfinite(excess):
+            self._learn(excess)
+        return confirmed
+
+    @property
+    def _limit(self) -> float:
+        """Of the excess; none until it is known what is usual."""
+        return max(_USUAL[0], _USUAL[1] * self._deviation) if self._scans >= _MIN_SCANS else np.inf
+
+    def _excess(self, before: Tuple[Scan, np.ndarray], after: Tuple[Scan, np.ndarray]) -> float:
+        """Share of contradictions above the usual one; -inf: the two cannot be compared."""
+        step = se2.compose(se2.inverse(before[1]), after[1])
+        if before[0].lidar != after[0].lidar or se2.travelled(step)[0] > _MAX_STEP_M:
+            return -np.inf
+        least = np.inf
+        for turn_rad in _TURNS_RAD:
+            least = min(least, contradictions(before[0], after[0], step + [0.0, 0.0, turn_rad]) - self._usual)
+            if least <= self._limit:  # explained
+                break
+        return least
+
+    def _learn(self, excess: float) -> None:
+        self._scans += 1
+        weight = 1.0 / min(self._scans, _MEMORY_SCANS)
+        self._usual += weight * excess
+        self._deviation += weight * (abs(excess) - self._deviation)
+
+
+def contradictions(before: Scan, after: Scan, step: np.ndarray) -> float:
+    """Share of the end points of two scans, taken a step (3,) apart, that the other scan looked through."""
+    before_from_after = se2.compose(
+        se2.inverse(before.base_from_laser), se2.compose(np.asarray(step, float), after.base_from_laser)
+    )
+    seen = _looked_through(before, _ends(after), before_from_after)
+    missed = _looked_through(after, _ends(before), se2.inverse(before_from_after))
+    return float(np.concatenate([seen, missed]).mean())
+
+
+def _ends(scan: Scan) -> np.ndarray:
+    """(B, 2) end points [m] in the frame of the lidar."""
+    ranges_m, bearings = scan.ranges_m[scan.answered], scan.angles_rad[scan.answered]
+    return np.column_stack([ranges_m * np.cos(bearings), ranges_m * np.sin(bearings)])
+
+
+def _looked_through(scan: Scan, points_m: np.ndarray, laser_from_points: np.ndarray) -> np.ndarray:
+    """(N,) bool: all beams of the scan that pass close to a point (N, 2) end behind it."""
+    points_m = se2.transform_points(laser_from_points, points_m)
+    range_m = np.hypot(points_m[:, 0], points_m[:, 1])
+    bearing = np.arctan2(points_m[:, 1], points_m[:, 0])
+    answered = scan.answered
+    order = np.argsort(scan.angles_rad[answered])
+    beams_rad, ends_m = scan.angles_rad[answered][order], scan.ranges_m[answered][order]
+    turned = beams_rad[0] + np.mod(bearing - beams_rad[0] + _TOLERANCE_RAD, 2.0 * np.pi) - _TOLERANCE_RAD
+    first = np.searchsorted(beams_rad, turned - _TOLERANCE_RAD)
+    last = np.searchsorted(beams_rad, turned + _TOLERANCE_RAD)
+    nearest_m = _minimum_between(ends_m, first, last)
+    return np.isfinite(nearest_m) & (range_m + _TOLERANCE_M + _TOLERANCE_SHARE * range_m < nearest_m)
+
+
+def _minimum_between(values: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """(N,) least of values[first:last]; inf where that is empty."""
+    padded = np.append(values, [np.inf, np.inf])
+    least = np.minimum.reduceat(padded, np.column_stack([first, np.maximum(last, first + 1)]).ravel())[::2]
+    return np.where(last > first, least, np.inf)
