@@ -103,7 +103,6 @@ class LocalizationPanes(unittest.TestCase):
         self.assertIn("glass_cell", kept.arrays)
         self.end()
 
-        self.robot.moving = False
         self.start()
         self.assertTrue(wait_until(lambda: self.lines.having("panes that the map lacks", str(self.file)), 20.0))
         self.assertTrue(wait_until(self.line_is_drawn, 30.0), "the pane is forgotten")
