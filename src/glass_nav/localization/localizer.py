@@ -25,7 +25,7 @@ from glass_nav.localization.beam_classification.unmapped_panes import UnmappedPa
 from glass_nav.localization.integrity import pose_state, protection_level
 from glass_nav.localization.integrity.dead_reckoning import DeadReckoning
 from glass_nav.localization.integrity.integrity_monitor import IntegrityMonitor
-from glass_nav.localization.integrity.kidnap_detector import KidnapDetector
+from glass_nav.localization.integrity.kidnap_detector import KidnapDetector, Verdict
 from glass_nav.localization.integrity.protection_level import ProtectionLevels
 from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.particle_filter.particle_filter import ONE_PLACE, ParticleFilter, ParticleFilterParams
@@ -242,6 +242,8 @@ class Localizer:
         if not due and self._integrity.fits(scan, map_from_base, step, self._params.odometry):
             best = self._filter.best
             cases, expected = self._classifier.classify(scan, map_from_base, best.covariance, for_weights=False)
+            if self._search is None and self._kidnap_detector.is_matching:  # a robot that stands is to know, too
+                self._watch(scan, odom_from_base, map_from_base, step)
             return self._judged(scan, map_from_base, cases, expected, step)
         cases = self._track(scan, odom_from_base) if self._search is None else self._find(scan, odom_from_base)
         self._schedule.updated(scan.lidar, odom_from_base)
@@ -267,13 +269,21 @@ class Localizer:
         cases = self._correct(scan, odom_from_base, step)
         if taken:
             self._integrity.narrow(self._filter.best.covariance)
-        verdict = self._kidnap_detector.observe(
-            scan, odom_from_base, self._filter.best.map_from_base, self._dead_reckoning
-        )
-        self._quality.doubt(verdict)
+        verdict = self._watch(scan, odom_from_base, self._filter.best.map_from_base, None)
         if verdict.found is not None:
             return self._settle(scan, odom_from_base, verdict.found, verdict.fit_there)
         return cases
+
+    def _watch(
+        self, scan: Scan, odom_from_base: np.ndarray, map_from_base: np.ndarray, step: Optional[np.ndarray]
+    ) -> Verdict:
+        """What the scan says about the tracked pose; `step` since the last update: None at an update."""
+        reckoned = self._dead_reckoning
+        if reckoned is not None and step is not None:
+            reckoned = reckoned.carried(step, self._params.odometry)
+        verdict = self._kidnap_detector.observe(scan, odom_from_base, map_from_base, reckoned)
+        self._quality.doubt(verdict)
+        return verdict
 
     def _correct(self, scan: Scan, odom_from_base: np.ndarray, step: Optional[np.ndarray]) -> BeamCases:
         """The scan draws and weighs the particles, and the best cluster of them is the pose."""

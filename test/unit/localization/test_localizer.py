@@ -13,6 +13,7 @@ from buildings import BASE_FROM_LASER, GLASS_ROOM, L_ROOM, SECOND_NS, Building, 
 
 from glass_nav import params
 from glass_nav.geometry import angles, se2
+from glass_nav.hypotheses import place_search
 from glass_nav.localization.localizer import Localizer
 from glass_nav.localization.localizer_params import LaserLimits, LocalizerParams, Schedule
 from glass_nav.sensing import bearings
@@ -778,6 +779,17 @@ def test_mrpts_ray_casts_give_nearly_the_same_answer(drive):
     assert np.abs(drive.errors(ours) - drive.errors(mrpts)).max() < 0.03
     same_case = [np.mean(one.cases.case == other.cases.case) for one, other in zip(ours, mrpts)]
     assert np.mean(same_case) > 0.98
+
+
+def test_the_search_beside_tracking_ends_though_the_robot_stands(drive, monkeypatch):
+    """Each scan advances it, though only the first one moves the particles; its verdict changes the confidence."""
+    monkeypatch.setattr(place_search, "_SLICE", 1_000_000)
+    localizer = started(at=drive.true[0] + [0.0, 0.0, 0.5])
+    stands = [
+        localizer.update(replace(drive.scans[0], stamp_ns=index * SECOND_NS), drive.odometry[0]) for index in range(60)
+    ]
+    assert not any(estimate.updated for estimate in stands[1:])
+    assert stands[-1].confidence > 2.0 * stands[1].confidence
 
 
 @pytest.mark.long_run

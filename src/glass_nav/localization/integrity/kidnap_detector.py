@@ -44,9 +44,7 @@ _HEAD_START = 3.0  # log likelihood ratio of the tracked pose, or of where odome
 _CARRIED_AWAY = -10.0  # log likelihood ratio of any other place to where odometry leads: for a new pose
 _SETTLED_M = 6.0  # after this distance as the best candidate, the fit at the tracked pose is the usual one
 _CALM_M = 2.0  # after this distance of usual fits nothing was wrong
-_CLEAR = (
-    3.0  # log likelihood ratio of the tracked pose to all others from which it is trusted though the robot was moved
-)
+_CLEAR = 3.0  # log likelihood ratio of the tracked pose to all others: it is trusted though the robot was moved
 _CLOSE = -1.0  # log likelihood ratio of another place to the tracked pose from which it may be the right one
 
 
@@ -117,6 +115,11 @@ class KidnapDetector:
         self._params = params
         if self._search is not None:
             self._search.decide_by(params)
+
+    @property
+    def is_matching(self) -> bool:
+        """A search has begun, and its first scan has not been matched everywhere yet: more scans advance that."""
+        return self._search is not None and self._verdict.candidates is None
 
     def observe(
         self,
