@@ -88,7 +88,15 @@ def test_nothing_of_the_tests_or_the_build_is_installed(install: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "module", ["glass_nav._beam_vote", "glass_nav._mrpt_grid", "glass_nav._mrpt_io", "glass_nav.msg"]
+    "module",
+    [
+        "glass_nav._beam_vote",
+        "glass_nav._distance_field",
+        "glass_nav._mrpt_grid",
+        "glass_nav._mrpt_io",
+        "glass_nav.msg",
+        "glass_nav.srv",
+    ],
 )
 def test_compiled_modules_and_messages_come_from_the_install_space(install: Path, tmp_path: Path, module: str) -> None:
     done = in_install_space(install, f"/usr/bin/python3 -c 'import {module} as m; print(m.__file__)'", tmp_path)

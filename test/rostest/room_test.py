@@ -43,7 +43,9 @@ class RoomTest(unittest.TestCase):
         self.assertTrue(wait_until(self.initialpose.get_num_connections, 30.0), "nobody listens to initialpose")
         self.assertTrue(wait_until(lambda: len(self.transforms), 30.0), "no map -> odom within 30 s")
         self.poses.clear()
+        self.lines.clear()
         self.initialpose.publish(pose_message(self.robot.map_from_base()))
+        self.expect_line("starting at")
         self.expect_right_pose()
         self.lines.clear()
 
