@@ -7,7 +7,7 @@ nor what the beam passed, so glass hardly misleads it, and is no information to 
 
 from __future__ import annotations
 
-from typing import Tuple
+from typing import Any, Dict, Tuple
 
 import numpy as np
 from scipy import ndimage
@@ -36,6 +36,10 @@ class DistanceField:
         self.compiled = _distance_field.DistanceField(
             distance, grid_map.resolution_m, grid_map.map_from_grid, max_distance_m
         )
+
+    def __deepcopy__(self, _memo: Dict[int, Any]) -> DistanceField:
+        """Itself: it never changes."""
+        return self
 
     def at(self, x_m: np.ndarray, y_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Distance and its gradient at points of the frame map.
