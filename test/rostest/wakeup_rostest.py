@@ -151,7 +151,7 @@ class WakeUp(unittest.TestCase):
         code, printed = demo.wait(2 * STEP_S)  # which drives to a node, and measures
         self.assertEqual(code, 0, printed)
         self.assertIn("wakes up at x ", printed)
-        self.assertIn("  match node M0: degree 3, r ", printed)
+        self.assertRegex(printed, r"  match node M0: degree [34], r ")
         self.assertIn("  match edge E0: ", printed)
         self.assertIn(f"CONFIRMED after {self.topology.last.depth} edges, right: hands over x ", printed)
         self.assertRegex(printed, r"goto_node \d+: it stands at the goal, .* m driven; truly 0\.[01]\d m from the node")

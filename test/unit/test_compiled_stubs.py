@@ -23,6 +23,8 @@ def in_stub(body: List[ast.stmt]) -> Names:
     for node in body:
         if isinstance(node, ast.FunctionDef):
             found[node.name] = [argument.arg for argument in node.args.args]
+        elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+            found[node.target.id] = ["self"]  # an attribute
         elif isinstance(node, ast.ClassDef) and not node.bases:
             found[node.name] = in_stub(node.body)
     return found
@@ -37,6 +39,8 @@ def in_module(owner: Any) -> Names:
             continue
         if isinstance(value, type):
             found[name] = in_module(value)
+        elif isinstance(value, property):
+            found[name] = ["self"]
         else:
             signature = value.__doc__.strip().splitlines()[0]
             found[name] = re.findall(r"(\w+): ", signature)

@@ -28,6 +28,7 @@ NODE_ONLY = frozenset(
         "pose_file",
         "pose_file_max_age_s",
         "pose_file_max_speed_m_s",
+        "panes_file",
         "landmark_file",
     ]
 )

@@ -163,7 +163,12 @@ def summary(claims: IntegrityTrace) -> Dict[str, Optional[float]]:
         "time_to_alarm_s": to_alarm,
         "time_back_s": back,
     }
-    return {name: value if value is not None and math.isfinite(value) else None for name, value in figures.items()}
+    return {name: None if value is None else _rounded(value) for name, value in figures.items()}
+
+
+def _rounded(value: float) -> Optional[float]:
+    """To 12 digits, the last ones of a sum depend on where its terms lie in memory; None: infinite or NaN."""
+    return float(f"{value:.12g}") if math.isfinite(value) else None
 
 
 def rows_of(mask: np.ndarray) -> List[Tuple[int, int]]:

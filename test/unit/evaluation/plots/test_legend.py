@@ -7,7 +7,6 @@ import pytest
 from PIL import Image
 
 from glass_nav.evaluation.plots import legend
-from glass_nav.ros.topology import topology_displays
 from glass_nav.shapes import FIGURES
 from glass_nav.vocabulary import CASE_MARKS, CASES_IN_ORDER, SEARCH_RGB, WallKind
 
@@ -44,8 +43,15 @@ def test_all_that_is_shown_has_a_row():
         assert any(words.startswith(str(kind)) and row.rgb == kind.rgb for words, row in rows.items())
     colours = [row.rgb for row in legend.SECTIONS["Place in the atlas"]]
     assert set(SEARCH_RGB.values()) < set(colours)
-    assert {topology_displays.ATLAS_RGB, topology_displays.FOREST_RGB, topology_displays.LEFT_OUT_RGB} < set(colours)
     assert len(legend.SECTIONS["Landmarks"]) == 3
+
+
+def test_the_marks_of_the_topological_node_have_their_rows():
+    pytest.importorskip("geometry_msgs", reason="no ROS beside this Python")
+    from glass_nav.ros.topology import topology_displays
+
+    colours = [row.rgb for row in legend.SECTIONS["Place in the atlas"]]
+    assert {topology_displays.ATLAS_RGB, topology_displays.FOREST_RGB, topology_displays.LEFT_OUT_RGB} < set(colours)
 
 
 def test_letters_are_smooth():
