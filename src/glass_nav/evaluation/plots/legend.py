@@ -39,6 +39,7 @@ FONT_PX = 11
 _ROW, _HEADING, _MARGIN = 15, 18, 5
 _SWATCH = (34, 13)  # of the mark before the words
 _FINE = 4  # a swatch is drawn that many times larger, and scaled down: smooth edges
+_BASIC_LAYOUT = 0  # of Pillow; its other one, raqm, crashes in the Pillow of ROS Noetic
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,8 @@ def _font(name: str) -> Any:
     import matplotlib
     from PIL import ImageFont
 
-    return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name), FONT_PX)
+    path = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name
+    return ImageFont.truetype(str(path), FONT_PX, layout_engine=_BASIC_LAYOUT)
 
 
 def _swatch(row: Row) -> Any:
