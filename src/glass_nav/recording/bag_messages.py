@@ -128,14 +128,16 @@ class Bag:
             for connection in reader.connections:
                 if messages.text_of(connection):
                     reader.typestore.register(get_types_from_msg(messages.text_of(connection), connection.msgtype))
-        known = reader.typestore.fielddefs
+        known = messages.definitions_of(reader.typestore)
         if any(connection.msgtype not in known for connection in reader.connections):
-            reader.typestore.register({name: each for name, each in ours.fielddefs.items() if name not in known})
+            reader.typestore.register(
+                {name: each for name, each in messages.definitions_of(ours).items() if name not in known}
+            )
 
     def _check_defined(self, connection: Any) -> None:
         kind = connection.msgtype.replace("/msg/", "/")
         if self._reader.is2:
-            if connection.msgtype not in self._reader.typestore.fielddefs:
+            if connection.msgtype not in messages.definitions_of(self._reader.typestore):
                 raise RecordingError(
                     f"{self.path}: {absolute(connection.topic)} is {kind}, which the bag does not define; "
                     "`ros2 bag record --storage mcap` writes definitions"

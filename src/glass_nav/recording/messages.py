@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import Any, Optional
+from typing import Any, Dict, Optional
 
 from glass_nav.recording.message_writer import TF_MESSAGE, TF_TYPE
 
@@ -41,7 +41,7 @@ def text_of(connection: Any) -> str:
 def noetic_md5(kind: str) -> Optional[str]:
     """Of a type as rosbags writes it; None if Noetic does not have it."""
     store = noetic_store()
-    return str(store.generate_msgdef(kind)[1]) if kind in store.fielddefs else None
+    return str(store.generate_msgdef(kind)[1]) if kind in definitions_of(store) else None
 
 
 def ros2_store() -> Any:
@@ -52,3 +52,8 @@ def ros2_store() -> Any:
     store.register(get_types_from_msg(TRUE_BEAMS, "glass_nav/msg/TrueBeams"))
     store.register(get_types_from_msg(BEAM_CASES, "glass_nav/msg/BeamCases"))
     return store
+
+
+def definitions_of(store: Any) -> Dict[str, Any]:
+    """The message definitions that a typestore knows, by type; older rosbags write the name in capitals."""
+    return dict(getattr(store, "fielddefs", None) or store.FIELDDEFS)

@@ -19,7 +19,7 @@ def map_of(walls, size_m=(20.0, 20.0), resolution_m=RESOLUTION_M):
     cells = np.zeros((round(size_m[1] / resolution_m), round(size_m[0] / resolution_m)), np.int8)
     for x0, y0, x1, y1 in walls:
         left, low, right, high = (round(value / resolution_m) for value in (x0, y0, x1, y1))
-        cells[low : max(high, low + 1), left : max(right, left + 1)] = 100
+        cells[int(low) : int(max(high, low + 1)), int(left) : int(max(right, left + 1))] = 100
     return GridMap(cells, resolution_m, np.zeros(3))
 
 
