@@ -56,4 +56,4 @@ def ros2_store() -> Any:
 
 def definitions_of(store: Any) -> Dict[str, Any]:
     """The message definitions that a typestore knows, by type; older rosbags write the name in capitals."""
-    return dict(getattr(store, "fielddefs", None) or store.FIELDDEFS)
+    return dict(store.fielddefs if hasattr(store, "fielddefs") else store.FIELDDEFS)
