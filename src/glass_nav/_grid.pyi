@@ -1,5 +1,5 @@
 # cpp/grid; its faces are sensing/raycast.py and hypotheses/scan_matcher.py. P poses, B beams, H x W cells.
-from typing import Optional, TypedDict
+from typing import TypedDict
 
 import numpy as np
 
@@ -26,7 +26,7 @@ class Grid:
         resolution_m: float,
         occupied_percent: int,
         unknown_stops: bool,
-        guide: Optional[FreeRanges],
+        guide: FreeRanges | None,
     ) -> None: ...
     def cast(
         self,
