@@ -14,8 +14,8 @@ from sensor_msgs.msg import LaserScan, PointCloud2
 from visualization_msgs.msg import MarkerArray
 
 from glass_nav.localization.localizer import Estimate
-from glass_nav.localization.method import PoseFilter
 from glass_nav.localization.map_to_odom import MapToOdom, StampedTransform
+from glass_nav.localization.method import PoseFilter
 from glass_nav.msg import BeamCases, LocalizationStatus
 from glass_nav.rate_limiter import RateLimiter, period_s
 from glass_nav.ros import conversions, legend
