@@ -18,8 +18,10 @@ import numpy as np
 
 from glass_nav.log_line import LogLine
 from glass_nav.params import number
+from glass_nav.topology import frame_relation
 from glass_nav.topology.atlas import atlas_file
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
+from glass_nav.topology.frame_relation import FrameRelation
 from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search.search_estimate import SearchEstimate, TurnChoice
@@ -82,6 +84,7 @@ class SearchStatus:
     stamp_ns: int = 0  # of the meetpoint that it follows from; 0: of none
     estimate: Optional[SearchEstimate] = None  # of the search; None before its first meetpoint
     poses: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # (K, 3) map_from_base of the first candidates
+    relation: Optional[FrameRelation] = None  # of the frames, if it is CONFIRMED and dead reckoning is known
 
     @property
     def map_from_base(self) -> Optional[np.ndarray]:
@@ -343,7 +346,12 @@ class SearchSession:
         if gives_up:
             estimate = replace(estimate, choice=None)  # nobody is to drive on
         poses = localizer.poses(estimate, self._p.listed_candidates)
-        status = self._status = SearchStatus(estimate.state, estimate.reason, stamp_ns, estimate, poses)
+        status = SearchStatus(estimate.state, estimate.reason, stamp_ns, estimate, poses)
+        if status.map_from_base is not None:
+            node = localizer.node(estimate)
+            relation = frame_relation.of(localizer.atlas, node, status.map_from_base, localizer.environment_from_base)
+            status = replace(status, relation=relation)
+        self._status = status
         decisions: List[Decision] = [
             status,
             LogLine(f"{estimate.depth} edges: {estimate.state}, {estimate.reason}"),

@@ -10,6 +10,7 @@ from typing import Any, List, Optional, Tuple
 import numpy as np
 import pytest
 
+from glass_nav.geometry import se2
 from glass_nav.sensing.scan import Scan
 from glass_nav.topology import search_session
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
@@ -151,6 +152,34 @@ def test_parameters_that_mean_nothing_are_refused(fields: Any, line: str) -> Non
     with pytest.raises(ValueError) as refused:
         SessionParams(**fields)
     assert str(refused.value) == line
+
+
+def test_candidates_are_counted_as_the_reason_counts_them() -> None:
+    session = started()
+    session.meetpoint(meetpoint())
+    estimate = session.status.estimate
+    assert estimate is not None and len(estimate.dart) == 6  # the document has a candidate for each node at first
+    assert (session.status.reason, estimate.candidates) == ("2 candidates", 2)
+    drive(session, Traversal(0, 8.0, 8.0), T_0 + S)
+    estimate = session.status.estimate
+    assert estimate is not None and session.status.reason == f"{estimate.candidates} candidates"
+    assert estimate.candidates == len(estimate.dart)
+
+
+def test_a_confirmed_meetpoint_gives_the_relation_of_frames() -> None:
+    session = started()
+    drive_until_confirmed(session)
+    assert session.status.map_from_base is not None and session.status.relation is None  # without dead reckoning
+    session = started()
+    session.meetpoint(meetpoint())
+    drive(session, Traversal(0, 8.0, 8.0), T_0 + S)
+    assert session.status.relation is None
+    odometry = np.array([3.0, -1.0, 2.0])
+    session.edge_traversal(Traversal(2, 11.2, 8.0), T_0 + 2 * S)
+    session.meetpoint(replace(meetpoint(T_0 + 2 * S), odom_from_base=odometry))
+    relation, pose = session.status.relation, session.status.map_from_base
+    assert relation is not None and pose is not None and relation.node == 0
+    np.testing.assert_allclose(se2.compose(relation.map_from_environment, odometry), pose, atol=1e-9)
 
 
 # -- pairs of reports

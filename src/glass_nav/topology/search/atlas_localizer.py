@@ -129,6 +129,15 @@ class AtlasLocalizer:
             return estimate.map_from_base[None]
         return self.map_from_base(estimate.dart[:most])
 
+    def node(self, estimate: SearchEstimate) -> Optional[int]:
+        """Of the first candidate; None without one, as where only scans found the place."""
+        return int(self._atlas.darts.node[estimate.dart[0]]) if len(estimate.dart) else None
+
+    @property
+    def environment_from_base(self) -> Optional[np.ndarray]:
+        """(3,) dead reckoning at the last meetpoint, if it was reported."""
+        return self._forest.meetpoints[-1].odom_from_base
+
     def path(self, dart: int) -> np.ndarray:
         """Darts (K,) along the path of a candidate, the reference dart of the first meetpoint first."""
         return np.array([found for _, found, _ in self._forest.path(dart)], np.int64)
