@@ -30,6 +30,7 @@ from glass_nav.demo.plain_localization import (
 from glass_nav.geometry import se2
 from glass_nav.localization.beam_classification.beam_classifier import BeamClassifier
 from glass_nav.localization.beam_classification.case_votes import BeamCases
+from glass_nav.localization.document_localizer import DocumentLocalizer
 from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.beam_classification.expected_ranges import ExpectedRanges
@@ -133,7 +134,7 @@ SETTINGS = {
     ),
 }
 
-PoseFilter = Union[Localizer, PlainMcl]
+PoseFilter = Union[Localizer, DocumentLocalizer, PlainMcl]
 
 
 def localizer(
@@ -164,9 +165,15 @@ def _with_vote(mode: str) -> Callable[[LocalizerParams, GridMap, np.random.Gener
     )
 
 
-OURS: Dict[str, Callable[[LocalizerParams, GridMap, np.random.Generator], Localizer]] = {
+def _by_ranges(params: LocalizerParams, grid_map: GridMap, rng: np.random.Generator) -> Localizer:
+    return Localizer(replace(params, mixture=replace(params.mixture, weight_mode="ranges")), grid_map, rng)
+
+
+OURS: Dict[str, Callable[[LocalizerParams, GridMap, np.random.Generator], PoseFilter]] = {
     "ours": Localizer,
     "ours_paper": _with_vote("paper"),
+    "ours_ranges": _by_ranges,
+    "document": DocumentLocalizer,
     "ours_case1": partial(Localizer, classifier=DiffuseOnly),
     "ours_oracle": OracleCases,
 }
