@@ -12,6 +12,7 @@ import logging
 import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from pathlib import Path
 from typing import Callable, List, Optional, Tuple, Union
 
 import numpy as np
@@ -47,7 +48,7 @@ class SessionParams:
     listed_candidates: int = number(1000, 1, 100_000)  # at most, with their poses
     # [s] between the stamps of an edge traversal and its meetpoint
     pairing_tolerance_s: float = number(2.0, 0.0, 100.0)
-    visits_file: str = ""  # the atlas with its statistics is saved there; empty: nowhere
+    visits_file: str = ""  # the atlas with its statistics is read there and saved there; empty: nowhere
 
     def __post_init__(self) -> None:
         if self.listed_candidates < 1:
@@ -177,7 +178,7 @@ class SearchSession:
     @property
     def uses_scans(self) -> bool:
         """Whether scans are evidence."""
-        return self._takes_scans and self._explanation.has_map
+        return self.takes_scans and self._explanation.has_map
 
     @property
     def is_looking(self) -> bool:
@@ -186,7 +187,8 @@ class SearchSession:
         return searching and self.uses_scans and self._localizer is not None
 
     @property
-    def _takes_scans(self) -> bool:
+    def takes_scans(self) -> bool:
+        """Whether scans are asked for, with or without a map."""
         return self._p.judge_by_scans and self._search_params.use_scans and not self._search_params.document
 
     # -- events
@@ -211,6 +213,8 @@ class SearchSession:
         self._last_meetpoint = meetpoint
         if self._localizer is not None and self._status.state == SearchState.WAITING:
             return self._judge(self._localizer, self._localizer.start(self._judgeable(meetpoint)), meetpoint.stamp_ns)
+        if meetpoint.stamp_ns and meetpoint.stamp_ns == self._status.stamp_ns:
+            return []  # the driver repeats its report until it hears that the search has begun
         self._unpaired_meetpoint = meetpoint
         return self._pair("meetpoint")
 
@@ -250,7 +254,7 @@ class SearchSession:
             grid_map: it.
             name: for people, as "that of topic /map".
         """
-        if self._takes_scans:
+        if self.takes_scans:
             self._explanation.take(grid_map)
         if not self._p.check_map:
             return []
@@ -312,17 +316,33 @@ class SearchSession:
     # -- how an event is decided
 
     def _load(self) -> LogLine:
-        """Raises what reading raises, and AtlasError if the atlas is of another map than the one that is served."""
+        """Raises what reading raises, and AtlasError if the atlas is of another map than the one that is served, or the
+        visits are of another atlas.
+        """
         found_at, atlas = self._read_atlas()
+        atlas = self._with_visits(atlas)
         warning = ""
         if self._map is not None:
             try:
                 warning = atlas.check_map(*self._map)
             except AtlasError as err:
                 raise AtlasError(f"{found_at}: {err}") from err
-        self._localizer = AtlasLocalizer(atlas, self._search_params, self._explanation if self._takes_scans else None)
+        self._localizer = AtlasLocalizer(atlas, self._search_params, self._explanation if self.takes_scans else None)
         text = f"{found_at}: {len(atlas.nodes)} nodes, {len(atlas.edges)} edges"
         return LogLine(f"{text}; it {warning}", logging.WARNING) if warning else LogLine(text)
+
+    def _with_visits(self, atlas: Atlas) -> Atlas:
+        """With what the file of visits knows of it."""
+        path = self._p.visits_file
+        if not path or not Path(path).exists():
+            return atlas
+        kept = atlas_file.load(path)
+        if not np.array_equal(kept.darts.node, atlas.darts.node) or len(kept.nodes) != len(atlas.nodes):
+            raise AtlasError(
+                f"~visits_file {path}: has visits of another atlas: {len(kept.nodes)} nodes and {len(kept.edges)} "
+                f"edges, got an atlas of {len(atlas.nodes)} and {len(atlas.edges)}; delete it, or name another file"
+            )
+        return replace(atlas, visits=kept.visits)
 
     def _await_meetpoint(self, why: str) -> SearchStatus:
         return self._show(SearchState.WAITING, f"the next meetpoint begins a search: {why}")

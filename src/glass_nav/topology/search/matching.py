@@ -148,6 +148,11 @@ class Matcher:
         fits[fits] = self._angles_fit(dart[fits], meetpoint)
         return fits
 
+    @property
+    def some_usually_missed(self) -> bool:
+        """Whether the atlas has nodes that robots usually miss."""
+        return bool(self.atlas.visits.usually_missed.any())
+
     def log_likelihood_at(self, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
         """(C,) log density of the meetpoint if its reference edge is one of darts (C,) that match, up to a constant."""
         nodes, node = self.atlas.nodes, self.atlas.darts.node[dart]
