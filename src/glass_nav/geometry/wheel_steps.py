@@ -39,7 +39,7 @@ def increments_of(step: np.ndarray, wheel_base_m: float) -> Tuple[float, float, 
     turned = float(angles.wrap(np.arctan2(y, x) - 0.5 * turn)) if chord_m > _NOWHERE_M else 0.0
     if abs(turned) > 0.5 * np.pi:  # it drove backwards
         chord_m, turned = -chord_m, float(angles.wrap(turned + np.pi))
-    forward_m, half_m = chord_m / float(_chord_share(turn)), 0.5 * turn * wheel_base_m
+    forward_m, half_m = chord_m / float(_chord_share(np.array(turn))), 0.5 * turn * wheel_base_m
     return forward_m - half_m, forward_m + half_m, turned
 
 

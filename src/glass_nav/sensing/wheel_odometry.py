@@ -69,7 +69,7 @@ def counts(message: Any, topic_number: int, p: WheelParams) -> Counts:
     if hasattr(message, "position") and hasattr(message, "name"):
         found = dict(zip(message.name, message.position))
         return Counts(*(None if found.get(joint) is None else float(found[joint]) for joint in p.wheel_joints))
-    data = getattr(message, "data", None)
+    data: Any = getattr(message, "data", None)
     kind = type(message).__name__.split("__")[-1]
     if np.ndim(data) == 1 and len(data) == 2 and len(p.wheel_topics) == 1:
         return Counts(float(data[0]), float(data[1]))

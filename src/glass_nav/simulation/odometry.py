@@ -72,7 +72,7 @@ class Odometry:
                 [[forward, mismatch, 0.0], [-mismatch, forward, 0.0], [mismatch / half_m, 0.0, turn]]
             )
         self.odom_from_base = np.zeros(3)
-        self.rolled_m = np.zeros(2) if kind == "diff" else None  # (2,) by the left and the right wheel, as they count it
+        self.rolled_m = np.zeros(2) if kind == "diff" else None  # (2,) as the left and the right wheel count it
         self.velocity = np.zeros(3)  # as reported: forward, left [m/s], turn [rad/s]
         self._spin, self._spin_left_s = np.zeros(3), 0.0  # velocity reported by a spinning wheel, and its time left
 

@@ -25,9 +25,7 @@ WAITING = 100  # messages that may wait for a scan
 class BearingInput:
     """Stores bearings until a scan that is not older, and logs unusable ones; inactive without ~landmark_file."""
 
-    def __init__(
-        self, p: LocalizationNodeParams, tf: tf2_ros.Buffer, transforms: Transforms, log: LogThrottle
-    ) -> None:
+    def __init__(self, p: LocalizationNodeParams, tf: tf2_ros.Buffer, transforms: Transforms, log: LogThrottle) -> None:
         """
         Raises:
             LandmarkError: the landmark file is unusable; one line.

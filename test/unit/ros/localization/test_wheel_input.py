@@ -34,7 +34,7 @@ class Log:
 class Broadcaster:
     sent = []
 
-    def sendTransform(self, transform):  # noqa: N802  tf2's name
+    def sendTransform(self, transform):
         self.sent.append(transform)
 
 
@@ -105,7 +105,9 @@ def test_what_cannot_be_used_is_said(monkeypatch):
 def test_another_distance_between_the_wheels_holds_from_now_on(monkeypatch):
     robot = wheels(monkeypatch, Log(), wheel_topics=("joint_states",))
     p = LocalizationParams()
-    robot.reconfigure(replace(p, localizer=replace(p.localizer, odometry=replace(p.localizer.odometry, wheel_base_m=0.8))))
+    robot.reconfigure(
+        replace(p, localizer=replace(p.localizer, odometry=replace(p.localizer.odometry, wheel_base_m=0.8)))
+    )
     for step in range(2):
         robot._take(0, joints(1_000 * MS + step * 20 * MS, 0.0, 0.1 * step))
     assert robot.odom_from_base(1_020 * MS)[2] == pytest.approx(0.01 / 0.8)
