@@ -12,6 +12,7 @@ import logging
 import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from pathlib import Path
 from typing import Callable, List, Optional, Tuple, Union
 
 import numpy as np
@@ -45,7 +46,7 @@ class SessionParams:
     listed_candidates: int = number(1000, 1, 100_000)  # at most, with their poses
     # [s] between the stamps of an edge traversal and its meetpoint
     pairing_tolerance_s: float = number(2.0, 0.0, 100.0)
-    visits_file: str = ""  # the atlas with its statistics is saved there; empty: nowhere
+    visits_file: str = ""  # the atlas with its statistics is read there and saved there; empty: nowhere
 
     def __post_init__(self) -> None:
         if self.listed_candidates < 1:
@@ -198,6 +199,8 @@ class SearchSession:
         self._last_meetpoint = meetpoint
         if self._localizer is not None and self._status.state == SearchState.WAITING:
             return self._judge(self._localizer, self._localizer.start(self._judgeable(meetpoint)), meetpoint.stamp_ns)
+        if meetpoint.stamp_ns and meetpoint.stamp_ns == self._status.stamp_ns:
+            return []  # the driver repeats its report until it hears that the search has begun
         self._unpaired_meetpoint = meetpoint
         return self._pair("meetpoint")
 
@@ -280,8 +283,11 @@ class SearchSession:
     # -- how an event is decided
 
     def _load(self) -> LogLine:
-        """Raises what reading raises, and AtlasError if the atlas is of another map than the one that is served."""
+        """Raises what reading raises, and AtlasError if the atlas is of another map than the one that is served, or the
+        visits are of another atlas.
+        """
         found_at, atlas = self._read_atlas()
+        atlas = self._with_visits(atlas)
         warning = ""
         if self._map is not None:
             try:
@@ -292,6 +298,19 @@ class SearchSession:
         self._localizer = AtlasLocalizer(atlas, self._search_params, *scans)
         text = f"{found_at}: {len(atlas.nodes)} nodes, {len(atlas.edges)} edges"
         return LogLine(f"{text}; it {warning}", logging.WARNING) if warning else LogLine(text)
+
+    def _with_visits(self, atlas: Atlas) -> Atlas:
+        """With what the file of visits knows of it."""
+        path = self._p.visits_file
+        if not path or not Path(path).exists():
+            return atlas
+        kept = atlas_file.load(path)
+        if not np.array_equal(kept.darts.node, atlas.darts.node) or len(kept.nodes) != len(atlas.nodes):
+            raise AtlasError(
+                f"~visits_file {path}: has visits of another atlas: {len(kept.nodes)} nodes and {len(kept.edges)} "
+                f"edges, got an atlas of {len(atlas.nodes)} and {len(atlas.edges)}; delete it, or name another file"
+            )
+        return replace(atlas, visits=kept.visits)
 
     def _await_meetpoint(self, why: str) -> SearchStatus:
         return self._show(SearchState.WAITING, f"the next meetpoint begins a search: {why}")
