@@ -1,44 +1,25 @@
-"""Samples -> the four ranges that each beam may measure.
+"""A second opinion on expected ranges: in numpy, every surface from every sample by a ray cast of its own.
 
-Seed document glass_localization.txt, step 2 (cut off there; the formulation is ours): one ray cast
-that goes on behind the first surface gives what a beam would measure if it returned from it (case 1),
-was mirrored at it (case 2), or passed one or two panes (cases 3 and 4). The map does not mark glass. A corner or a post without a normal is drawn up to a cell too large, and beams that graze it on the
-map may miss it: half of the samples see past it. N samples, B beams; arrays by case have 4 rows, case k in row k - 1.
+The tests hold the compiled expected ranges against it. N samples, B beams; arrays by case have 4 rows.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Tuple
 
 import numpy as np
 
 from glass_nav.geometry import se2
+from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, ExpectedRanges, cos_incidence
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import UNKNOWN, GridMap
 
-MIN_COS = 0.2  # a surface seen flatter than 78 degrees is no worse placed than at that
 _FIRST, _SECOND, _THIRD = 0, 2, 3  # rows
 _NOWHERE_M = 1e-9
 _BESIDE_CELLS = 2.5  # in front of a surface: past the steps of its staircase
 _BOTH_FACES_CELLS = 3.0  # a wall up to so thick has one line through all its cells
 _LINE_CELLS, _GRAZING_COS = 2.0, 0.02  # the line of a wall lies so near to the cells that a beam meets
-
-
-@dataclass(frozen=True)
-class ExpectedRanges:
-    """Ranges that the map predicts for each beam from each sample; for sample 0, the pose itself, with more detail."""
-
-    range_m: np.ndarray  # (4, N, B) along the beam, inf where the map has no surface
-    cos_incidence: np.ndarray  # (4, N, B) |u . n| at the surface that returns it; 1 where it has no normal
-    thickness_m: np.ndarray  # (4, N, B) of the wall that returns it, as drawn
-    cell: np.ndarray  # (4, N, B) int32 flat cell that returns it, -1: none
-    pane_incidence: np.ndarray  # (1, B) angle to the normal of sample 0's first surface [rad], NaN without one
-    line_m: np.ndarray  # (4, B) range of sample 0 by the lines of the walls, face_m behind the near faces
-    axis_rad: np.ndarray  # (4, B) axes of their normals in map, up to half a turn; NaN: none. Case 2: mirrored
-    face_m: float  # half a cell
-    seen_side: np.ndarray  # (4, B) bool: sample 0's surfaces are met from a side that is not unknown
 
 
 def of(
@@ -49,23 +30,9 @@ def of(
     max_thickness_m: float,
     min_linearity: float,
     behind_m: float = np.inf,
-    gate_m: float = np.inf,
-    depth_share: float = 1.0,
     mirrored_by_line: bool = True,
 ) -> ExpectedRanges:
-    """Expected ranges of every beam of the scan from every sample.
-
-    Args:
-        caster: of the map.
-        thickness_m: (H * W,) of the map's walls, sensing/wall_thickness.py.
-        samples: (N, 3) robot poses in map.
-        scan: its ranges matter for behind_m only.
-        max_thickness_m: a thicker run of occupied cells cannot be glass and ends the ray.
-        min_linearity: below it a surface has no normal: no mirrored range.
-        behind_m: all samples but the first look no farther behind the end of a beam than that, and nowhere where a beam
-            did not return; inf: everywhere.
-        mirrored_by_line: the mirrored ranges are those by the lines of the walls; else by their cells.
-    """
+    """As expected_ranges.of(), without a gate."""
     from_laser = se2.compose(samples, scan.base_from_laser)
     paths = caster.cast_paths(from_laser, scan.angles_rad, _reach_m(scan, behind_m), max_thickness_m, min_linearity)
     range_m, cos, cell = paths.range_m, paths.cos_incidence, paths.cell
@@ -227,10 +194,3 @@ def _to_line(
     cells = thickness_m[cell] / grid_map.resolution_m
     middle = np.where(cells <= _BOTH_FACES_CELLS, 0.5 * (cells - 1.0), 0.0)  # a thicker wall has a line for each face
     return normal, distance_m - np.sign(distance_m) * np.maximum(middle, 0.0) * grid_map.resolution_m
-
-
-def cos_incidence(caster: RayCaster, beam_rad: np.ndarray, cell: np.ndarray, min_linearity: float) -> np.ndarray:
-    """|u . n| of beams (P, B) [rad, in map] at the cells (P, B) they meet; 1 where nothing or no normal is there."""
-    normal_rad, linearity = caster.normals()
-    usable = (cell >= 0) & (linearity[cell] >= min_linearity)
-    return np.where(usable, np.abs(np.cos(beam_rad - normal_rad[cell])), 1.0)

@@ -12,6 +12,7 @@ from typing import Any, Dict, List, Tuple
 from glass_nav import amcl_parameters, params
 from glass_nav.localization.initial_pose import StartPose
 from glass_nav.localization.localizer_params import LocalizerParams
+from glass_nav.localization.method import Method
 from glass_nav.params import ParamError
 from glass_nav.sensing.deskew import Deskew
 
@@ -49,6 +50,7 @@ class ReplayParams:
     frames: Frames = field(default_factory=Frames)
     start: StartPose = field(default_factory=StartPose)
     deskew: Deskew = field(default_factory=Deskew)
+    method: Method = field(default_factory=Method)
     localizer: LocalizerParams = field(default_factory=LocalizerParams)
 
 

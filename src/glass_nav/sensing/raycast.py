@@ -1,4 +1,4 @@
-"""GridMap, poses -> what beams would meet: the face of the compiled module _mrpt_grid.
+"""GridMap, poses -> what beams would meet: the face of the compiled modules _grid and _mrpt_rays.
 
 P poses, B beams, H rows and W columns of the map. Poses are in the frame map, beam angles in the frame of their
 pose; a cell is named by its flat index row * W + column. Ranges are exact: the length of the ray from its origin
@@ -17,7 +17,7 @@ from typing import Optional, Tuple
 
 import numpy as np
 
-from glass_nav import _mrpt_grid
+from glass_nav import _grid
 from glass_nav.geometry import angles, se2
 from glass_nav.world.grid_map import OCCUPIED_PERCENT, GridMap
 
@@ -98,8 +98,9 @@ class RayCaster:
         self._grid_map = grid_map
         self._threads = int(threads)
         self._grid_from_map = se2.inverse(grid_map.map_from_grid)
-        self._grid = _mrpt_grid.Grid(
-            grid_map.occupancy, grid_map.resolution_m, OCCUPIED_PERCENT, backend, unknown == "stop"
+        self._guide = _mrpt_rays(grid_map) if backend == "mrpt" else None
+        self._grid = _grid.Grid(
+            grid_map.occupancy, grid_map.resolution_m, OCCUPIED_PERCENT, unknown == "stop", self._guide
         )
         self._normals: Optional[Tuple[np.ndarray, np.ndarray, np.ndarray]] = None
 
@@ -244,6 +245,7 @@ class RayCaster:
         reach_m = _checked_reach(reach_m, angles_rad)
         poses, angles_rad = self._checked(poses, angles_rad, max_range_m)
         found = self._grid.expected_ranges(
+            self._grid_map.occupancy,
             thickness_m,
             poses,
             angles_rad,
@@ -264,7 +266,7 @@ class RayCaster:
     def simulate_scan_ray_raw(self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float) -> np.ndarray:
         """As cast(), by MRPT's simulateScanRay as it is, faults included: to be compared with, not to be used."""
         poses, angles_rad = self._checked(poses, angles_rad, max_range_m)
-        return self._grid.simulate_scan_ray_raw(poses, angles_rad, max_range_m)
+        return self._grid.free_ranges(self._guide or _mrpt_rays(self._grid_map), poses, angles_rad, max_range_m)
 
     def normals(self) -> Tuple[np.ndarray, np.ndarray]:
         """Normals of all cells that a ray may meet first; computed once, when first needed.
@@ -338,6 +340,13 @@ def _checked_reach(reach_m: np.ndarray, angles_rad: np.ndarray) -> np.ndarray:
     if not (np.isfinite(reach_m) & (reach_m > 0.0)).all():
         raise ValueError(f"ray caster: reach must be finite and > 0 m, got {reach_m.min()} to {reach_m.max()}")
     return reach_m
+
+
+def _mrpt_rays(grid_map: GridMap) -> _grid.FreeRanges:
+    """MRPT's simulateScanRay on that map."""
+    from glass_nav import _mrpt_rays  # 56 MB: MRPT brings OpenCV and more
+
+    return _mrpt_rays.SimulatedRays(grid_map.occupancy, grid_map.resolution_m, OCCUPIED_PERCENT)
 
 
 def _check_limits(max_thickness_m: float, min_linearity: float, min_gap_m: float) -> None:

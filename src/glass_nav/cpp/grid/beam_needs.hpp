@@ -10,7 +10,12 @@
 namespace glass_nav {
 
 constexpr std::size_t kPathCount = 4;
-enum Path : std::size_t { kFirst, kMirrored, kSecond, kThird };  // to the first surface, mirrored there, to those behind
+enum Path : std::size_t {
+  kFirst,
+  kMirrored,
+  kSecond,
+  kThird
+};  // to the first surface, mirrored there, to those behind
 
 /// How far poses are from the first of them.
 struct PoseSpread {

@@ -1,11 +1,10 @@
-/// The Python module _mrpt_grid. Private: docstrings, checks and defaults are in sensing/raycast.py and
+/// The Python module _grid. Private: docstrings, checks and defaults are in sensing/raycast.py and
 /// hypotheses/scan_matcher.py.
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <stdexcept>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -40,15 +39,15 @@ py::array_t<T> result_for(const RayBatch& rays) {
 }
 
 std::unique_ptr<GridRaycaster> make_grid(const Array<std::int8_t>& occupancy, double resolution_m, int occupied_percent,
-                                         const std::string& backend, bool unknown_stops) {
+                                         bool unknown_stops, std::shared_ptr<FreeRanges> guide) {
   if (occupancy.ndim() != 2) throw std::invalid_argument("occupancy must be (H, W)");
   constexpr py::ssize_t kMost = std::numeric_limits<int>::max();
   if (occupancy.shape(0) > kMost || occupancy.shape(1) > kMost) throw std::invalid_argument("occupancy is too large");
   const auto height = static_cast<int>(occupancy.shape(0)), width = static_cast<int>(occupancy.shape(1));
   const std::int8_t* cells = occupancy.data();
-  const Backend chosen = backend_from_name(backend);
   py::gil_scoped_release unlocked;
-  return std::make_unique<GridRaycaster>(cells, height, width, resolution_m, occupied_percent, chosen, unknown_stops);
+  return std::make_unique<GridRaycaster>(cells, height, width, resolution_m, occupied_percent, unknown_stops,
+                                         std::move(guide));
 }
 
 void redraw(GridRaycaster& grid, const Array<std::int8_t>& occupancy, int first_row, int first_column, int rows,
@@ -142,17 +141,19 @@ py::tuple cast_paths(const GridRaycaster& grid, const Array<double>& poses, cons
   return py::make_tuple(range_m, cos, cell);
 }
 
-py::tuple expected_ranges(const GridRaycaster& grid, const Array<float>& thickness_m, const Array<double>& poses,
-                          const Array<double>& angles, const Array<double>& measured_m, const Array<double>& reach_m,
-                          double gate_m, double depth_share, double max_range_m, double max_thickness_m, double min_linearity,
+py::tuple expected_ranges(const GridRaycaster& grid, const Array<std::int8_t>& occupancy,
+                          const Array<float>& thickness_m, const Array<double>& poses, const Array<double>& angles,
+                          const Array<double>& measured_m, const Array<double>& reach_m, double gate_m,
+                          double depth_share, double max_range_m, double max_thickness_m, double min_linearity,
                           double min_gap_m, bool mirrored_by_line, double grid_yaw, int threads) {
   const RayBatch rays = batch_of(poses, angles, max_range_m, threads);
   if (rays.pose_count < 1) throw std::invalid_argument("poses must be (P, 3), P > 0");
   if (reach_m.size() != angles.size() || measured_m.size() != angles.size()) {
     throw std::invalid_argument("measured and reach must be (B,)");
   }
-  if (thickness_m.size() != static_cast<py::ssize_t>(grid.width()) * grid.height()) {
-    throw std::invalid_argument("thicknesses must be (H * W,)");
+  const py::ssize_t cells = static_cast<py::ssize_t>(grid.width()) * grid.height();
+  if (occupancy.size() != cells || thickness_m.size() != cells) {
+    throw std::invalid_argument("occupancy must be (H, W), and thicknesses (H * W,)");
   }
   const py::ssize_t paths = kPathCount, beams = angles.shape(0);
   const std::vector<py::ssize_t> of_samples{paths, poses.shape(0), beams}, of_pose{paths, beams}, of_beams{1, beams};
@@ -165,13 +166,14 @@ py::tuple expected_ranges(const GridRaycaster& grid, const Array<float>& thickne
                            reach_m.data(),
                            gate_m,
                            depth_share,
+                           occupancy.data(),
                            thickness_m.data(),
                            {max_thickness_m, min_linearity, min_gap_m},
                            mirrored_by_line,
                            grid_yaw};
-  const ExpectedArrays out{range_m.mutable_data(),       cos.mutable_data(),      thickness_to.mutable_data(),
-                           cell.mutable_data(),          incidence_rad.mutable_data(), line_m.mutable_data(),
-                           axis_rad.mutable_data(),      seen_side.mutable_data()};
+  const ExpectedArrays out{range_m.mutable_data(),  cos.mutable_data(),           thickness_to.mutable_data(),
+                           cell.mutable_data(),     incidence_rad.mutable_data(), line_m.mutable_data(),
+                           axis_rad.mutable_data(), seen_side.mutable_data()};
   {
     py::gil_scoped_release unlocked;
     expect_ranges(grid, wanted, out);
@@ -179,13 +181,13 @@ py::tuple expected_ranges(const GridRaycaster& grid, const Array<float>& thickne
   return py::make_tuple(range_m, cos, thickness_to, cell, incidence_rad, line_m, axis_rad, seen_side);
 }
 
-py::array_t<double> simulate_scan_ray_raw(const GridRaycaster& grid, const Array<double>& poses,
-                                          const Array<double>& angles, double max_range_m) {
-  const RayBatch rays = batch_of(poses, angles, max_range_m, 1);
-  auto range_m = result_for<double>(rays);
+py::array_t<double> free_ranges(const GridRaycaster& grid, const FreeRanges& rays, const Array<double>& poses,
+                                const Array<double>& angles, double max_range_m) {
+  const RayBatch batch = batch_of(poses, angles, max_range_m, 1);
+  auto range_m = result_for<double>(batch);
   double* to = range_m.mutable_data();
   py::gil_scoped_release unlocked;
-  grid.simulate_scan_ray_raw(rays, to);
+  grid.free_ranges(rays, batch, to);
   return range_m;
 }
 
@@ -247,22 +249,23 @@ py::tuple places(const ScanSearch& search) {
 }  // namespace
 }  // namespace glass_nav
 
-PYBIND11_MODULE(_mrpt_grid, module) {
+PYBIND11_MODULE(_grid, module) {
   using namespace glass_nav;
+  py::class_<FreeRanges, std::shared_ptr<FreeRanges>>(module, "FreeRanges");  // made by _mrpt_rays
   py::class_<GridRaycaster>(module, "Grid")
       .def(py::init(&make_grid), py::arg("occupancy"), py::arg("resolution_m"), py::arg("occupied_percent"),
-           py::arg("backend"), py::arg("unknown_stops"))
+           py::arg("unknown_stops"), py::arg("guide"))
       .def("cast", &cast, py::arg("poses"), py::arg("angles"), py::arg("max_range_m"), py::arg("threads"))
       .def("cast_first", &cast_first, py::arg("poses"), py::arg("angles"), py::arg("max_range_m"), py::arg("threads"))
       .def("cast_surfaces", &cast_surfaces, py::arg("poses"), py::arg("angles"), py::arg("max_range_m"),
            py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"), py::arg("threads"))
       .def("cast_paths", &cast_paths, py::arg("poses"), py::arg("angles"), py::arg("reach_m"),
            py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"), py::arg("threads"))
-      .def("expected_ranges", &expected_ranges, py::arg("thickness_m"), py::arg("poses"), py::arg("angles"),
-           py::arg("measured_m"), py::arg("reach_m"), py::arg("gate_m"), py::arg("depth_share"), py::arg("max_range_m"),
-           py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"), py::arg("mirrored_by_line"),
-           py::arg("grid_yaw"), py::arg("threads"))
-      .def("simulate_scan_ray_raw", &simulate_scan_ray_raw, py::arg("poses"), py::arg("angles"), py::arg("max_range_m"))
+      .def("expected_ranges", &expected_ranges, py::arg("occupancy"), py::arg("thickness_m"), py::arg("poses"),
+           py::arg("angles"), py::arg("measured_m"), py::arg("reach_m"), py::arg("gate_m"), py::arg("depth_share"),
+           py::arg("max_range_m"), py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"),
+           py::arg("mirrored_by_line"), py::arg("grid_yaw"), py::arg("threads"))
+      .def("free_ranges", &free_ranges, py::arg("rays"), py::arg("poses"), py::arg("angles"), py::arg("max_range_m"))
       .def("normals", &normals)
       .def("redraw", &redraw, py::arg("occupancy"), py::arg("first_row"), py::arg("first_column"), py::arg("rows"),
            py::arg("columns"));

@@ -6,7 +6,6 @@
 #include <limits>
 #include <vector>
 
-#include "beam_needs.hpp"
 #include "ray_stream.hpp"
 #include "wall_lines.hpp"
 
@@ -16,10 +15,10 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kBeside = 2.5;                        // cells in front of a surface: past the steps of its staircase
+constexpr double kBeside = 2.5;                         // cells in front of a surface: past the steps of its staircase
 constexpr double kLineCells = 2.0, kGrazingCos = 0.02;  // a line lies so near to the cells that a beam meets
 constexpr double kNowhere_m = 1e-9;
-constexpr double kFace = 0.5;                          // cells from the near face of a wall to its line
+constexpr double kFace = 0.5;  // cells from the near face of a wall to its line
 
 class ExpectedRanges {
  public:
@@ -97,7 +96,8 @@ class ExpectedRanges {
     const MirroredRange by_line = mirrored_range(mirror, target, from);
     const double near = kLineCells * (1.0 + 2.0 * by_line.cos_mirror);
     const double off = std::abs(by_line.range - out_.range_m[at] / grid_.resolution_m());
-    if (off * by_line.cos <= near && by_line.cos >= kGrazingCos) out_.range_m[at] = by_line.range * grid_.resolution_m();
+    if (off * by_line.cos <= near && by_line.cos >= kGrazingCos)
+      out_.range_m[at] = by_line.range * grid_.resolution_m();
   }
 
   struct MirroredRange {
@@ -240,7 +240,8 @@ class ExpectedRanges {
         if (may_miss(n, b)) miss_corners(n, b);
         const std::size_t mirrored = index(kMirrored, n, b);
         if (wanted_.mirrored_by_line && out_.cell[mirrored] >= 0) {
-          mirror_by_line(mirrored, lines_.of(out_.cell[index(kFirst, n, b)]), lines_.of(out_.cell[mirrored]), ray(n, b));
+          mirror_by_line(mirrored, lines_.of(out_.cell[index(kFirst, n, b)]), lines_.of(out_.cell[mirrored]),
+                         ray(n, b));
         }
         for (std::size_t path = 0; path < kPathCount; ++path) {
           const std::size_t at = index(path, n, b);
@@ -281,7 +282,8 @@ class ExpectedRanges {
     const Ray straight = ray(0, beam);
     const WallLine& first = seen_.at[kFirst][beam].line;
     const double into = first.projection(straight);
-    const Ray mirrored{straight.x, straight.y, straight.dx - 2.0 * into * first.nx, straight.dy - 2.0 * into * first.ny};
+    const Ray mirrored{straight.x, straight.y, straight.dx - 2.0 * into * first.nx,
+                       straight.dy - 2.0 * into * first.ny};
     out_.incidence_rad[beam] = first.straight ? std::acos(std::min(out_.cos[index(kFirst, 0, beam)], 1.0)) : kNaN;
     for (std::size_t path = 0; path < kPathCount; ++path) {
       const std::size_t from = index(path, 0, beam), to = path * beams_ + beam;
@@ -302,7 +304,8 @@ class ExpectedRanges {
     }
   }
 
-  /// At which a beam crosses the line of a wall, which it meets there; half a cell more than that where there is no line.
+  /// At which a beam crosses the line of a wall, which it meets there; half a cell more than that where there is no
+  /// line.
   static double range_by_line(const WallLine& line, const Ray& from, double range) {
     if (!line.straight) return range + kFace;
     const double into = line.projection(from), cos = std::abs(into), by_line = line.distance(from.x, from.y) / into;
@@ -318,7 +321,10 @@ class ExpectedRanges {
       dx = sign * line.nx;
       dy = sign * line.ny;
     }
-    return grid_.is_known(cell % grid_.width() + 0.5 + kBeside * dx, cell / grid_.width() + 0.5 + kBeside * dy);
+    const double column = std::floor(cell % grid_.width() + 0.5 + kBeside * dx);
+    const double row = std::floor(cell / grid_.width() + 0.5 + kBeside * dy);
+    if (column < 0.0 || row < 0.0 || column >= grid_.width() || row >= grid_.height()) return false;
+    return wanted_.occupancy[static_cast<std::size_t>(row) * grid_.width() + static_cast<std::size_t>(column)] >= 0;
   }
 
   const GridRaycaster& grid_;

@@ -16,10 +16,10 @@ constexpr double kMinCos = 0.2;  // a surface seen flatter than 78 degrees is no
 struct WallLine {
   static constexpr float kBothFaces = 3.0F;  // a wall up to so thick has one line through all its cells
 
-  bool straight = false;    // false: the cell has no line
+  bool straight = false;      // false: the cell has no line
   double nx = 0.0, ny = 0.0;  // unit normal
-  double at = 0.0;          // n . p for all points p of the line
-  double middle = 0.0;      // from the line to the one half a cell behind either face
+  double at = 0.0;            // n . p for all points p of the line
+  double middle = 0.0;        // from the line to the one half a cell behind either face
 
   /// Along the normal from a point to the line that lies half a cell behind the face on the point's side.
   double distance(double x, double y) const {

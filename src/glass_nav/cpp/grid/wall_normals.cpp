@@ -173,7 +173,8 @@ WallNormals::WallNormals(const std::vector<std::uint8_t>& occupied, int width, i
   const std::vector<std::uint8_t> boundary = boundary_of(occupied, width, height);
   const CellBox near = changed.grown(kReach, kReach, kReach, kReach, width, height);
   Patch patch(boundary, width, height);
-  collect(boundary, [&](int x, int y) { return near.contains(x, y) ? normal_at(x, y, patch) : before.at(y * width_ + x); });
+  collect(boundary,
+          [&](int x, int y) { return near.contains(x, y) ? normal_at(x, y, patch) : before.at(y * width_ + x); });
 }
 
 WallNormals::Normal WallNormals::at(std::int32_t cell) const {

@@ -9,6 +9,7 @@ map may miss it: half of the samples see past it. N samples, B beams; arrays by 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
 import numpy as np
 
 from glass_nav.geometry import se2

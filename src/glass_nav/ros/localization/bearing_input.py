@@ -9,7 +9,7 @@ import numpy as np
 import rospy
 import tf2_ros
 
-from glass_nav.localization.localizer import Localizer
+from glass_nav.localization.method import PoseFilter
 from glass_nav.msg import LandmarkBearings
 from glass_nav.ros import conversions
 from glass_nav.ros.landmarks import bearing_messages
@@ -42,7 +42,7 @@ class BearingInput:
         """Store a message for the next scan."""
         self._waiting.append(msg)
 
-    def give(self, localizer: Localizer, scan_ns: int) -> None:
+    def give(self, localizer: PoseFilter, scan_ns: int) -> None:
         """Pass the filter all bearings with odometry that are not newer than the scan that follows."""
         for msg in list(self._waiting):
             if conversions.ns_from_stamp(msg.header.stamp) > scan_ns:
@@ -57,7 +57,7 @@ class BearingInput:
         """Drop stored messages: time has jumped."""
         self._waiting.clear()
 
-    def _add(self, localizer: Localizer, msg: LandmarkBearings) -> None:
+    def _add(self, localizer: PoseFilter, msg: LandmarkBearings) -> None:
         """The bearings of one message to known landmarks."""
         mounting = conversions.mounting_from_transform(
             self._tf.lookup_transform(

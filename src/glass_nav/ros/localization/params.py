@@ -17,6 +17,7 @@ import numpy as np
 from glass_nav import amcl_parameters, params
 from glass_nav.localization.initial_pose import StartPose, StartRules
 from glass_nav.localization.localizer_params import LocalizerParams
+from glass_nav.localization.method import Method
 from glass_nav.localization.panes_memory import PanesFilePath
 from glass_nav.localization.particle_filter.motion import MODELS
 from glass_nav.localization.saved_pose import PoseFile
@@ -94,12 +95,13 @@ class LocalizationParams:
     pose_file: PoseFile = field(default_factory=PoseFile)
     panes_file: PanesFilePath = field(default_factory=PanesFilePath)
     deskew: Deskew = field(default_factory=Deskew)
+    method: Method = field(default_factory=Method)
     localizer: LocalizerParams = field(default_factory=LocalizerParams)
 
     @property
     def session(self) -> SessionParams:
         """Those that the session begins with."""
-        return SessionParams(self.localizer, self.start, self.rules, self.pose_file, self.panes_file)
+        return SessionParams(self.localizer, self.start, self.rules, self.pose_file, self.panes_file, self.method)
 
 
 # The node's own parameters that may change while it runs; of the filter's, all may.

@@ -13,8 +13,9 @@ from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan, PointCloud2
 from visualization_msgs.msg import MarkerArray
 
-from glass_nav.localization.localizer import Estimate, Localizer
+from glass_nav.localization.localizer import Estimate
 from glass_nav.localization.map_to_odom import MapToOdom, StampedTransform
+from glass_nav.localization.method import PoseFilter
 from glass_nav.msg import BeamCases, LocalizationStatus
 from glass_nav.rate_limiter import RateLimiter, period_s
 from glass_nav.ros import conversions, legend
@@ -139,7 +140,7 @@ class Publishers:
                 MarkerArray([beam_displays.status_marker(where, self._frame, state, trouble, NOT_KNOWN)])
             )
 
-    def send_glass_map(self, localizer: Localizer, grid_map: GridMap, stamp_ns: int, now_s: float) -> None:
+    def send_glass_map(self, localizer: PoseFilter, grid_map: GridMap, stamp_ns: int, now_s: float) -> None:
         """The glass map, if it has changed, somebody listens and it is due."""
         listeners = self._glass_map.get_num_connections() + self._wall_markers.get_num_connections()
         if not (self._glass_is_news and listeners and self._glass_pace.is_due(now_s, self._p.glass_map_period_s)):

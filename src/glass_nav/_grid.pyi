@@ -17,14 +17,16 @@ class _Surfaces(TypedDict):
     mirrored_m: np.ndarray
     mirrored_cell: np.ndarray
 
+class FreeRanges: ...  # made by _mrpt_rays
+
 class Grid:
     def __init__(
         self,
         occupancy: np.ndarray,  # (H, W) int8
         resolution_m: float,
         occupied_percent: int,
-        backend: str,
         unknown_stops: bool,
+        guide: FreeRanges | None,
     ) -> None: ...
     def cast(
         self,
@@ -58,6 +60,7 @@ class Grid:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...  # (4, P, B) float64 ranges, float64 cosines, int32 cells
     def expected_ranges(
         self,
+        occupancy: np.ndarray,  # (H, W) int8
         thickness_m: np.ndarray,  # (H * W,) float32
         poses: np.ndarray,  # (N, 3) float64
         angles: np.ndarray,
@@ -82,7 +85,9 @@ class Grid:
         np.ndarray,  # (4, B) float64 axes
         np.ndarray,  # (4, B) bool, seen side
     ]: ...
-    def simulate_scan_ray_raw(self, poses: np.ndarray, angles: np.ndarray, max_range_m: float) -> np.ndarray: ...
+    def free_ranges(
+        self, rays: FreeRanges, poses: np.ndarray, angles: np.ndarray, max_range_m: float
+    ) -> np.ndarray: ...  # (P, B) float64
     def normals(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...  # (H * W,) float32 each
     def redraw(
         self, occupancy: np.ndarray, first_row: int, first_column: int, rows: int, columns: int
