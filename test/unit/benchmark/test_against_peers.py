@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import configparser
+import sys
+from pathlib import Path
 
-import against_peers
 import numpy as np
-import pf_localization
 import pytest
-from against_peers import Figures
 
 from glass_nav.world.grid_map import GridMap
+
+REPO = Path(__file__).resolve().parents[3]
+sys.path.append(str(REPO / "test" / "benchmark"))
+
+import against_peers  # noqa: E402
+import pf_localization  # noqa: E402
+from against_peers import Figures  # noqa: E402
 
 
 def test_particles_of_the_other_begin_around_the_pose_and_not_anywhere(tmp_path):
