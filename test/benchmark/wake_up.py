@@ -86,6 +86,7 @@ class Trial:
             self.robot.on_status = self._print
         self.rng = np.random.default_rng([job.seed, 2])
         self._last_node = -1
+        self._shown: Optional[SearchEstimate] = None
         self._began_ns = self.simulation.stamp_ns
 
     @property
@@ -117,7 +118,8 @@ class Trial:
 
     def _print(self, status: SearchStatus) -> None:
         estimate, arrival = status.estimate, self.robot.arrival
-        if estimate is not None and arrival is not None:
+        if estimate is not None and arrival is not None and estimate is not self._shown:
+            self._shown = estimate
             print(
                 f"{self.now_s:7.1f} s depth {estimate.depth} {estimate.state}: {estimate.reason}; rank "
                 f"{estimate.choice.rank if estimate.choice else '-'}; {self._truth(arrival)}{self._belief()}",
