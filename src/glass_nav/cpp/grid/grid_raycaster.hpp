@@ -71,6 +71,9 @@ class GridRaycaster {
   /// First occupied cell along every ray: range_m inf and cell -1 where there is none. `cell` may be null.
   void cast_first(const RayBatch& batch, double* range_m, std::int32_t* cell) const;
 
+  /// The same; beam b is followed up to reach_m[b].
+  void cast_first(const RayBatch& batch, const double* reach_m, double* range_m, std::int32_t* cell) const;
+
   /// First, second and third surface along every ray, with what lies between.
   void cast_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const SurfaceArrays& out) const;
 
@@ -88,18 +91,21 @@ class GridRaycaster {
   GridCells cells() const;
   template <class Use>
   void with_ray_marcher(const Use& use) const;  // use(GridCells, marcher)
+  template <class Reach>
+  void find_first(const RayBatch& batch, const Reach& t_max, double* range_m, std::int32_t* cell) const;
   template <class Reach, class Store>
   void find_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const Reach& t_max, const Store& store) const;
 
-  /// Keeps which cells of a box are surfaces; which of them end a ray, row by row.
+  /// Keeps which cells of a box are unknown, if those stop rays; which of its cells end a ray, row by row.
   std::vector<std::uint8_t> drawn(const std::int8_t* occupancy, const CellBox& box);
+  std::vector<std::uint8_t> surfaces() const;  // of each cell, not 0: occupied
 
   int width_, height_;
   double resolution_m_;
   int occupied_percent_;
   bool unknown_stops_;
   std::shared_ptr<FreeRanges> guide_;
-  std::vector<std::uint8_t> surface_;                        // of each cell, not 0: occupied
+  std::vector<std::uint8_t> unknown_;  // of each cell, not 0: unknown; empty unless those stop rays
   std::unique_ptr<ChessboardDistance> chessboard_distance_;  // between the cells where a ray may end
   mutable std::once_flag normals_once_;
   mutable std::unique_ptr<const WallNormals> normals_;
