@@ -141,7 +141,9 @@ class GlassMap:
             cell: (B,) flat cells of the map, -1: none.
             axis_rad: (B,) of the normals of the wall there in map; NaN: none, which is never gone.
         """
-        known = np.flatnonzero((cell >= 0) & np.isfinite(axis_rad))
+        walls, at = self._numbers(np.where(cell >= 0, self._bordered(cell), -1))
+        own = np.where(walls, self._log_odds[1, at], 0.0) if len(self._wall) else np.zeros(len(cell))
+        known = np.flatnonzero((own < 0.0) & np.isfinite(axis_rad))  # only few: the rest costs milliseconds
         normal_rad = (axis_rad[known] - self._grid_yaw_rad)[:, None, None]
         reach = max(1, round(_OPENING_M / self._resolution_m))
         along, across = np.arange(-reach, reach + 1)[:, None], np.arange(-1, 2)  # walls of cells are staircases
@@ -154,11 +156,11 @@ class GlassMap:
         learnt = np.zeros(rows.shape)  # (B, 2 reach + 1, 3)
         learnt.flat[found] = self._log_odds[1, at[found]]
         odds = np.where(learnt.max(axis=2) > -learnt.min(axis=2), learnt.max(axis=2), learnt.min(axis=2))
-        own, after, before = odds[:, reach], odds[:, reach + 1 :], odds[:, reach - 1 :: -1]
-        opening = own + sum(np.minimum(side.cumsum(axis=1).min(axis=1), 0.0) for side in (before, after))
+        after, before = odds[:, reach + 1 :], odds[:, reach - 1 :: -1]
+        opening = odds[:, reach] + sum(np.minimum(side.cumsum(axis=1).min(axis=1), 0.0) for side in (before, after))
         spread = 2.0 * sum(self._SPREAD) - self._SPREAD[0]  # so many cells learn from a beam
         gone = np.zeros(len(cell), bool)
-        gone[known] = (own < 0.0) & (_chance(self._prior[1] + opening / spread) < _GONE)
+        gone[known] = _chance(self._prior[1] + opening / spread) < _GONE
         return gone
 
     def occupancy(self) -> np.ndarray:
