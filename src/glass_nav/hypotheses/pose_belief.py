@@ -295,7 +295,8 @@ class PoseBelief:
     def _unknown(self, poses: np.ndarray) -> np.ndarray:
         """Indices of the poses (N, 3) that are not followed."""
         return np.array(
-            [k for k, pose in enumerate(poses) if not pose_tracker.same_place(self._tracker.poses, pose).any()], np.int64
+            [k for k, pose in enumerate(poses) if not pose_tracker.same_place(self._tracker.poses, pose).any()],
+            np.int64,
         )
 
     def _append(self, poses: np.ndarray, evidence: Evidence, now: np.ndarray) -> None:

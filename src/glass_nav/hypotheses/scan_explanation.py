@@ -86,9 +86,7 @@ class ScanExplanation:
         few = count < max(_MIN_BEAMS, _MIN_KNOWN * len(beams.ends_m))
         return beams.poses, np.where(few, np.nan, beams.explained.sum(axis=1) / np.maximum(count, 1))
 
-    def beams(
-        self, scan: Scan, map_from_base: np.ndarray, most_m: float, most_rad: float
-    ) -> Optional[BeamsExplained]:
+    def beams(self, scan: Scan, map_from_base: np.ndarray, most_m: float, most_rad: float) -> Optional[BeamsExplained]:
         """As fitted(), beam by beam; None if hardly any beam returned."""
         used = _used_beams(scan)
         if used is None:

@@ -19,12 +19,13 @@ import numpy as np
 
 from glass_nav.log_line import LogLine
 from glass_nav.params import number
-from glass_nav.topology import frame_relation
+from glass_nav.topology import frame_relation, search_story
 from glass_nav.topology.atlas import atlas_file
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.topology.frame_relation import FrameRelation
 from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search.belief import Belief
 from glass_nav.topology.search.search_estimate import SearchEstimate, TurnChoice
 from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.topology.search.served_explanation import ServedExplanation
@@ -86,6 +87,7 @@ class SearchStatus:
     estimate: Optional[SearchEstimate] = None  # of the search; None before its first meetpoint
     poses: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # (K, 3) map_from_base of the first candidates
     relation: Optional[FrameRelation] = None  # of the frames, if it is CONFIRMED and dead reckoning is known
+    belief: Optional[Belief] = None  # of scans and forest; None: no scan has been evidence yet
 
     @property
     def map_from_base(self) -> Optional[np.ndarray]:
@@ -187,7 +189,8 @@ class SearchSession:
         """
         loaded = self._load()
         if self._p.search_at_start:
-            return [loaded, self._await_meetpoint("the node has started")]
+            waiting = self._await_meetpoint("the node has started")
+            return [loaded, waiting, LogLine(f"{waiting.state}: {waiting.reason}")]
         return [loaded, self._show(SearchState.IDLE, "no search was asked for")]
 
     def meetpoint(self, meetpoint: Meetpoint) -> List[Decision]:
@@ -373,7 +376,7 @@ class SearchSession:
         self._status = status
         decisions: List[Decision] = [
             status,
-            LogLine(f"{estimate.depth} edges: {estimate.state}, {estimate.reason}"),
+            LogLine(search_story.after(estimate, localizer.forest, stamp_ns)),
         ]
         if goal is not None and not estimate.done:
             decisions.append(Progress(status))

@@ -55,6 +55,7 @@ from glass_nav.topology import observations, search_session
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.topology.observations import ObservationError
+from glass_nav.topology.search_scene import SearchScene
 from glass_nav.topology.search_session import Decision, GoalOutcome, SearchSession, SearchStatus
 
 SERVICE_TIMEOUT_S = 30.0
@@ -71,6 +72,7 @@ class TopologyNode:
         self._base_frame = ""  # of the last meetpoint
         self._shown_atlas: Optional[Atlas] = None
         self._atlas_markers: List[Marker] = []  # of that atlas
+        self._scene = SearchScene()
         self._log = LogThrottle()
         self._inbox = Mailbox(reports=100, commands=100)  # reports: meetpoints and traversals, in order
         self._clock = LoopClock()
@@ -219,14 +221,20 @@ class TopologyNode:
     def _publish(self, status: SearchStatus) -> None:
         """Status, candidates and markers, all latched: whoever comes later sees what is."""
         frame, localizer = self._p.global_frame_id, self._session.localizer
+        if status.estimate is None and status.belief is None:
+            self._scene.forget()
+        if localizer is not None and status.estimate is not None:
+            self._scene.stepped(localizer)
         self._status.publish(topology_messages.status_msg(status, frame))
-        self._candidates.publish(topology_messages.candidates_msg(status, self._atlas, frame))
+        self._candidates.publish(topology_messages.candidates_msg(status, self._atlas, frame, self._scene.ruled_out))
         if localizer is None:
             return
         if localizer.atlas is not self._shown_atlas:  # its markers are made once, and sent with those of each step
             self._shown_atlas = localizer.atlas
             self._atlas_markers = topology_displays.atlas_markers(localizer.atlas, frame)
-        self._markers.publish(topology_displays.search_markers(localizer, status, frame, self._atlas_markers))
+        self._markers.publish(
+            topology_displays.search_markers(localizer, status, self._scene, frame, self._atlas_markers)
+        )
 
     def _send_feedback(self, progress: search_session.Progress) -> None:
         status = topology_messages.status_msg(progress.status, self._p.global_frame_id)

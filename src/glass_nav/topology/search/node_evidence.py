@@ -64,7 +64,9 @@ class NodeEvidence:
         last = np.searchsorted(self.poses[:, 0], poses[:, 0] + near_m)
         for k in np.flatnonzero(first < last).tolist():
             off = self.poses[first[k] : last[k]] - poses[k]
-            near = np.flatnonzero((np.hypot(off[:, 0], off[:, 1]) < near_m) & (np.abs(angles.wrap(off[:, 2])) < _NEAR_RAD))
+            near = np.flatnonzero(
+                (np.hypot(off[:, 0], off[:, 1]) < near_m) & (np.abs(angles.wrap(off[:, 2])) < _NEAR_RAD)
+            )
             if len(near):
                 best = first[k] + int(near[np.argmax(self.nats[first[k] + near])])
                 nats[k], dart[k] = max(float(self.nats[best]), _NO_NODE), self.dart[best]
