@@ -24,7 +24,7 @@ from typing import List, Optional, Protocol, Tuple
 
 import numpy as np
 
-from glass_nav.geometry import angles, se2
+from glass_nav.geometry import se2
 from glass_nav.hypotheses import new_walls, pose_tracker
 from glass_nav.hypotheses.new_walls import NewWalls
 from glass_nav.hypotheses.scan_explanation import BeamsExplained
@@ -32,6 +32,7 @@ from glass_nav.sensing.scan import Scan
 
 _NATS = 0.5  # of a piece of wall that the map explains, to one that it does not; see above
 _CHANCE, _MAX_CHANCE = 0.7, 0.9  # share that is explained elsewhere: at least, at most
+_UNCHOSEN = 0.05  # less is explained by chance in a scan that did not choose the pose
 _CHANCE_RANK = 10  # of the distinct places, by what the map explains: nobody expects so many copies of a place
 _MIN_NEW = 4.0  # pieces of wall that make a view
 _MOVED_M, _TURNED_RAD = 0.5, 0.5  # then poses slide to where the scan fits, new walls or not
@@ -95,7 +96,8 @@ class Evidence:
 
     @classmethod
     def none(cls, count: int) -> Evidence:
-        return cls(*(np.zeros(count) for _ in range(4)), np.full(count, NEW, np.int64))
+        nothing = np.zeros(count)
+        return cls(nothing, nothing, nothing, nothing, np.full(count, NEW, np.int64))
 
     def __getitem__(self, chosen: np.ndarray) -> Evidence:
         return Evidence(*(values[chosen] for values in vars(self).values()))
@@ -233,7 +235,7 @@ class PoseBelief:
         if pieces.sum() < _MIN_NEW:
             return None
         self._walls.add(beams.ends_m, self._odom_from_base, self.driven_m)
-        return _View(scan, self._odom_from_base, self.driven_m, pieces, self._chance)
+        return _View(scan, self._odom_from_base, self.driven_m, pieces, self._chance - _UNCHOSEN)
 
     # -- a scan that is looked for everywhere
 

@@ -7,7 +7,7 @@ out. Shapes are free of ROS. K hypotheses.
 
 from __future__ import annotations
 
-from typing import List, Optional, Sequence, Tuple, Union
+from typing import Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -118,7 +118,8 @@ class SearchScene:
     def _crosses(self, atlas: Atlas, alive: np.ndarray, letter_m: float) -> List[Union[Shape, Text]]:
         """A cross on each node that went and where no candidate is left, with the value that ruled it out."""
         nodes = atlas.darts.node
-        left, crossed = set(nodes[alive].tolist()), {}
+        left = set(nodes[alive].tolist())
+        crossed: Dict[int, RuledOut] = {}
         for gone in self.ruled_out:
             node = int(nodes[gone.dart])
             if node not in left:

@@ -19,6 +19,7 @@ import numpy as np
 
 from glass_nav.log_line import LogLine
 from glass_nav.params import number
+from glass_nav.sensing.scan import Scan
 from glass_nav.topology import frame_relation, search_story
 from glass_nav.topology.atlas import atlas_file
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
@@ -32,6 +33,8 @@ from glass_nav.topology.search.served_explanation import ServedExplanation
 from glass_nav.vocabulary import SearchState
 from glass_nav.world.grid_map import GridMap
 
+ON_THE_WAY_S = 5.0  # from one line between meetpoints to the next
+
 ReadAtlas = Callable[[], Tuple[str, Atlas]]  # where it was found, and the atlas
 
 
@@ -41,7 +44,7 @@ class SessionParams:
 
     check_map: bool = True  # refuse the atlas if another map is served than it was made from
     end_without_atlas: bool = False  # when the atlas is refused, rather than wait for its map
-    judge_by_scans: bool = True  # judge candidates by the scan at a meetpoint, where there are scans and a map
+    judge_by_scans: bool = True  # as use_scans of the search, which has taken its place
     search_at_start: bool = True  # with the first meetpoint; else when asked
     publish_initial_pose: bool = True
     listed_candidates: int = number(1000, 1, 100_000)  # at most, with their poses
@@ -153,6 +156,7 @@ class SearchSession:
         self._last_meetpoint: Optional[Meetpoint] = None
         self._unpaired_meetpoint: Optional[Meetpoint] = None
         self._unpaired_traversal: Optional[Tuple[Traversal, int]] = None  # with its stamp [ns]
+        self._told = -1, 0  # places left, and the stamp [ns], when the log said so
 
     @property
     def status(self) -> SearchStatus:
@@ -176,8 +180,19 @@ class SearchSession:
 
     @property
     def uses_scans(self) -> bool:
-        """Whether candidates are judged by the scan of a meetpoint, if it has one."""
-        return self._p.judge_by_scans and self._explanation.has_map
+        """Whether scans are evidence."""
+        return self.takes_scans and self._explanation.has_map
+
+    @property
+    def is_looking(self) -> bool:
+        """Whether scans are of use now."""
+        searching = self._status.state in (SearchState.WAITING, SearchState.SEARCHING, SearchState.TENTATIVE)
+        return searching and self.uses_scans and self._localizer is not None
+
+    @property
+    def takes_scans(self) -> bool:
+        """Whether scans are asked for, with or without a map."""
+        return self._p.judge_by_scans and self._search_params.use_scans and not self._search_params.document
 
     # -- events
 
@@ -207,6 +222,36 @@ class SearchSession:
         self._unpaired_meetpoint = meetpoint
         return self._pair("meetpoint")
 
+    def scan(self, scan: Scan, odom_from_base: np.ndarray) -> List[Decision]:
+        """The robot sees something, wherever it is.
+
+        Args:
+            scan: one revolution of a lidar.
+            odom_from_base: (3,) of the robot by dead reckoning at its stamp.
+        """
+        localizer = self._localizer
+        if localizer is None or not self.is_looking:
+            return []
+        is_new, final = localizer.look(scan, odom_from_base)
+        if final is not None:
+            self._unpaired_meetpoint, self._unpaired_traversal = None, None
+            return self._judge(localizer, final, scan.stamp_ns)
+        if not is_new:
+            return []
+        self._status = replace(self._status, belief=localizer.belief)
+        return [self._status, *self._told_on_the_way(localizer.belief, scan.stamp_ns)]
+
+    def _told_on_the_way(self, belief: Optional[Belief], stamp_ns: int) -> List[Decision]:
+        """A line where the number of places that are left has changed, and the last line is some time ago."""
+        if belief is None:
+            return []
+        risk = self._search_params.tolerances.risk
+        left, (told_left, told_ns) = len(belief.left(risk)), self._told
+        if left == told_left or 0 <= stamp_ns - told_ns < ON_THE_WAY_S * 1e9:
+            return []
+        self._told = left, stamp_ns
+        return [LogLine(search_story.on_the_way(belief, risk))]
+
     def edge_traversal(self, traversal: Traversal, stamp_ns: int) -> List[Decision]:
         """The robot reports an edge that it drove, before or after the meetpoint at its end.
 
@@ -224,7 +269,7 @@ class SearchSession:
             grid_map: it.
             name: for people, as "that of topic /map".
         """
-        if self._p.judge_by_scans:
+        if self.takes_scans:
             self._explanation.take(grid_map)
         if not self._p.check_map:
             return []
@@ -297,8 +342,7 @@ class SearchSession:
                 warning = atlas.check_map(*self._map)
             except AtlasError as err:
                 raise AtlasError(f"{found_at}: {err}") from err
-        scans = (self._explanation.shares, self._explanation) if self._p.judge_by_scans else (None, None)
-        self._localizer = AtlasLocalizer(atlas, self._search_params, *scans)
+        self._localizer = AtlasLocalizer(atlas, self._search_params, self._explanation if self.takes_scans else None)
         text = f"{found_at}: {len(atlas.nodes)} nodes, {len(atlas.edges)} edges"
         return LogLine(f"{text}; it {warning}", logging.WARNING) if warning else LogLine(text)
 
@@ -321,6 +365,8 @@ class SearchSession:
     def _show(self, state: SearchState, reason: str, stamp_ns: int = 0) -> SearchStatus:
         """A state outside of searches: what was known is forgotten."""
         self._unpaired_meetpoint, self._unpaired_traversal = None, None
+        if self._localizer is not None:
+            self._localizer.begin()
         self._status = SearchStatus(state, reason, stamp_ns)
         return self._status
 
@@ -368,7 +414,7 @@ class SearchSession:
         if gives_up:
             estimate = replace(estimate, choice=None)  # nobody is to drive on
         poses = localizer.poses(estimate, self._p.listed_candidates)
-        status = SearchStatus(estimate.state, estimate.reason, stamp_ns, estimate, poses)
+        status = SearchStatus(estimate.state, estimate.reason, stamp_ns, estimate, poses, belief=localizer.belief)
         if status.map_from_base is not None:
             node = localizer.node(estimate)
             relation = frame_relation.of(localizer.atlas, node, status.map_from_base, localizer.environment_from_base)

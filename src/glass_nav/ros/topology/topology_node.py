@@ -68,8 +68,8 @@ class TopologyNode:
     def __init__(self, p: TopologyParams) -> None:
         self._p = p.node
         self._session = SearchSession(self._read_atlas, p.session, p.search)
-        self._scans = ScanMemory(p.node.odom_frame_id) if p.session.judge_by_scans else None
-        self._base_frame = ""  # of the last meetpoint
+        self._scans = ScanMemory(p.node.odom_frame_id) if self._session.takes_scans else None
+        self._base_frame = p.node.base_frame_id  # or that of the last meetpoint
         self._shown_atlas: Optional[Atlas] = None
         self._atlas_markers: List[Marker] = []  # of that atlas
         self._scene = SearchScene()
@@ -104,7 +104,7 @@ class TopologyNode:
             ("edge_traversal", EdgeTraversal, self._take_traversal),
         ):
             rospy.Subscriber(topic, kind, self._put_report, callback_args=take, queue_size=10, tcp_nodelay=True)
-        if p.session.check_map or p.session.judge_by_scans:
+        if p.session.check_map or self._session.takes_scans:
             rospy.Subscriber(
                 "map",
                 OccupancyGrid,
@@ -123,14 +123,26 @@ class TopologyNode:
             mail = self._inbox.take(timeout_s=0.1)
             jump = self._clock.tick()
             if jump is not None:
+                if self._scans is not None:
+                    self._scans.forget()
                 self._carry_out(self._session.time_jumped_back(jump))
             for work in [*mail["commands"], *mail["reports"]]:
                 work()
+            self._look()
             if self._session.is_to_end:
                 ending.wait(LAST_WORDS_S)
                 raise AtlasError(self._session.status.reason)
 
     # -- events
+
+    def _look(self) -> None:
+        """At the newest scan."""
+        if self._scans is None or not self._session.is_looking:
+            return
+        placed = self._scans.newest(self._base_frame)
+        if placed is not None:
+            self._scene.saw(placed.scan.points_in_base()[placed.scan.answered], placed.odom_from_base)
+            self._carry_out(self._session.scan(placed.scan, placed.odom_from_base))
 
     def _put_report(self, msg: Any, take: Callable[[Any], None]) -> None:
         self._inbox.put("reports", lambda: take(msg))
