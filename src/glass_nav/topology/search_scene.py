@@ -23,14 +23,15 @@ from glass_nav.vocabulary import LEFT_OUT_RGB, PLACE_RGB, Rgb
 HYPOTHESES, SCANS, DRIVEN, RULED_OUT, ROWS = NAMESPACES = ("hypotheses", "scans", "driven", "ruled_out", "rows")
 MAX_ROBOTS, MAX_SCANS = 8, 3
 MAX_REASONS = 12  # beside crosses; more would hide the map
-MAX_ROWS, MAX_NAMED = 6, 8  # of the forest, and search nodes named in a row
+MAX_ROWS, MAX_NAMED = 5, 6  # of the forest, and search nodes named in a row
+MAX_CROSSED = 2  # search nodes that went, named in a row
 
 INK: Rgb = (20, 20, 20)
 _RING_M, _CORNERS = 0.45, 24
 _STEP_M = 0.1  # of the driven path
 _KEPT = 5000  # points of it
 _MIN_SHARE = 0.005  # of a hypothesis that is drawn
-_APART_M = 1.5  # reasons nearer than that would cover each other
+_APART = np.array([6.0, 1.5])  # letters along and across: reasons nearer than that would cover each other
 _HEIGHT_M = 0.06
 
 
@@ -128,11 +129,11 @@ class SearchScene:
         texts: List[Text] = []
         named: List[np.ndarray] = []
         for place, gone in zip(places, crossed.values()):
-            if len(texts) < MAX_REASONS and all(np.hypot(*(place - other)) > _APART_M for other in named):
+            if len(texts) < MAX_REASONS and all((np.abs(place - other) > _APART * letter_m).any() for other in named):
                 named.append(place)
                 at_m = np.append(place + [0.0, -0.8 * letter_m], 0.1)
                 texts.append(
-                    Text(RULED_OUT, 1 + len(texts), mismatches.words(gone), at_m, 0.6 * letter_m, LEFT_OUT_RGB)
+                    Text(RULED_OUT, 1 + len(texts), mismatches.words(gone), at_m, 0.75 * letter_m, LEFT_OUT_RGB)
                 )
         texts += [Text(RULED_OUT, 1 + n, "", np.zeros(3), 1.0, LEFT_OUT_RGB) for n in range(len(texts), MAX_REASONS)]
         cross = Shape(RULED_OUT, 0, ShapeKind.LINES, figures_at("x", places, 0.5), _HEIGHT_M, 0.06, LEFT_OUT_RGB)
@@ -145,7 +146,7 @@ class SearchScene:
         rows = [words for words, _ in self._rows[-MAX_ROWS:]]
         texts = []
         for number in range(MAX_ROWS):
-            at_m = np.array([0.5 * (low[0] + high[0]), low[1] - (2.5 + 1.5 * number) * letter_m, 0.1])
+            at_m = np.array([0.5 * (low[0] + high[0]), low[1] - (4.5 + 1.5 * number) * letter_m, 0.1])
             texts.append(Text(ROWS, number, rows[number] if number < len(rows) else "", at_m, 0.8 * letter_m, INK))
         return texts
 
@@ -153,7 +154,7 @@ class SearchScene:
 def letter_size_m(atlas: Atlas) -> float:
     """Height of letters that can be read where all of the atlas is seen."""
     span = np.ptp(atlas.nodes.position_m, axis=0)
-    return max(0.3, 0.016 * float(span.max()))
+    return max(0.3, 0.02 * float(span.max()))
 
 
 def _robot(pose: np.ndarray) -> np.ndarray:
@@ -172,7 +173,9 @@ def _row_words(atlas: Atlas, forest: SearchForest, gone: Sequence[RuledOut]) -> 
     out = [f"{node} x ({why})" for node, why in crossed.items() if node not in alive]
     driven = f"edge {forest.traversals[-1].length_m:.2f} m, " if forest.depth else ""
     seen = f"depth {forest.depth}: {driven}degree {here.degree}, r {here.r_m:.2f} m"
-    return f"{seen} | {_named([str(node) for node in alive], MAX_NAMED) or 'none left'} | {_named(out, 3)}".rstrip(" |")
+    return f"{seen} | {_named([str(node) for node in alive], MAX_NAMED) or 'none left'} | {_named(out, MAX_CROSSED)}".rstrip(
+        " |"
+    )
 
 
 def _named(names: List[str], most: int) -> str:

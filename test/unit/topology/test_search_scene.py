@@ -83,7 +83,7 @@ def test_no_cross_stands_on_a_candidate_that_is_alive_and_each_says_why_it_went(
     np.testing.assert_allclose(centres, [[6, 0], [14, 0], [6, 5]], atol=1e-9)  # node 0 is left
     assert texts["ruled_out"] == ["degree 3, seen 1", "r 1.70 m, seen 0.90 m", "r 0.60 m, seen 0.90 m"]
     assert texts["rows"] == [
-        "depth 0: degree 1, r 0.90 m | 0 | 1 x (degree 3, seen 1), 2 x (r 1.70 m, seen 0.90 m), 3 x (r 0.60 m, seen 0.90 m)"
+        "depth 0: degree 1, r 0.90 m | 0 | 1 x (degree 3, seen 1), 2 x (r 1.70 m, seen 0.90 m) and 1 more"
     ]
 
 

@@ -23,7 +23,7 @@ from glass_nav.ros import command_line, conversions, shutdown
 from glass_nav.world.grid_map import GridMap
 
 DOCKS_PX = (360, 90)  # of the window, that the panels and the tool bar take
-SHARE = 0.86  # of the rest that the map fills: there are texts around it
+SHARE = 0.8  # of the rest that the map fills: there are texts around it
 WAIT_S = 30.0
 
 

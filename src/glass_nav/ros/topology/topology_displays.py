@@ -19,12 +19,12 @@ from glass_nav.geometry import se2
 from glass_nav.ros import conversions
 from glass_nav.ros.packed_markers import PackedMarkerArray, colour, points_marker, shape_marker, text_marker
 from glass_nav.shapes import Shape
-from glass_nav.topology import search_scene
+from glass_nav.topology import search_scene, search_story
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search_scene import SearchScene
 from glass_nav.topology.search_session import SearchStatus
-from glass_nav.vocabulary import ATLAS_RGB, FOREST_RGB, NODE_RGB, SEARCH_RGB
+from glass_nav.vocabulary import ATLAS_RGB, FOREST_RGB, NODE_RGB, SEARCH_RGB, SearchState
 
 NAMESPACES = ("atlas", "nodes", *(state.lower() for state in SEARCH_RGB), "forest", "text", *search_scene.NAMESPACES)
 MAX_PATHS = 50  # of candidates; more would only hide the map
@@ -76,9 +76,12 @@ def search_markers(
     markers.append(points_marker(header, "forest", 0, Marker.LINE_LIST, forest, 2 * _HEIGHT_M, 0.12, _rgb(FOREST_RGB)))
     shown = [
         shape_marker(header, each) if isinstance(each, Shape) else text_marker(header, each)
-        for each in scene.shapes(atlas, status.belief, alive)
+        for each in scene.shapes(atlas, None if status.state == SearchState.CONFIRMED else status.belief, alive)
     ]
-    words = _text(header, atlas, f"{status.state}\n{status.reason}")
+    reason = status.reason
+    if estimate is None and status.belief is not None:  # before the first meetpoint
+        reason = search_story.on_the_way(status.belief, localizer.params.tolerances.risk)
+    words = _text(header, atlas, f"{status.state}\n{reason}")
     return PackedMarkerArray([*atlas_shown, *markers, words, *shown])
 
 
@@ -109,9 +112,9 @@ def _rgb(rgb: "tuple[int, int, int]") -> ColorRGBA:
 def _text(header: Header, atlas: Atlas, text: str) -> Marker:
     """Above the atlas, readable from where all of it is seen."""
     low, high = atlas.nodes.position_m.min(axis=0), atlas.nodes.position_m.max(axis=0)
-    size = max(0.3, 0.018 * float((high - low).max()))
+    size = search_scene.letter_size_m(atlas)
     pose = Pose(orientation=Quaternion(w=1.0))
-    pose.position.x, pose.position.y = 0.5 * float(low[0] + high[0]), float(high[1]) + 2.0 * size
+    pose.position.x, pose.position.y = 0.5 * float(low[0] + high[0]), float(high[1]) + 4.0 * size
     return Marker(
         header=header,
         ns="text",

@@ -10,7 +10,8 @@ Subscribes: meetpoint (Meetpoint), edge_traversal (EdgeTraversal): of the driver
 Publishes: turn_choice (TurnChoice): the answer to each meetpoint while there is something to find out;
     initialpose (PoseWithCovarianceStamped) once when CONFIRMED, with the stamp of the meetpoint;
     ~candidates (TopologyCandidates, latched), ~status (TopologyStatus, latched), ~markers (MarkerArray, latched):
-    see topology_displays.py for the namespaces; legend (Image, latched): what the marks in rviz mean.
+    see topology_displays.py for the namespaces; tf map -> map_atlas (static, the same frame): rviz knows the frame map
+    before the pose is known; legend (Image, latched): what the marks in rviz mean.
 Action: localize_globally (LocalizeGlobally): begins a search; feedback is ~status; succeeds when CONFIRMED, is aborted
     when AMBIGUOUS or LOST, and when preempted the search is over.
 Services: ~restart (Trigger): forget the search, the next meetpoint begins one; ~reload_atlas (Trigger): read the file
@@ -27,6 +28,7 @@ from typing import Any, Callable, List, Optional, Tuple
 import actionlib
 import numpy as np
 import rospy
+import tf2_ros
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
@@ -82,6 +84,10 @@ class TopologyNode:
         self._candidates = rospy.Publisher("~candidates", TopologyCandidates, queue_size=2, latch=True)
         self._status = rospy.Publisher("~status", TopologyStatus, queue_size=10, latch=True)
         self._markers = rospy.Publisher("~markers", MarkerArray, queue_size=2, latch=True)
+        self._frame = tf2_ros.StaticTransformBroadcaster()  # the frame map exists before the pose is known
+        self._frame.sendTransform(
+            conversions.transform_stamped(0, p.node.global_frame_id, f"{p.node.global_frame_id}_atlas", np.zeros(3))
+        )
         self._legends = legend.publish(p.node.global_frame_id)
         self._server = actionlib.SimpleActionServer("localize_globally", LocalizeGloballyAction, auto_start=False)
         self._server.register_goal_callback(lambda: self._inbox.put("commands", self._accept_goal))

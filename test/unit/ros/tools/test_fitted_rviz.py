@@ -24,7 +24,7 @@ def grid_map() -> GridMap:
 def test_all_that_the_map_knows_is_in_sight() -> None:
     scale, x_m, y_m = fitted_rviz.view_of(grid_map(), (1360, 590))
     assert (x_m, y_m) == (pytest.approx(13.0), pytest.approx(4.5))
-    assert scale == pytest.approx(0.86 * 1000 / 20.0)
+    assert scale == pytest.approx(fitted_rviz.SHARE * 1000 / 20.0)
 
 
 def test_the_configuration_differs_in_the_view_only() -> None:
