@@ -172,14 +172,12 @@ class PoseBelief:
         self.carry(odom_from_base)
         if self._search is not None:
             found = self._search.advance()
-            if found is None:
-                return False
-            self._take_in(self._search, found)
-            return True
-        if not self.searches:
+            if found is not None:
+                self._take_in(self._search, found)
+                return True
+        elif not self.searches:
             self._begin_search(scan)
-            return False
-        return self._judge_if_due(scan)
+        return bool(self.searches) and self._judge_if_due(scan)
 
     def weigh(self, nats: np.ndarray, label: np.ndarray) -> None:
         """Add log likelihood ratios (K,) to the evidence of the poses, and label (K,) them."""
@@ -221,7 +219,8 @@ class PoseBelief:
             self._views.append(view)
             self.evidence = self.evidence.with_view(*_of_view(beams, view))
         self._keep_distinct()
-        if self.driven_m - self._searched_m >= _SEARCH_AGAIN_M or not len(self._tracker):
+        far = self.driven_m - self._searched_m >= _SEARCH_AGAIN_M or not len(self._tracker)
+        if far and self._search is None:
             self._begin_search(scan)
         return True
 

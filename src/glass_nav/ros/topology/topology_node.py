@@ -4,11 +4,10 @@ Wiring only: SearchSession decides. Callbacks store, one loop works: nothing els
 
 Subscribes: meetpoint (Meetpoint), edge_traversal (EdgeTraversal): of the driver, or by hand; in either order, the
     traversal and the meetpoint at its end belong together. map (OccupancyGrid, if ~check_map): the atlas must be made
-    from it. scan (LaserScan), tf ~odom_frame_id <- frame of the meetpoint <- laser, and map, if ~judge_by_scans:
-    candidates from where the map does not explain the scan of a meetpoint's stamp are ruled out; where meetpoints have
-    odometry, the poses that explain the scans are followed from one meetpoint to the next as well.
+    from it. scan (LaserScan), tf ~odom_frame_id <- ~base_frame_id <- laser, and map, if ~use_scans: scans from
+    anywhere, at meetpoints and between them, are evidence.
 Publishes: turn_choice (TurnChoice): the answer to each meetpoint while there is something to find out;
-    initialpose (PoseWithCovarianceStamped) once when CONFIRMED, with the stamp of the meetpoint;
+    initialpose (PoseWithCovarianceStamped) once when CONFIRMED, with the stamp of the meetpoint or scan;
     ~candidates (TopologyCandidates, latched), ~status (TopologyStatus, latched), ~markers (MarkerArray, latched):
     see topology_displays.py for the namespaces; tf map -> map_atlas (static, the same frame): rviz knows the frame map
     before the pose is known; legend (Image, latched): what the marks in rviz mean.

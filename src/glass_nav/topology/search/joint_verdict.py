@@ -23,6 +23,7 @@ from glass_nav.vocabulary import SearchState
 
 _MIN_DRIVEN_M = 1.0  # before a place is confirmed: odometry must agree with it
 _LOST_SEARCHES, _LOST_M = 3, 4.0  # of the whole map, and driven, before it is given up
+_AMBIGUOUS_EDGES = 6  # driven before places that no turn tells apart are given up: scans may
 _MAX_SHOWN = 0.9995  # of a probability in words
 
 
@@ -79,7 +80,8 @@ class JointVerdict:
             choice = TurnChoice(proof.ranks[0], here.degree)
             return self._estimate(SearchState.SEARCHING, reason, depth, dart, choice)
         rank = self._least_passed(here)
-        if proof.indistinguishable and len(known) == len(left) and self._all_passed(here) and depth > 0:
+        listed = float(belief.share[known].sum())
+        if proof.indistinguishable and 1.0 - listed < self._params.tolerances.risk and depth >= _AMBIGUOUS_EDGES:
             reason = f"{len(dart)} places match, and no turn can tell them apart"
             return self._estimate(SearchState.AMBIGUOUS, reason, depth, dart, None)
         reason = f"{places}; no turn is known to tell them apart, next a new edge"
@@ -113,7 +115,3 @@ class JointVerdict:
             return here.degree // 2
         least = np.flatnonzero(times == times.min())
         return int(least[len(least) // 2]) if least[0] > 0 or len(least) == 1 else int(least[-1])
-
-    def _all_passed(self, here: Meetpoint) -> bool:
-        times = self._passed.times(here)
-        return times is None or bool(times.min() > 0)
