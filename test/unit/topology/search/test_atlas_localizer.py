@@ -307,7 +307,7 @@ def test_places_that_look_alike_stay_both() -> None:
 
 
 def test_a_robot_of_another_building_is_lost() -> None:
-    nowhere = share_at(-1000.0)
+    nowhere = share_at(-1000.0, elsewhere=0.2)
     localizer = AtlasLocalizer(twins(), SearchParams(use_edge_angles=False), nowhere)
     told = driven_in_the_first_row(localizer, nowhere)
     assert told[-1].state == SearchState.LOST and told[-1].choice is None and len(told[-1].dart) == 0
