@@ -69,7 +69,9 @@ from glass_nav.vocabulary import LocalizationState, Outcome
 
 MARKERS_PERIOD_S = 0.5
 RESTART_WAIT_S = 2.0  # for the service, by the wall clock
-ODOMETRY_GRACE_S = 1.0  # by the wall clock, without odometry, before the log says so: at the start it may come a little later
+ODOMETRY_GRACE_S = (
+    1.0  # by the wall clock, without odometry, before the log says so: at the start it may come a little later
+)
 SILENCE_S = 5.0  # without any scan for so long, the log says why
 
 

@@ -24,7 +24,7 @@ from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search_scene import SearchScene
 from glass_nav.topology.search_session import SearchStatus
-from glass_nav.vocabulary import ATLAS_RGB, FOREST_RGB, NODE_RGB, SEARCH_RGB, SearchState
+from glass_nav.vocabulary import ATLAS_RGB, FOREST_RGB, NODE_RGB, SEARCH_RGB
 
 NAMESPACES = ("atlas", "nodes", *(state.lower() for state in SEARCH_RGB), "forest", "text", *search_scene.NAMESPACES)
 MAX_PATHS = 50  # of candidates; more would only hide the map
@@ -76,7 +76,7 @@ def search_markers(
     markers.append(points_marker(header, "forest", 0, Marker.LINE_LIST, forest, 2 * _HEIGHT_M, 0.12, _rgb(FOREST_RGB)))
     shown = [
         shape_marker(header, each) if isinstance(each, Shape) else text_marker(header, each)
-        for each in scene.shapes(atlas, None if status.state == SearchState.CONFIRMED else status.belief, alive)
+        for each in scene.shapes(atlas, status.belief if status.map_from_base is None else None, alive)
     ]
     reason = status.reason
     if estimate is None and status.belief is not None:  # before the first meetpoint
