@@ -48,7 +48,7 @@ def main() -> int:
     exact, mrpt = RayCaster(world), RayCaster(world, backend="mrpt")
     casts: Dict[str, Callable[[], np.ndarray]] = {
         "exact": lambda: exact.cast(poses, angles_rad, args.max_range_m),
-        "simulateScanRay": lambda: exact.simulate_scan_ray_raw(poses, angles_rad, args.max_range_m),
+        "simulateScanRay": lambda: mrpt.simulate_scan_ray_raw(poses, angles_rad, args.max_range_m),
         "mrpt, corrected": lambda: mrpt.cast(poses, angles_rad, args.max_range_m),
     }
     rates = alternate(casts, POSES * BEAMS)

@@ -19,6 +19,7 @@ import os
 import sys
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Callable, Dict, List
 
@@ -82,7 +83,9 @@ def compare(arguments: argparse.Namespace) -> Dict[str, float]:
     likelihood = baselines.LikelihoodField(drive.grid_map, field)
     filters: Dict[str, baselines.PoseFilter] = {
         "ours": Localizer(settings, drive.grid_map, rng()),
-        "ours, weights of the field": baselines.OtherWeights(settings, drive.grid_map, rng(), likelihood),
+        "ours, weights of the field": Localizer(
+            settings, drive.grid_map, rng(), particle_filter=partial(baselines.OtherWeights, model=likelihood)
+        ),
         "plain, weights of the field": baselines.PlainMcl(settings, drive.grid_map, rng(), likelihood, count),
     }
     times: Dict[str, List[float]] = {name: [] for name in [*filters, CLASSIFY]}

@@ -29,8 +29,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import floors
 import numpy as np
 
-from wired_robot import WiredRobot
-
+from glass_nav.demo.wired_robot import WiredRobot
 from glass_nav.driving.driver_params import DriveParams
 from glass_nav.driving.edge_tracking.edge_driver import Arrival
 from glass_nav.driving.route import RoutePlanner

@@ -92,8 +92,9 @@ def test_nothing_of_the_tests_or_the_build_is_installed(install: Path) -> None:
     [
         "glass_nav._beam_vote",
         "glass_nav._distance_field",
-        "glass_nav._mrpt_grid",
+        "glass_nav._grid",
         "glass_nav._mrpt_io",
+        "glass_nav._mrpt_rays",
         "glass_nav.msg",
         "glass_nav.srv",
     ],

@@ -48,7 +48,7 @@ def test_demo_names_a_wrong_argument(arguments: "list[str]", message: str) -> No
     assert run(SCRIPTS / "demo", *arguments) == (2, message)
 
 
-@pytest.mark.parametrize("script, words", [("demo", "--seeds 3"), ("test", "test/unit/geometry"), ("setup", "--dev")])
+@pytest.mark.parametrize("script, words", [("demo", "--seeds 5"), ("test", "test/unit/geometry"), ("setup", "--dev")])
 @pytest.mark.parametrize("option", ["--help", "-h"])
 def test_each_script_explains_itself(script: str, words: str, option: str) -> None:
     code, out = run(SCRIPTS / script, option)

@@ -39,7 +39,7 @@ MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or les
     "evaluation/pages": "geometry evaluation/metrics evaluation/plots",
     "replay": "geometry world sensing panes hypotheses localization topology driving recording evaluation",
     "compare": "geometry world sensing panes hypotheses localization topology driving recording evaluation replay",
-    "demo": "geometry world topology evaluation",
+    "demo": "geometry world sensing hypotheses localization topology driving simulation evaluation",
     "cli": "geometry world sensing panes hypotheses localization topology driving recording simulation evaluation checkup "
     "replay compare",
     "ros": "geometry world sensing panes hypotheses localization topology driving recording simulation evaluation checkup "
@@ -60,8 +60,9 @@ FOR_ALL = {
 ONLY_BY = {  # compiled modules, each behind its face; and what is heavy, where it is needed
     "glass_nav._beam_vote": "localization",
     "glass_nav._distance_field": "hypotheses sensing",
-    "glass_nav._mrpt_grid": "hypotheses sensing",
+    "glass_nav._grid": "hypotheses sensing",
     "glass_nav._mrpt_io": "recording world",
+    "glass_nav._mrpt_rays": "sensing",
     "dask": "compare",
     "distributed": "compare",
     "jinja2": "evaluation",
@@ -201,7 +202,7 @@ def test_what_has_no_room_imports_no_room(path: Path) -> None:
         pytest.param("localization", "def f():\n    import rospy", id="ROS, inside a function"),
         pytest.param("cli", "from sensor_msgs.msg import LaserScan", id="messages"),
         pytest.param("recording", "from glass_nav.msg import BeamCases", id="our messages"),
-        pytest.param("localization", "from glass_nav import _mrpt_grid", id="a compiled module, past its face"),
+        pytest.param("localization", "from glass_nav import _grid", id="a compiled module, past its face"),
         pytest.param("cli", "from rosbags.rosbag1 import Reader", id="rosbags outside recording"),
     ],
 )

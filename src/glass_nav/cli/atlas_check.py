@@ -12,8 +12,9 @@ from glass_nav.cli import search_params
 from glass_nav.cli.progress import Progress
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import KINDS, Atlas, AtlasError
-from glass_nav.topology.search import distinguishability
+from glass_nav.topology.search import distinguishability, learnt_atlas
 from glass_nav.topology.search.distinguishability import Distinguishability
+from glass_nav.topology.search.matching import Tolerances
 from glass_nav.world import map_file
 
 HELP = "validate an atlas, and list places that are indistinguishable"
@@ -64,7 +65,7 @@ def main(arguments: argparse.Namespace) -> None:
         except AtlasError as err:
             raise AtlasError(f"{path}: {err}") from err
     print(f"{path}: in order" + (f", but it {warning}" if warning else ""))
-    for line in summary(atlas):
+    for line in summary(atlas, params.tolerances):
         print(f"  {line}")
     count = len(atlas.darts)
     starts = np.unique(np.linspace(0, count - 1, min(count, arguments.starts)).astype(np.int64))
@@ -77,8 +78,8 @@ def main(arguments: argparse.Namespace) -> None:
         print(f"  {line}")
 
 
-def summary(atlas: Atlas) -> List[str]:
-    """What an atlas consists of."""
+def summary(atlas: Atlas, tolerances: Tolerances) -> List[str]:
+    """What an atlas consists of, and what robots taught it."""
     counts = np.bincount(atlas.nodes.kind, minlength=len(KINDS)).tolist()
     kinds = ", ".join(
         f"{count} {KINDS[kind].replace('_', ' ')}{'s' * (count != 1)}" for kind, count in enumerate(counts) if count
@@ -89,7 +90,36 @@ def summary(atlas: Atlas) -> List[str]:
         f"{len(atlas.nodes)} nodes ({kinds}), {len(atlas.edges)} edges of {atlas.edges.length_m.sum():.0f} m, "
         f"{components} component{'s' * (components != 1)}",
         f"visits by robots: {atlas.visits.node_count.sum()} of nodes, {atlas.visits.edge_count.sum()} of edges",
+        *learnt(atlas, tolerances),
     ]
+
+
+def learnt(atlas: Atlas, tolerances: Tolerances) -> List[str]:
+    """What robots have taught the atlas, one line for each node or edge; none without enough visits."""
+    known, lines = learnt_atlas.of(atlas, tolerances), []
+    for what, value, of_map, sigma, of_map_sigma, count in (
+        ("r", known.nodes.r_m, atlas.nodes.r_m, known.nodes.sigma_r_m, atlas.nodes.sigma_r_m, atlas.visits.node_count),
+        (
+            "length",
+            known.edges.length_m,
+            atlas.edges.length_m,
+            known.edges.sigma_m,
+            atlas.edges.sigma_m,
+            atlas.visits.edge_count,
+        ),
+    ):
+        owner = "node" if what == "r" else "edge"
+        lines += [
+            f"{owner} {at}: {count[at]} visits, {what} {of_map[at]:.3f} -> {value[at]:.3f} m, standard deviation "
+            f"{of_map_sigma[at]:.3f} -> {sigma[at]:.3f} m"
+            for at in np.flatnonzero(count >= learnt_atlas.MIN_VISITS).tolist()
+        ]
+    missed = np.flatnonzero(atlas.visits.usually_missed).tolist()
+    if missed:
+        lines.append(f"usually missed by robots, and expected to be: nodes {', '.join(map(str, missed))}")
+    if len(lines) > MAX_LISTED:
+        lines = [*lines[:MAX_LISTED], f"... and {len(lines) - MAX_LISTED} more"]
+    return [f"learnt: {line}" for line in lines]
 
 
 def verdict(atlas: Atlas, found: Distinguishability) -> List[str]:

@@ -100,7 +100,7 @@ def _replay(options: ReplayOptions, search: PaneSearch) -> None:
         print(f"glass_nav map panes: {note}", file=sys.stderr)
     progress = Progress(ready.recording.name, ready.expected_scans)
     try:
-        ready.run(progress.step, search.listen)
+        search.add(ready, progress.step)
     finally:
         progress.finish()
 

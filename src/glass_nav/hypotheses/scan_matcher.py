@@ -2,7 +2,7 @@
 
 Correlative scan matching (Olson (2009)) of the beams' end points against a likelihood field, over every position
 and heading, by branch and bound (Hess, Kohler, Rapp, Andor (2016)): the face of MatchGrid and ScanSearch in the compiled
-module _mrpt_grid. It ignores what the beams passed and which wall they met, so it proposes poses and judges none. On a
+module _grid. It ignores what the beams passed and which wall they met, so it proposes poses and judges none. On a
 large map that takes longer than a robot may wait for its pose, so a search can be done in slices. Their size is
 a count of look-ups and no time, so that a replay gives the same answer.
 """
@@ -14,7 +14,7 @@ from typing import Optional
 
 import numpy as np
 
-from glass_nav import _mrpt_grid
+from glass_nav import _grid
 from glass_nav.geometry import angles, se2
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.world.grid_map import GridMap
@@ -63,7 +63,7 @@ class ScanMatcher:
                 for first in strips
             ]
         )
-        self._grid = _mrpt_grid.MatchGrid(scores, allowed)
+        self._grid = _grid.MatchGrid(scores, allowed)
 
     def _scores(self, field: DistanceField, first: int, last: int, columns: int) -> np.ndarray:
         """(last - first, W) uint8: how near to a wall the centres of the cells of some rows lie."""
@@ -85,14 +85,14 @@ class ScanMatcher:
 
     def begin(self, points_m: np.ndarray, keep: int) -> SlicedSearch:
         """A search as of search() that is done in slices."""
-        search = _mrpt_grid.ScanSearch(self._grid, points_m / self._cell_m, _HEADINGS_RAD, keep)
+        search = _grid.ScanSearch(self._grid, points_m / self._cell_m, _HEADINGS_RAD, keep)
         return SlicedSearch(search, self._map_from_grid, self._cell_m)
 
 
 class SlicedSearch:
     """One scan, to be matched slice by slice."""
 
-    def __init__(self, search: _mrpt_grid.ScanSearch, map_from_grid: np.ndarray, cell_m: float) -> None:
+    def __init__(self, search: _grid.ScanSearch, map_from_grid: np.ndarray, cell_m: float) -> None:
         """Made by ScanMatcher.begin()."""
         self._search, self._map_from_grid, self._cell_m = search, map_from_grid, cell_m
 

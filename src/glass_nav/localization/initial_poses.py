@@ -11,7 +11,7 @@ import numpy as np
 from glass_nav.geometry import se2
 from glass_nav.localization import initial_pose, saved_pose
 from glass_nav.localization.initial_pose import PoseGuess, StartPose
-from glass_nav.localization.localizer import Localizer
+from glass_nav.localization.method import PoseFilter
 from glass_nav.localization.saved_pose import PoseFile
 from glass_nav.world.grid_map import GridMap
 
@@ -48,7 +48,7 @@ class InitialPoses:
         self._home: Optional[Tuple[np.ndarray, np.ndarray]] = None if start_without_guess else self._default
         self._whose = "the pose of its parameters"
 
-    def begin(self, localizer: Localizer) -> str:
+    def begin(self, localizer: PoseFilter) -> str:
         """Place the particles of a new localizer; where, in words that go on a sentence."""
         if self._home is None:
             try:
@@ -76,7 +76,7 @@ class InitialPoses:
         self._home, self._whose = (map_from_base, covariance), "its last pose"
 
     def apply(
-        self, localizer: Localizer, grid_map: GridMap, scan_ns: int, odom_from_base: np.ndarray, now_s: float
+        self, localizer: PoseFilter, grid_map: GridMap, scan_ns: int, odom_from_base: np.ndarray, now_s: float
     ) -> bool:
         """Start over at the pose that waits, if one does and it is its time; whether it was done."""
         if self._pose_file_waits:
@@ -100,7 +100,7 @@ class InitialPoses:
         _log.info(f"starting at {_words(map_from_base)}")
         return True
 
-    def _resume(self, localizer: Localizer, grid_map: GridMap, scan_ns: int, odom_from_base: np.ndarray) -> bool:
+    def _resume(self, localizer: PoseFilter, grid_map: GridMap, scan_ns: int, odom_from_base: np.ndarray) -> bool:
         """Start at the pose of the file, or search the whole map if it is not valid; whether one was done."""
         try:
             saved = saved_pose.load(self._file.path)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Optional
 
-from glass_nav.localization.localizer import Localizer
+from glass_nav.localization.method import PoseFilter
 from glass_nav.world import panes_file
 from glass_nav.world.grid_map import GridMap
 from glass_nav.world.panes_file import PanesFileError
@@ -42,7 +42,7 @@ class PanesMemory:
         self._path = file.path if file.panes_file else None
         self._told_m = 0.0
 
-    def recall(self, localizer: Localizer, grid_map: GridMap) -> None:
+    def recall(self, localizer: PoseFilter, grid_map: GridMap) -> None:
         """Give a localizer that has just begun on this map what the file holds; one line says what, or why not."""
         self._told_m = 0.0
         if self._path is None:
@@ -58,13 +58,13 @@ class PanesMemory:
             self._told_m = _length_m(localizer)
             _log.info(f"{self._path}: {len(kept.panes)} panes that the map lacks, {self._told_m:.1f} m of them in use")
 
-    def tell(self, localizer: Localizer) -> None:
+    def tell(self, localizer: PoseFilter) -> None:
         """One line for the log when markedly more glass was found than was told before."""
         if _length_m(localizer) >= self._told_m + max(_NEWS_M, _NEWS_SHARE * self._told_m):
             self._told_m = _length_m(localizer)
             _log.warning(self.summary(localizer))
 
-    def summary(self, localizer: Localizer) -> Optional[str]:
+    def summary(self, localizer: PoseFilter) -> Optional[str]:
         """What the map lacks and how to draw it in; None if nothing was found."""
         count = len(localizer.unmapped_panes)
         if not count:
@@ -74,7 +74,7 @@ class PanesMemory:
             return f"{lacks}; glass_nav map panes BAG --map MAP.yaml --out DIR draws it in"
         return f"{lacks}; call ~save_panes, then glass_nav map draw MAP.yaml --panes {self._path} --out DIR draws it in"
 
-    def save(self, localizer: Localizer, grid_map: GridMap) -> str:
+    def save(self, localizer: PoseFilter, grid_map: GridMap) -> str:
         """Write the file; what was written, in words.
 
         Raises:
@@ -94,7 +94,7 @@ class PanesMemory:
             raise ValueError(f"{self._path}: cannot be written: {err.strerror or err}") from err
         return f"{len(panes)} panes ({_length_m(localizer):.1f} m in use) and the glass map written to {self._path}"
 
-    def keep(self, localizer: Localizer, grid_map: GridMap) -> None:
+    def keep(self, localizer: PoseFilter, grid_map: GridMap) -> None:
         """Write the file, if there is one and anything to write, before this localizer ends; a line if that fails."""
         if self._path is None or not (localizer.found_panes or len(localizer.glass_map.arrays()["glass_cell"])):
             return
@@ -104,5 +104,5 @@ class PanesMemory:
             _log.error(f"panes are not kept: {err}")
 
 
-def _length_m(localizer: Localizer) -> float:
+def _length_m(localizer: PoseFilter) -> float:
     return sum((pane.length_m for pane in localizer.unmapped_panes), 0.0)

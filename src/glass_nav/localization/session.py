@@ -11,8 +11,9 @@ import numpy as np
 from glass_nav.localization import initial_pose
 from glass_nav.localization.initial_pose import PoseGuess, StartPose, StartRules
 from glass_nav.localization.initial_poses import InitialPoses, OdometryAt
-from glass_nav.localization.localizer import Estimate, Localizer
+from glass_nav.localization.localizer import Estimate
 from glass_nav.localization.localizer_params import LocalizerParams
+from glass_nav.localization.method import Method, PoseFilter
 from glass_nav.localization.panes_memory import PanesFilePath, PanesMemory
 from glass_nav.localization.saved_pose import PoseFile
 from glass_nav.localization.state_log import StateLog
@@ -34,6 +35,7 @@ class SessionParams:
     rules: StartRules
     pose_file: PoseFile
     panes_file: PanesFilePath = PanesFilePath()
+    method: Method = Method()
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class LocalizationSession:
         self._rng = params.rules.rng
         self._starts = InitialPoses(params.start, params.rules.start_without_guess, params.pose_file, odometry_at)
         self._panes = PanesMemory(params.panes_file)
-        self.localizer: Optional[Localizer] = None
+        self.localizer: Optional[PoseFilter] = None
         self.grid_map: Optional[GridMap] = None
         self.map_origin = ""  # where it came from, in words
         self.waits_for_pose = params.rules.wait_for_initialpose  # with a map, without a localizer
@@ -215,7 +217,7 @@ class LocalizationSession:
         """What to report while no scan is being used."""
         return LocalizationState.UNKNOWN if self.estimate is None else LocalizationState.UNCERTAIN
 
-    def _running(self) -> Localizer:
+    def _running(self) -> PoseFilter:
         if self.localizer is None:
             raise ValueError("there is no map yet")
         return self.localizer
@@ -223,7 +225,7 @@ class LocalizationSession:
     def _begin(self) -> str:
         """A new localizer, at the start that there is; where, in words."""
         assert self.grid_map is not None
-        self.localizer = Localizer(self._params.localizer, self.grid_map, self._rng)
+        self.localizer = self._params.method.begin(self._params.localizer, self.grid_map, self._rng)
         self._panes.recall(self.localizer, self.grid_map)
         self._start_over()
         return self._starts.begin(self.localizer)

@@ -10,7 +10,8 @@ import numpy as np
 
 from glass_nav.evaluation.metrics.replay_result import ReplayResult
 from glass_nav.localization.initial_pose import StartPose
-from glass_nav.localization.localizer import Estimate, Localizer
+from glass_nav.localization.localizer import Estimate
+from glass_nav.localization.method import PoseFilter
 from glass_nav.recording.log_file import open_log
 from glass_nav.recording.recording import LogOptions, Recording, Step
 from glass_nav.replay import replay_params, replay_run
@@ -30,7 +31,7 @@ class PreparedReplay:
     settings: ReplayParams
     grid_map: GridMap
     recording: Recording
-    localizer: Localizer
+    localizer: PoseFilter
     start: Callable[[int], None]  # see replay_run.run()
     origin: str  # where the robot starts, in words
     notes: List[str]  # what was chosen or found odd
@@ -63,7 +64,7 @@ def prepare(options: ReplayOptions) -> PreparedReplay:
     settings, unused = (ReplayParams(), []) if options.params is None else replay_params.load(options.params)
     grid_map = map_file.load(options.map)
     recording = open_recording(options, settings)
-    localizer = Localizer(settings.localizer, grid_map, np.random.default_rng(options.seed))
+    localizer = settings.method.begin(settings.localizer, grid_map, np.random.default_rng(options.seed))
     start, origin = _start(localizer, recording, options.use.start, settings.start)
     unused_note = [f"parameters that only a node uses: {', '.join(unused)}"] if unused else []
     notes = [*recording.notes, *unused_note, f"start: {origin}"]
@@ -89,12 +90,14 @@ def _source(given: LogOptions, settings: ReplayParams) -> LogOptions:
         base_frame=given.base_frame or base_frame,
         odom_frame=given.odom_frame or odom_frame,
         deskew=settings.deskew.deskew,
+        wheels=settings.wheels,
+        wheel_base_m=settings.localizer.odometry.wheel_base_m,
         laser_max_range=settings.localizer.limits.laser_max_range,
     )
 
 
 def _start(
-    localizer: Localizer, recording: Recording, given: StartOptions, defaults: StartPose
+    localizer: PoseFilter, recording: Recording, given: StartOptions, defaults: StartPose
 ) -> Tuple[Callable[[int], None], str]:
     """What places the particles at the first scan, and a text that says where."""
     covariance = defaults.covariance if given.variance is None else np.diag(given.variance)

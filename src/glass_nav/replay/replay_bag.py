@@ -10,7 +10,8 @@ from glass_nav.evaluation.plots import legend
 from glass_nav.localization.beam_classification import beam_cloud
 from glass_nav.localization.beam_classification.beam_shapes import beam_shapes
 from glass_nav.localization.beam_classification.wall_shapes import wall_shapes
-from glass_nav.localization.localizer import Estimate, Localizer
+from glass_nav.localization.localizer import Estimate
+from glass_nav.localization.method import PoseFilter
 from glass_nav.localization.place_shapes import place_shapes
 from glass_nav.localization.status_text import status_text
 from glass_nav.recording.recording import Recording, Step
@@ -23,7 +24,7 @@ GLASS_PERIOD_NS = 30_000_000_000  # a map is large
 
 @contextmanager
 def listener(
-    path: Path, recording: Recording, localizer: Localizer, grid_map: GridMap
+    path: Path, recording: Recording, localizer: PoseFilter, grid_map: GridMap
 ) -> "Iterator[Callable[[Step, Estimate], None]]":
     """What replay_run.run() calls with each scan; the bag is there when the block has ended without an error.
 
@@ -37,7 +38,7 @@ def listener(
 
 
 class _Writer:
-    def __init__(self, bag: ResultBag, recording: Recording, localizer: Localizer, grid_map: GridMap) -> None:
+    def __init__(self, bag: ResultBag, recording: Recording, localizer: PoseFilter, grid_map: GridMap) -> None:
         self._bag, self._truth, self._localizer, self._grid_map = bag, recording.ground_truth, localizer, grid_map
         self._glass_ns = self._last_ns = self._markers_ns = -1
 

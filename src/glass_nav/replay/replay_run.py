@@ -12,7 +12,8 @@ from glass_nav.evaluation.metrics import case_scores, pose_errors
 from glass_nav.evaluation.metrics.case_scores import CaseScores, SurfaceScores
 from glass_nav.evaluation.metrics.replay_result import NO_BEAM, BeamExample, KeptScan, ReplayResult
 from glass_nav.geometry import se2
-from glass_nav.localization.localizer import Estimate, Localizer
+from glass_nav.localization.localizer import Estimate
+from glass_nav.localization.method import PoseFilter
 from glass_nav.recording.recording import BeamTruth, Recording, RecordingError, Refusal, Step
 from glass_nav.replay.window import Window
 from glass_nav.sensing.scan import Scan, ScanError
@@ -25,7 +26,7 @@ PARTS = 60  # of the log, so that they do not all show one moment
 
 def run(
     recording: Recording,
-    localizer: Localizer,
+    localizer: PoseFilter,
     start: Callable[[int], None],
     seed: int,
     window: Optional[Window] = None,

@@ -1,4 +1,4 @@
-"""GridMap, poses -> what beams would meet: the face of the compiled module _mrpt_grid.
+"""GridMap, poses -> what beams would meet: the face of the compiled modules _grid and _mrpt_rays.
 
 P poses, B beams, H rows and W columns of the map. Poses are in the frame map, beam angles in the frame of their
 pose; a cell is named by its flat index row * W + column. Ranges are exact: the length of the ray from its origin
@@ -17,7 +17,7 @@ from typing import Optional, Tuple
 
 import numpy as np
 
-from glass_nav import _mrpt_grid
+from glass_nav import _grid
 from glass_nav.geometry import angles, se2
 from glass_nav.world.grid_map import OCCUPIED_PERCENT, GridMap
 
@@ -84,8 +84,9 @@ class RayCaster:
         self._grid_map = grid_map
         self._threads = int(threads)
         self._grid_from_map = se2.inverse(grid_map.map_from_grid)
-        self._grid = _mrpt_grid.Grid(
-            grid_map.occupancy, grid_map.resolution_m, OCCUPIED_PERCENT, backend, unknown == "stop"
+        self._guide = _mrpt_rays(grid_map) if backend == "mrpt" else None
+        self._grid = _grid.Grid(
+            grid_map.occupancy, grid_map.resolution_m, OCCUPIED_PERCENT, unknown == "stop", self._guide
         )
         self._normals: Optional[Tuple[np.ndarray, np.ndarray, np.ndarray]] = None
 
@@ -200,7 +201,7 @@ class RayCaster:
     def simulate_scan_ray_raw(self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float) -> np.ndarray:
         """As cast(), by MRPT's simulateScanRay as it is, faults included: to be compared with, not to be used."""
         poses, angles_rad = self._checked(poses, angles_rad, max_range_m)
-        return self._grid.simulate_scan_ray_raw(poses, angles_rad, max_range_m)
+        return self._grid.free_ranges(self._guide or _mrpt_rays(self._grid_map), poses, angles_rad, max_range_m)
 
     def normals(self) -> Tuple[np.ndarray, np.ndarray]:
         """Normals of all cells that a ray may meet first; computed once, when first needed.
@@ -217,6 +218,17 @@ class RayCaster:
         A slanted wall is a staircase of cells; the line through them is the wall.
         """
         return self._walls()[2]
+
+    def walls_at(self, cell: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """normals() and wall_offsets_m() at flat cells (...) alone: normal_rad, linearity, offset_m, each (...) float32.
+
+        NaN, 0 and NaN for a cell without a normal, and for -1.
+
+        Raises:
+            ValueError: a cell that the map has not.
+        """
+        normal_rad, linearity, offset_m = self._grid.walls_at(cell)
+        return self._in_map(normal_rad), linearity, offset_m
 
     def _walls(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         if self._normals is None:  # two threads may both compute it: the same arrays
@@ -263,6 +275,13 @@ def changed_box(before: GridMap, after: GridMap) -> Tuple[slice, slice]:
     if not len(rows):
         return slice(0, 0), slice(0, 0)
     return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
+def _mrpt_rays(grid_map: GridMap) -> _grid.FreeRanges:
+    """MRPT's simulateScanRay on that map."""
+    from glass_nav import _mrpt_rays  # 56 MB: MRPT brings OpenCV and more
+
+    return _mrpt_rays.SimulatedRays(grid_map.occupancy, grid_map.resolution_m, OCCUPIED_PERCENT)
 
 
 def _check_limits(max_thickness_m: float, min_linearity: float, min_gap_m: float) -> None:

@@ -12,14 +12,17 @@ import logging
 import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from pathlib import Path
 from typing import Callable, List, Optional, Tuple, Union
 
 import numpy as np
 
 from glass_nav.log_line import LogLine
 from glass_nav.params import number
+from glass_nav.topology import frame_relation
 from glass_nav.topology.atlas import atlas_file
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
+from glass_nav.topology.frame_relation import FrameRelation
 from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search.search_estimate import SearchEstimate, TurnChoice
@@ -43,7 +46,7 @@ class SessionParams:
     listed_candidates: int = number(1000, 1, 100_000)  # at most, with their poses
     # [s] between the stamps of an edge traversal and its meetpoint
     pairing_tolerance_s: float = number(2.0, 0.0, 100.0)
-    visits_file: str = ""  # the atlas with its statistics is saved there; empty: nowhere
+    visits_file: str = ""  # the atlas with its statistics is read there and saved there; empty: nowhere
 
     def __post_init__(self) -> None:
         if self.listed_candidates < 1:
@@ -82,6 +85,7 @@ class SearchStatus:
     stamp_ns: int = 0  # of the meetpoint that it follows from; 0: of none
     estimate: Optional[SearchEstimate] = None  # of the search; None before its first meetpoint
     poses: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # (K, 3) map_from_base of the first candidates
+    relation: Optional[FrameRelation] = None  # of the frames, if it is CONFIRMED and dead reckoning is known
 
     @property
     def map_from_base(self) -> Optional[np.ndarray]:
@@ -195,6 +199,8 @@ class SearchSession:
         self._last_meetpoint = meetpoint
         if self._localizer is not None and self._status.state == SearchState.WAITING:
             return self._judge(self._localizer, self._localizer.start(self._judgeable(meetpoint)), meetpoint.stamp_ns)
+        if meetpoint.stamp_ns and meetpoint.stamp_ns == self._status.stamp_ns:
+            return []  # the driver repeats its report until it hears that the search has begun
         self._unpaired_meetpoint = meetpoint
         return self._pair("meetpoint")
 
@@ -277,8 +283,11 @@ class SearchSession:
     # -- how an event is decided
 
     def _load(self) -> LogLine:
-        """Raises what reading raises, and AtlasError if the atlas is of another map than the one that is served."""
+        """Raises what reading raises, and AtlasError if the atlas is of another map than the one that is served, or the
+        visits are of another atlas.
+        """
         found_at, atlas = self._read_atlas()
+        atlas = self._with_visits(atlas)
         warning = ""
         if self._map is not None:
             try:
@@ -289,6 +298,19 @@ class SearchSession:
         self._localizer = AtlasLocalizer(atlas, self._search_params, *scans)
         text = f"{found_at}: {len(atlas.nodes)} nodes, {len(atlas.edges)} edges"
         return LogLine(f"{text}; it {warning}", logging.WARNING) if warning else LogLine(text)
+
+    def _with_visits(self, atlas: Atlas) -> Atlas:
+        """With what the file of visits knows of it."""
+        path = self._p.visits_file
+        if not path or not Path(path).exists():
+            return atlas
+        kept = atlas_file.load(path)
+        if not np.array_equal(kept.darts.node, atlas.darts.node) or len(kept.nodes) != len(atlas.nodes):
+            raise AtlasError(
+                f"~visits_file {path}: has visits of another atlas: {len(kept.nodes)} nodes and {len(kept.edges)} "
+                f"edges, got an atlas of {len(atlas.nodes)} and {len(atlas.edges)}; delete it, or name another file"
+            )
+        return replace(atlas, visits=kept.visits)
 
     def _await_meetpoint(self, why: str) -> SearchStatus:
         return self._show(SearchState.WAITING, f"the next meetpoint begins a search: {why}")
@@ -343,7 +365,12 @@ class SearchSession:
         if gives_up:
             estimate = replace(estimate, choice=None)  # nobody is to drive on
         poses = localizer.poses(estimate, self._p.listed_candidates)
-        status = self._status = SearchStatus(estimate.state, estimate.reason, stamp_ns, estimate, poses)
+        status = SearchStatus(estimate.state, estimate.reason, stamp_ns, estimate, poses)
+        if status.map_from_base is not None:
+            node = localizer.node(estimate)
+            relation = frame_relation.of(localizer.atlas, node, status.map_from_base, localizer.environment_from_base)
+            status = replace(status, relation=relation)
+        self._status = status
         decisions: List[Decision] = [
             status,
             LogLine(f"{estimate.depth} edges: {estimate.state}, {estimate.reason}"),

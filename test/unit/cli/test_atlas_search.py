@@ -175,3 +175,16 @@ def test_bad_input_is_refused_in_one_line(tmp_path: Path, capsys: Any) -> None:
     assert capsys.readouterr().err.strip().endswith("did you mean glass_bridge?")
     assert run("wake-up", str(tmp_path / "none.npz")) == 3
     assert capsys.readouterr().err.strip() == f"glass_nav atlas: {tmp_path / 'none.npz'}: does not exist"
+
+
+def test_check_says_what_robots_taught_the_atlas(tmp_path: Path, capsys: Any) -> None:
+    atlas = atlas_file.load(straight(tmp_path / "straight.json"))
+    atlas.visits.add_nodes(np.zeros(4, np.int64), np.full(4, atlas.nodes.r_m[0] + 0.02))
+    atlas.visits.add_edges(np.zeros(5, np.int64), np.full(5, atlas.edges.length_m[0] + 0.05))
+    atlas.visits.add_misses(np.array([1, 1, 1]))
+    atlas_file.save(atlas, tmp_path / "visits.json")
+    assert run("check", str(tmp_path / "visits.json")) == 0
+    printed = capsys.readouterr().out
+    assert "visits by robots: 4 of nodes, 5 of edges" in printed
+    assert "learnt: node 0: 4 visits, r " in printed and "learnt: edge 0: 5 visits, length " in printed
+    assert "learnt: usually missed by robots, and expected to be: nodes 1" in printed

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import yaml
@@ -70,6 +72,13 @@ def test_the_missing_pane_is_found_and_drawn(run, drive, tmp_path):
     assert np.count_nonzero(after.occupied & wanted) > 0.8 * np.count_nonzero(wanted)
 
 
+def test_with_a_ground_truth_panes_are_found_where_the_filter_is_not_sure(run, drive, tmp_path, never_sure):
+    lacking = drive.with_suffix(".map.yaml")
+    code, out, _ = run("map", "panes", drive, "--map", lacking, "--every", "2", "--out", tmp_path / "found")
+    assert code == 0
+    assert "1 panes drawn" in out
+
+
 def test_the_complete_map_gets_no_pane_twice(run, drive, tmp_path):
     complete = drive.with_suffix(".complete.map.yaml")
     code, out, _ = run("map", "panes", drive, "--map", complete, "--every", "3", "--out", tmp_path / "found")
@@ -92,18 +101,21 @@ def test_panes_are_chosen_by_number(run, drive, tmp_path):
     assert "there is no pane 7: 0 were found" in err
 
 
-def test_a_log_without_a_usable_pose_draws_nothing(run, drive, tmp_path, monkeypatch):
-    state = pose_state.LocalizationState.UNCERTAIN
+@pytest.fixture
+def never_sure(monkeypatch):
+    """The filter is UNCERTAIN at every scan."""
     judge = pose_state.PoseQuality.judge
 
     def unsure(self, *arguments, **options):
-        from dataclasses import replace
-
-        return replace(judge(self, *arguments, **options), state=state)
+        return replace(judge(self, *arguments, **options), state=pose_state.LocalizationState.UNCERTAIN)
 
     monkeypatch.setattr(pose_state.PoseQuality, "judge", unsure)
+
+
+def test_a_log_without_a_usable_pose_draws_nothing(run, drive, tmp_path, never_sure):
     lacking = drive.with_suffix(".map.yaml")
-    code, _, err = run("map", "panes", drive, "--map", lacking, "--max-scans", "5", "--out", tmp_path / "found")
+    options = ["--ground-truth", "none", "--initial-pose", 1, 1, 0, "--max-scans", "5"]
+    code, _, err = run("map", "panes", drive, "--map", lacking, *options, "--out", tmp_path / "found")
     assert code == 3
     assert "in none of 5 scans was the pose certain enough (LOCALIZED) to learn about the map; nothing is drawn" in err
     assert list((tmp_path / "found").iterdir()) == []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from glass_nav import _mrpt_grid
+from glass_nav import _grid
 from glass_nav.geometry import angles, se2
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.sensing.distance_field import DistanceField
@@ -33,7 +33,7 @@ def by_trying(scores, allowed, points, headings):
 
 def search(scores, allowed, points, headings, keep):
     """Row, column, heading and score of the best places."""
-    complete = _mrpt_grid.ScanSearch(_mrpt_grid.MatchGrid(scores, allowed), points, headings, keep)
+    complete = _grid.ScanSearch(_grid.MatchGrid(scores, allowed), points, headings, keep)
     assert complete.advance(2**62)
     return complete.places()
 
@@ -70,7 +70,7 @@ def test_a_search_in_slices_finds_what_one_at_once_finds(slice_size):
     rng = np.random.default_rng(3)
     scores, allowed = rng.integers(0, 256, (40, 70)).astype(np.uint8), rng.random((40, 70)) < 0.3
     given = rng.uniform(-20.0, 20.0, (9, 2)), rng.uniform(-np.pi, np.pi, 7), 20
-    sliced = _mrpt_grid.ScanSearch(_mrpt_grid.MatchGrid(scores, allowed), *given)
+    sliced = _grid.ScanSearch(_grid.MatchGrid(scores, allowed), *given)
     slices = 1
     while not sliced.advance(slice_size):
         slices += 1

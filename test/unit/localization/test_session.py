@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from glass_nav.localization import method
 from glass_nav.localization import session as session_module
 from glass_nav.localization.beam_classification.case_votes import BeamCases
 from glass_nav.localization.beam_classification.glass_map import GlassEvidence, GlassMap
@@ -112,7 +113,7 @@ class Bench:
 
 @pytest.fixture(autouse=True)
 def _fake_localizer(monkeypatch):
-    monkeypatch.setattr(session_module, "Localizer", FakeLocalizer)
+    monkeypatch.setattr(method, "Localizer", FakeLocalizer)
 
 
 @pytest.fixture

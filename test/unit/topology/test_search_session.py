@@ -10,6 +10,7 @@ from typing import Any, List, Optional, Tuple
 import numpy as np
 import pytest
 
+from glass_nav.geometry import se2
 from glass_nav.sensing.scan import Scan
 from glass_nav.topology import search_session
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
@@ -153,6 +154,34 @@ def test_parameters_that_mean_nothing_are_refused(fields: Any, line: str) -> Non
     assert str(refused.value) == line
 
 
+def test_candidates_are_counted_as_the_reason_counts_them() -> None:
+    session = started()
+    session.meetpoint(meetpoint())
+    estimate = session.status.estimate
+    assert estimate is not None and len(estimate.dart) == 6  # the document has a candidate for each node at first
+    assert (session.status.reason, estimate.candidates) == ("2 candidates", 2)
+    drive(session, Traversal(0, 8.0, 8.0), T_0 + S)
+    estimate = session.status.estimate
+    assert estimate is not None and session.status.reason == f"{estimate.candidates} candidates"
+    assert estimate.candidates == len(estimate.dart)
+
+
+def test_a_confirmed_meetpoint_gives_the_relation_of_frames() -> None:
+    session = started()
+    drive_until_confirmed(session)
+    assert session.status.map_from_base is not None and session.status.relation is None  # without dead reckoning
+    session = started()
+    session.meetpoint(meetpoint())
+    drive(session, Traversal(0, 8.0, 8.0), T_0 + S)
+    assert session.status.relation is None
+    odometry = np.array([3.0, -1.0, 2.0])
+    session.edge_traversal(Traversal(2, 11.2, 8.0), T_0 + 2 * S)
+    session.meetpoint(replace(meetpoint(T_0 + 2 * S), odom_from_base=odometry))
+    relation, pose = session.status.relation, session.status.map_from_base
+    assert relation is not None and pose is not None and relation.node == 0
+    np.testing.assert_allclose(se2.compose(relation.map_from_environment, odometry), pose, atol=1e-9)
+
+
 # -- pairs of reports
 
 
@@ -169,7 +198,7 @@ def test_reports_of_an_edge_come_in_either_order() -> None:
 
 @pytest.mark.parametrize(
     "meetpoint_s, traversal_s, dropped",
-    [pytest.param(60, 0, "traversal", id="old traversal"), pytest.param(0, 60, "meetpoint", id="old meetpoint")],
+    [pytest.param(60, 0, "traversal", id="old traversal"), pytest.param(1, 61, "meetpoint", id="old meetpoint")],
 )
 def test_of_two_reports_too_far_apart_the_older_is_dropped(meetpoint_s: int, traversal_s: int, dropped: str) -> None:
     session = started()
@@ -189,7 +218,7 @@ def test_of_two_reports_too_far_apart_the_older_is_dropped(meetpoint_s: int, tra
     assert session.status.estimate.depth == 1  # the other one waited
 
 
-@pytest.mark.parametrize("meetpoint_ns, traversal_ns", [(0, T_0), (T_0, 0), (0, 0), (T_0, T_0 + 2 * S)])
+@pytest.mark.parametrize("meetpoint_ns, traversal_ns", [(0, T_0), (T_0 + S, 0), (0, 0), (T_0 + S, T_0 + 3 * S)])
 def test_reports_without_a_stamp_or_within_the_tolerance_belong_together(meetpoint_ns: int, traversal_ns: int) -> None:
     session = started()
     session.meetpoint(meetpoint())
@@ -237,10 +266,54 @@ def test_an_initial_pose_can_be_kept_back() -> None:
     assert kinds(drive_until_confirmed(started(publish_initial_pose=False))) == [SearchStatus, LogLine]
 
 
+def test_a_meetpoint_that_is_reported_again_is_not_taken_for_the_end_of_the_next_edge() -> None:
+    session = started()
+    session.meetpoint(meetpoint(T_0))
+    depth = session.status.estimate.depth
+    assert session.meetpoint(meetpoint(T_0)) == []  # the driver has not heard yet that the search has begun
+    decisions = [
+        *session.edge_traversal(Traversal(0, 8.0, 8.0), T_0 + 10 * S),
+        *session.meetpoint(meetpoint(T_0 + 10 * S)),
+    ]
+    assert not any(isinstance(each, LogLine) and each.level == logging.WARNING for each in decisions)
+    assert session.status.estimate.depth == depth + 1
+
+
 def test_the_statistics_of_the_atlas_are_saved(tmp_path: Path) -> None:
     path = tmp_path / "visits.json"
     drive_until_confirmed(started(visits_file=str(path)))
     assert atlas_file.load(path).visits.node_count.tolist() == [2, 1, 0, 0]
+
+
+def test_the_statistics_that_were_saved_are_used_again(tmp_path: Path) -> None:
+    path = tmp_path / "visits.json"
+    for count in (1, 2, 3):
+        session = started(visits_file=str(path))
+        drive_until_confirmed(session)
+        assert session.localizer.atlas.visits.node_count.tolist() == [2 * count, count, 0, 0]
+
+
+@pytest.mark.parametrize(
+    "content, message",
+    [
+        ("{", "is not JSON: "),
+        ("", "is not JSON: "),
+        (
+            None,
+            "has visits of another atlas: 24 nodes and 30 edges, got an atlas of 4 and 4; delete it, or name another",
+        ),
+    ],
+)
+def test_a_bad_file_of_statistics_is_refused_in_one_line(content: Optional[str], message: str, tmp_path: Path) -> None:
+    path = tmp_path / "visits.json"
+    if content is None:
+        atlas_file.save(atlas_file.load(shipped_atlases.find("glass_atrium")), path)
+    else:
+        path.write_text(content)
+    with pytest.raises(AtlasError) as refused:
+        started(visits_file=str(path))
+    assert str(path) in str(refused.value) and "\n" not in str(refused.value)
+    assert message.split(":")[0] in str(refused.value)
 
 
 def test_a_file_that_cannot_be_written_is_said_and_nothing_else_changes(tmp_path: Path) -> None:

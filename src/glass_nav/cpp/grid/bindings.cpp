@@ -1,11 +1,10 @@
-/// The Python module _mrpt_grid. Private: docstrings, checks and defaults are in sensing/raycast.py and
+/// The Python module _grid. Private: docstrings, checks and defaults are in sensing/raycast.py and
 /// hypotheses/scan_matcher.py.
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <stdexcept>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -39,15 +38,15 @@ py::array_t<T> result_for(const RayBatch& rays) {
 }
 
 std::unique_ptr<GridRaycaster> make_grid(const Array<std::int8_t>& occupancy, double resolution_m, int occupied_percent,
-                                         const std::string& backend, bool unknown_stops) {
+                                         bool unknown_stops, std::shared_ptr<FreeRanges> guide) {
   if (occupancy.ndim() != 2) throw std::invalid_argument("occupancy must be (H, W)");
   constexpr py::ssize_t kMost = std::numeric_limits<int>::max();
   if (occupancy.shape(0) > kMost || occupancy.shape(1) > kMost) throw std::invalid_argument("occupancy is too large");
   const auto height = static_cast<int>(occupancy.shape(0)), width = static_cast<int>(occupancy.shape(1));
   const std::int8_t* cells = occupancy.data();
-  const Backend chosen = backend_from_name(backend);
   py::gil_scoped_release unlocked;
-  return std::make_unique<GridRaycaster>(cells, height, width, resolution_m, occupied_percent, chosen, unknown_stops);
+  return std::make_unique<GridRaycaster>(cells, height, width, resolution_m, occupied_percent, unknown_stops,
+                                         std::move(guide));
 }
 
 void redraw(GridRaycaster& grid, const Array<std::int8_t>& occupancy, int first_row, int first_column, int rows,
@@ -141,13 +140,13 @@ py::tuple cast_paths(const GridRaycaster& grid, const Array<double>& poses, cons
   return py::make_tuple(range_m, cos, cell);
 }
 
-py::array_t<double> simulate_scan_ray_raw(const GridRaycaster& grid, const Array<double>& poses,
-                                          const Array<double>& angles, double max_range_m) {
-  const RayBatch rays = batch_of(poses, angles, max_range_m, 1);
-  auto range_m = result_for<double>(rays);
+py::array_t<double> free_ranges(const GridRaycaster& grid, const FreeRanges& rays, const Array<double>& poses,
+                                const Array<double>& angles, double max_range_m) {
+  const RayBatch batch = batch_of(poses, angles, max_range_m, 1);
+  auto range_m = result_for<double>(batch);
   double* to = range_m.mutable_data();
   py::gil_scoped_release unlocked;
-  grid.simulate_scan_ray_raw(rays, to);
+  grid.free_ranges(rays, batch, to);
   return range_m;
 }
 
@@ -170,6 +169,30 @@ py::tuple normals(const GridRaycaster& grid) {
     angle_to[cell] = std::atan2(normal.y, normal.x);
     linearity_to[cell] = normal.linearity;
     offset_to[cell] = static_cast<float>(normal.offset * grid.resolution_m());
+  }
+  return py::make_tuple(normal_rad, linearity, offset_m);
+}
+
+py::tuple walls_at(const GridRaycaster& grid, const Array<std::int32_t>& cell) {
+  const std::int32_t* from = cell.data();
+  const py::ssize_t count = cell.size();
+  const std::int64_t cells = static_cast<std::int64_t>(grid.width()) * grid.height();
+  if (std::any_of(from, from + count, [&](std::int32_t each) { return each < -1 || each >= cells; })) {
+    throw std::invalid_argument("cells must be of the grid, or -1");
+  }
+  const std::vector<py::ssize_t> shape(cell.shape(), cell.shape() + cell.ndim());
+  py::array_t<float> normal_rad(shape), linearity(shape), offset_m(shape);
+  float *angle_to = normal_rad.mutable_data(), *linearity_to = linearity.mutable_data();
+  float* offset_to = offset_m.mutable_data();
+  {
+    py::gil_scoped_release unlocked;
+    const WallNormals& walls = grid.normals();
+    for (py::ssize_t i = 0; i < count; ++i) {
+      const WallNormals::Normal normal = walls.at(from[i]);
+      angle_to[i] = std::atan2(normal.y, normal.x);
+      linearity_to[i] = normal.linearity;
+      offset_to[i] = static_cast<float>(normal.offset * grid.resolution_m());
+    }
   }
   return py::make_tuple(normal_rad, linearity, offset_m);
 }
@@ -210,19 +233,21 @@ py::tuple places(const ScanSearch& search) {
 }  // namespace
 }  // namespace glass_nav
 
-PYBIND11_MODULE(_mrpt_grid, module) {
+PYBIND11_MODULE(_grid, module) {
   using namespace glass_nav;
+  py::class_<FreeRanges, std::shared_ptr<FreeRanges>>(module, "FreeRanges");  // made by _mrpt_rays
   py::class_<GridRaycaster>(module, "Grid")
       .def(py::init(&make_grid), py::arg("occupancy"), py::arg("resolution_m"), py::arg("occupied_percent"),
-           py::arg("backend"), py::arg("unknown_stops"))
+           py::arg("unknown_stops"), py::arg("guide"))
       .def("cast", &cast, py::arg("poses"), py::arg("angles"), py::arg("max_range_m"), py::arg("threads"))
       .def("cast_first", &cast_first, py::arg("poses"), py::arg("angles"), py::arg("max_range_m"), py::arg("threads"))
       .def("cast_surfaces", &cast_surfaces, py::arg("poses"), py::arg("angles"), py::arg("max_range_m"),
            py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"), py::arg("threads"))
       .def("cast_paths", &cast_paths, py::arg("poses"), py::arg("angles"), py::arg("reach_m"),
            py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"), py::arg("threads"))
-      .def("simulate_scan_ray_raw", &simulate_scan_ray_raw, py::arg("poses"), py::arg("angles"), py::arg("max_range_m"))
+      .def("free_ranges", &free_ranges, py::arg("rays"), py::arg("poses"), py::arg("angles"), py::arg("max_range_m"))
       .def("normals", &normals)
+      .def("walls_at", &walls_at, py::arg("cell"))
       .def("redraw", &redraw, py::arg("occupancy"), py::arg("first_row"), py::arg("first_column"), py::arg("rows"),
            py::arg("columns"));
   py::class_<MatchGrid, std::shared_ptr<MatchGrid>>(module, "MatchGrid")

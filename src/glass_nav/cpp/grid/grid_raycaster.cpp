@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "first_hits.hpp"
 #include "ray_stream.hpp"
@@ -34,43 +35,29 @@ void for_each_ray(const RayBatch& batch, double resolution_m, const Work& work) 
   });
 }
 
-constexpr float kFree = 1.0F, kUnknown = 0.5F, kOccupied = 0.0F;  // MRPT keeps the probability of being free
-
 }  // namespace
 
-Backend backend_from_name(const std::string& name) {
-  if (name == "exact") return Backend::exact;
-  if (name == "mrpt") return Backend::mrpt;
-  throw std::invalid_argument("backend must be 'exact' or 'mrpt', got '" + name + "'");
-}
-
 GridRaycaster::GridRaycaster(const std::int8_t* occupancy, int height, int width, double resolution_m,
-                             int occupied_percent, Backend backend, bool unknown_stops)
+                             int occupied_percent, bool unknown_stops, std::shared_ptr<FreeRanges> guide)
     : width_(width),
       height_(height),
       resolution_m_(resolution_m),
       occupied_percent_(occupied_percent),
       unknown_stops_(unknown_stops),
-      backend_(backend) {
+      guide_(std::move(guide)) {
   if (width < 1 || height < 1) throw std::invalid_argument("a grid needs at least one cell");
   if (!(resolution_m > 0.0 && std::isfinite(resolution_m))) throw std::invalid_argument("resolution must be > 0 m");
   const std::int64_t count = static_cast<std::int64_t>(width) * height;
   if (count > std::numeric_limits<std::int32_t>::max())
     throw std::invalid_argument("a grid has at most 2^31 - 1 cells");
-  // At the origin: setSize() would round any other place to whole cells.
-  map_.setSize(0.0F, static_cast<float>(width * resolution_m), 0.0F, static_cast<float>(height * resolution_m),
-               static_cast<float>(resolution_m));
-  if (map_.getSizeX() != static_cast<unsigned>(width) || map_.getSizeY() != static_cast<unsigned>(height)) {
-    throw std::invalid_argument("MRPT made " + std::to_string(map_.getSizeX()) + " x " +
-                                std::to_string(map_.getSizeY()) + " cells of a grid of " + std::to_string(width) +
-                                " x " + std::to_string(height));
-  }
+  if (unknown_stops) unknown_.resize(static_cast<std::size_t>(count));
   chessboard_distance_ = std::make_unique<ChessboardDistance>(drawn(occupancy, {0, 0, width, height}), width, height);
 }
 
 void GridRaycaster::redraw(const std::int8_t* occupancy, const CellBox& box) {
   chessboard_distance_->redraw(box, drawn(occupancy, box));
-  if (normals_ != nullptr) normals_ = std::make_unique<const WallNormals>(occupied(), width_, height_, *normals_, box);
+  if (guide_ != nullptr) guide_->redraw(occupancy, box);
+  if (normals_ != nullptr) normals_ = std::make_unique<const WallNormals>(surfaces(), width_, height_, *normals_, box);
 }
 
 std::vector<std::uint8_t> GridRaycaster::drawn(const std::int8_t* occupancy, const CellBox& box) {
@@ -78,39 +65,37 @@ std::vector<std::uint8_t> GridRaycaster::drawn(const std::int8_t* occupancy, con
   blocked.reserve(static_cast<std::size_t>(box.x1 - box.x0) * (box.y1 - box.y0));
   for (int y = box.y0; y < box.y1; ++y) {
     for (int x = box.x0; x < box.x1; ++x) {
-      const std::int8_t percent = occupancy[static_cast<std::ptrdiff_t>(y) * width_ + x];
-      const bool unknown = percent < 0, occupied = !unknown && percent >= occupied_percent_;
+      const std::size_t cell = static_cast<std::size_t>(y) * width_ + x;
+      const bool unknown = occupancy[cell] < 0, occupied = !unknown && occupancy[cell] >= occupied_percent_;
       blocked.push_back(occupied || (unknown && unknown_stops_) ? 1 : 0);
-      map_.setCell(x, y, occupied ? kOccupied : (unknown ? kUnknown : kFree));
+      if (unknown_stops_) unknown_[cell] = unknown ? 1 : 0;
     }
   }
   return blocked;
 }
 
-std::vector<std::uint8_t> GridRaycaster::occupied() const {
+std::vector<std::uint8_t> GridRaycaster::surfaces() const {
   const GridCells grid = cells();
-  std::vector<std::uint8_t> occupied(map_.getRawMap().size());
+  std::vector<std::uint8_t> occupied(static_cast<std::size_t>(width_) * height_);
   for (std::size_t i = 0; i < occupied.size(); ++i) occupied[i] = grid.occupied(static_cast<std::int32_t>(i)) ? 1 : 0;
   return occupied;
 }
 
 const WallNormals& GridRaycaster::normals() const {
   std::call_once(normals_once_,
-                 [this] { normals_ = std::make_unique<const WallNormals>(occupied(), width_, height_); });
+                 [this] { normals_ = std::make_unique<const WallNormals>(surfaces(), width_, height_); });
   return *normals_;
 }
 
-GridCells GridRaycaster::cells() const {
-  return {width_, height_, map_.getRawMap().data(), chessboard_distance_.get()};
-}
+GridCells GridRaycaster::cells() const { return {width_, height_, chessboard_distance_.get(), unknown_stops_ ? unknown_.data() : nullptr}; }
 
 template <class Use>
 void GridRaycaster::with_ray_marcher(const Use& use) const {
   const GridCells grid = cells();
-  if (backend_ == Backend::exact) {
+  if (guide_ == nullptr) {
     use(grid, ExactRayMarcher(grid));
   } else {
-    use(grid, MrptRayMarcher(grid, map_, resolution_m_));
+    use(grid, GuidedRayMarcher(grid, *guide_));
   }
 }
 
@@ -121,7 +106,7 @@ void GridRaycaster::cast_first(const RayBatch& batch, double* range_m, std::int3
     range_m[i] = met < 0 ? kInfinity : t * resolution_m_;
     if (cell != nullptr) cell[i] = met;
   };
-  if (backend_ == Backend::exact) {
+  if (guide_ == nullptr) {
     const FirstHits first_hits(grid);
     for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
       first_hits.along_all(count, t_max, rays,
@@ -129,7 +114,7 @@ void GridRaycaster::cast_first(const RayBatch& batch, double* range_m, std::int3
     });
     return;
   }
-  const MrptRayMarcher marcher(grid, map_, resolution_m_);
+  const GuidedRayMarcher marcher(grid, *guide_);
   for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
     const auto start = [&](std::size_t) {
       const Ray ray = rays.next();
@@ -192,12 +177,10 @@ void GridRaycaster::cast_paths(const RayBatch& batch, const double* reach_m, con
   });
 }
 
-void GridRaycaster::simulate_scan_ray_raw(const RayBatch& batch, double* range_m) const {
-  const MrptRayMarcher marcher(cells(), map_, resolution_m_);
+void GridRaycaster::free_ranges(const FreeRanges& rays, const RayBatch& batch, double* range_m) const {
   const double t_max = batch.max_range_m / resolution_m_;
-  for_each_ray(batch, resolution_m_, [&](std::size_t i, const Ray& ray) {
-    range_m[i] = marcher.free_cells(ray, 0.0, t_max) * resolution_m_;
-  });
+  for_each_ray(batch, resolution_m_,
+               [&](std::size_t i, const Ray& ray) { range_m[i] = rays.along(ray, 0.0, t_max) * resolution_m_; });
 }
 
 }  // namespace glass_nav

@@ -1,28 +1,18 @@
-/// Casts rays on an occupancy grid held by MRPT.
+/// Casts rays on an occupancy grid.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <mutex>
-#include <string>
 #include <vector>
 
-#include <mrpt/maps/COccupancyGridMap2D.h>
-
 #include "chessboard_distance.hpp"
+#include "free_ranges.hpp"
 #include "ray_marching.hpp"
 #include "wall_normals.hpp"
 
 namespace glass_nav {
-
-enum class Backend {
-  exact,  // skips from free square to free square, exact to the cell boundary
-  mrpt,   // COccupancyGridMap2D::simulateScanRay says where to look; see MrptRayMarcher
-};
-
-/// "exact" or "mrpt"; std::invalid_argument for any other name.
-Backend backend_from_name(const std::string& name);
 
 /// A batch of rays: every pose looks along every angle. Row-major arrays, owned by the caller.
 struct RayBatch {
@@ -66,8 +56,9 @@ class GridRaycaster {
   /// @param occupancy  height * width, row by row, 0 .. 100 percent or -1 unknown
   /// @param occupied_percent  a cell this occupied ends a beam
   /// @param unknown_stops  a ray ends, without a hit, at the first unknown cell; otherwise it passes
+  /// @param guide  says where to look for surfaces; null: rays skip from free square to free square
   GridRaycaster(const std::int8_t* occupancy, int height, int width, double resolution_m, int occupied_percent,
-                Backend backend, bool unknown_stops);
+                bool unknown_stops, std::shared_ptr<FreeRanges> guide);
 
   /// Cells in a box have changed. Not while another thread casts rays.
   /// @param occupancy  of the whole grid, as for the constructor
@@ -87,8 +78,8 @@ class GridRaycaster {
   void cast_paths(const RayBatch& batch, const double* reach_m, const SurfaceLimits& limits,
                   const PathArrays& out) const;
 
-  /// What simulateScanRay itself answers up to max_range_m, faults included: for comparison only.
-  void simulate_scan_ray_raw(const RayBatch& batch, double* range_m) const;
+  /// What the rays of another library answer up to max_range_m, unchecked: for comparison only.
+  void free_ranges(const FreeRanges& rays, const RayBatch& batch, double* range_m) const;
 
   /// Computed when first asked for; any thread may ask.
   const WallNormals& normals() const;
@@ -96,20 +87,20 @@ class GridRaycaster {
  private:
   GridCells cells() const;
   template <class Use>
-  void with_ray_marcher(const Use& use) const;  // use(GridCells, marcher of the backend)
+  void with_ray_marcher(const Use& use) const;  // use(GridCells, marcher)
   template <class Reach, class Store>
   void find_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const Reach& t_max, const Store& store) const;
 
-  /// Puts the cells of a box into the map; which of them end a ray, row by row.
+  /// Keeps which cells of a box are unknown, if those stop rays; which of its cells end a ray, row by row.
   std::vector<std::uint8_t> drawn(const std::int8_t* occupancy, const CellBox& box);
-  std::vector<std::uint8_t> occupied() const;
+  std::vector<std::uint8_t> surfaces() const;  // of each cell, not 0: occupied
 
   int width_, height_;
   double resolution_m_;
   int occupied_percent_;
   bool unknown_stops_;
-  Backend backend_;
-  mrpt::maps::COccupancyGridMap2D map_;
+  std::shared_ptr<FreeRanges> guide_;
+  std::vector<std::uint8_t> unknown_;  // of each cell, not 0: unknown; empty unless those stop rays
   std::unique_ptr<ChessboardDistance> chessboard_distance_;  // between the cells where a ray may end
   mutable std::once_flag normals_once_;
   mutable std::unique_ptr<const WallNormals> normals_;

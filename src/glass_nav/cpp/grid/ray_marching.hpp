@@ -3,14 +3,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
-
-#include <mrpt/maps/COccupancyGridMap2D.h>
 
 #include "chessboard_distance.hpp"
+#include "free_ranges.hpp"
 #include "grid_walk.hpp"
 
 namespace glass_nav {
@@ -18,16 +15,16 @@ namespace glass_nav {
 /// The cells as rays see them; all arrays are row-major and belong to the raycaster.
 struct GridCells {
   int width, height;
-  const mrpt::maps::COccupancyGridMap2D::cellType* log_odds;  // of being free
-  const ChessboardDistance* chessboard_distance;
+  const ChessboardDistance* chessboard_distance;  // to the cells that end a ray
+  const std::uint8_t* unknown;                    // not 0: ends a ray without being a surface; null: no cell does
 
   /// A surface.
-  bool occupied(std::int32_t cell) const { return log_odds[cell] < 0; }
+  bool occupied(std::int32_t cell) const { return blocked(cell) && (unknown == nullptr || unknown[cell] == 0); }
 
-  /// A cell that ends a ray without being a surface (unknown, if those are to stop a ray).
-  bool stops(std::int32_t cell) const {
-    return chessboard_distance->towards(false, false)[cell] == 0 && !occupied(cell);
-  }
+  /// A cell that ends a ray without being a surface.
+  bool stops(std::int32_t cell) const { return unknown != nullptr && blocked(cell) && unknown[cell] != 0; }
+
+  bool blocked(std::int32_t cell) const { return chessboard_distance->towards(false, false)[cell] == 0; }
 
   /// The occupied cell that the ray meets at the present step: its own or one beside the corner; -1 none. Where the
   /// ray leaves the grid at a corner there is still one beside it.
@@ -119,22 +116,11 @@ class ExactRayMarcher {
   GridCells cells_;
 };
 
-/// Asks simulateScanRay how far the ray is free, then checks the cells on the path itself.
-///
-/// Faults of simulateScanRay (MRPT 2.1 to 2.14), and their remedies here:
-/// - it samples every 0.8 cell and reports the sample, up to 0.8 cell late: the walk gives the cell boundary;
-/// - between two samples it slips through corners of cells, and so through thin walls: the walk visits every cell up
-///   to the reported range;
-/// - its steps are rounded to 1/1024 cell, so long rays drift sideways and hit what the true ray passes: if the walk
-/// finds
-///   nothing where it reported a hit, it is asked again from there on;
-/// - it makes max_range / resolution steps, so it stops at 0.8 max_range: it is given 1 / 0.8 of the range;
-/// - with a threshold of 0.5 an unknown cell ends the ray as invalid: unknown cells pass its threshold here, and the
-///   walk stops at them where that is asked for.
-class MrptRayMarcher {
+/// Asks another library how far each ray is free, then checks the cells on the path itself: the answer may be late, and
+/// may be wrong about what it passed or met.
+class GuidedRayMarcher {
  public:
-  MrptRayMarcher(const GridCells& cells, const mrpt::maps::COccupancyGridMap2D& map, double resolution_m)
-      : cells_(cells), map_(map), resolution_m_(resolution_m) {}
+  GuidedRayMarcher(const GridCells& cells, const FreeRanges& guide) : cells_(cells), guide_(guide) {}
 
   /// As ExactRayMarcher::march_all, one ray after the other.
   template <class Start, class Ignored, class Found>
@@ -147,21 +133,11 @@ class MrptRayMarcher {
     }
   }
 
-  /// simulateScanRay as it is, looking from ray length t to t_max [cells]; inf if it finds nothing.
-  double free_cells(const Ray& ray, double t, double t_max) const {
-    float range_m = 0.0F;
-    bool valid = false;
-    map_.simulateScanRay((ray.x + t * ray.dx) * resolution_m_, (ray.y + t * ray.dy) * resolution_m_,
-                         std::atan2(ray.dy, ray.dx), range_m, valid, (t_max - t) * resolution_m_ / kStepCells,
-                         kPassFrom);
-    return valid ? range_m / resolution_m_ : std::numeric_limits<double>::infinity();
-  }
-
  private:
   template <class Ignored>
   std::int32_t seek(const Ray& ray, GridWalk& walk, const Ignored& ignored) const {
     while (walk.inside()) {
-      const double look_until = walk.t() + free_cells(ray, walk.t(), walk.t_max()) + kMarginCells;
+      const double look_until = walk.t() + guide_.along(ray, walk.t(), walk.t_max()) + kMarginCells;
       for (; walk.inside() && walk.t() <= look_until; walk.leap(1)) {
         const std::int32_t met = cells_.met(walk, ignored);
         if (met >= 0) return met;
@@ -171,13 +147,10 @@ class MrptRayMarcher {
     return cells_.met(walk, ignored);
   }
 
-  static constexpr double kStepCells = 0.8;    // of simulateScanRay
-  static constexpr double kMarginCells = 2.0;  // it reports the sample before or after the boundary
-  static constexpr float kPassFrom = 0.4F;     // a cell that is free with at least this probability lets a ray pass
+  static constexpr double kMarginCells = 2.0;  // the guide reports a sample before or after the boundary
 
   GridCells cells_;
-  const mrpt::maps::COccupancyGridMap2D& map_;
-  double resolution_m_;
+  const FreeRanges& guide_;
 };
 
 }  // namespace glass_nav

@@ -1,4 +1,4 @@
-"""Picture of a robot that woke up somewhere: its path over the map, the candidates at each depth, where it ended.
+"""Picture of a robot that woke up somewhere: its path over the whole map, the candidates at each depth, where it ended.
 
 By matplotlib without a display. Poses (3,) x [m], y [m], yaw [rad] in the frame map.
 """
@@ -14,13 +14,16 @@ import numpy as np
 
 from glass_nav.evaluation.plots.canvas import frame, new_figure
 from glass_nav.evaluation.plots.labels import Labels
-from glass_nav.evaluation.plots.map_layer import draw_map
+from glass_nav.evaluation.plots.map_layer import UNKNOWN_GREY, WALL_BLACK, draw_map
+from glass_nav.geometry import se2
 from glass_nav.world.grid_map import GridMap
 
-MARGIN_M = 1.5
+MARGIN_M = 0.5
 MAX_PANELS = 8  # of depths; the first and the last ones
 COLUMNS = 2
+LEGEND_IN = 0.8  # height of the legend
 SEARCH_COLOUR, TOUR_COLOUR, CANDIDATE_COLOUR, TRUE_COLOUR = "#c98c00", "#0072b2", "#55104a", "#14dcab"
+FINAL_COLOUR = "#000000"
 
 
 @dataclass(frozen=True)
@@ -45,20 +48,23 @@ class WakeUpStory:
 
 
 def draw(path: Path, grid: GridMap, story: WakeUpStory, title: str) -> None:
-    """Above the whole path, below a small map for each depth."""
+    """Above the whole path, below a small map for each depth, at the foot what each mark means."""
     low, high = _bounds(grid, story)
     shown = _shown(len(story.depths))
     rows = math.ceil(len(shown) / COLUMNS)
     shape = float(np.clip((high[1] - low[1]) / (high[0] - low[0]), 0.2, 1.5))
     heights = [11.0 * shape, *[11.0 * shape / COLUMNS] * rows]
-    figure = new_figure(11.5, sum(heights) + 0.9 + 0.35 * rows)
-    layout = figure.add_gridspec(1 + rows, COLUMNS, height_ratios=heights)
+    figure = new_figure(11.5, sum(heights) + 1.0 + LEGEND_IN + 0.55 * rows)
+    layout = figure.add_gridspec(2 + rows, COLUMNS, height_ratios=[*heights, LEGEND_IN])
     above = figure.add_subplot(layout[0, :])
     _draw_way(above, grid, story, low, high)
     above.set_title(title, fontsize=11)
     for place, number in enumerate(shown):
         axes = figure.add_subplot(layout[1 + place // COLUMNS, place % COLUMNS])
         _draw_depth(axes, grid, story.depths[number], number, low, high)
+    foot = figure.add_subplot(layout[-1, :])
+    foot.axis("off")
+    foot.legend(handles=_marks(story), loc="center", ncol=4, fontsize=8, frameon=False)
     figure.savefig(path)
 
 
@@ -70,15 +76,15 @@ def _shown(count: int) -> List[int]:
 
 
 def _bounds(grid: GridMap, story: WakeUpStory) -> "tuple[np.ndarray, np.ndarray]":
-    """All that is drawn, and at least the path."""
-    parts = [story.search_m, story.tour_m, *(depth.candidates[:, :2] for depth in story.depths)]
-    points = np.concatenate([part.reshape(-1, 2) for part in parts])
-    if not len(points):
-        height, width = grid.occupancy.shape
-        points = grid.map_from_grid[:2] + np.array([[0.0, 0.0], [width, height]]) * grid.resolution_m
-    low, high = points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
-    middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 3.0)
-    return middle - half, middle + half
+    """Corners of all that the map knows and of the path."""
+    rows, columns = np.nonzero(grid.occupancy >= 0)
+    if len(rows):
+        corners = [[x, y] for x in (columns.min(), columns.max() + 1) for y in (rows.min(), rows.max() + 1)]
+    else:
+        corners = [[0, 0], list(grid.occupancy.shape[::-1])]
+    known = se2.transform_points(grid.map_from_grid, np.array(corners, float) * grid.resolution_m)
+    points = np.concatenate([known, story.search_m.reshape(-1, 2), story.tour_m.reshape(-1, 2)])
+    return points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
 
 
 def _ground(axes: Any, grid: GridMap, low: np.ndarray, high: np.ndarray) -> None:
@@ -88,47 +94,39 @@ def _ground(axes: Any, grid: GridMap, low: np.ndarray, high: np.ndarray) -> None
 
 def _draw_way(axes: Any, grid: GridMap, story: WakeUpStory, low: np.ndarray, high: np.ndarray) -> None:
     _ground(axes, grid, low, high)
-    for way, colour, style, width, label in (
-        (story.tour_m, TOUR_COLOUR, "-", 3.2, "true path of the tour"),
-        (story.search_m, SEARCH_COLOUR, "--", 1.8, "true path of the search"),
+    for way, colour, style, width in (
+        (story.tour_m, TOUR_COLOUR, "-", 3.2),
+        (story.search_m, SEARCH_COLOUR, "--", 1.8),
     ):
         if len(way):
-            axes.plot(way[:, 0], way[:, 1], color=colour, linestyle=style, linewidth=width, label=label, zorder=3)
-            axes.plot(*way[0], "o", color=colour, markersize=5, zorder=4)
-    labels = Labels(axes)
-    for number, depth in enumerate(story.depths):
-        if depth.truth is not None:
-            labels.add(depth.truth[:2], str(number), fontsize=8, zorder=6)
-    for pose, colour, label in (
-        (story.handed_over, CANDIDATE_COLOUR, "pose handed over"),
-        (story.truth, TRUE_COLOUR, "true pose at the end"),
-        (story.final, "#000000", "localization at the end"),
-    ):
+            axes.plot(way[:, 0], way[:, 1], color=colour, linestyle=style, linewidth=width, zorder=3)
+    if len(story.search_m):
+        axes.plot(*story.search_m[0], **_START, zorder=4)
+    for pose, colour in ((story.handed_over, CANDIDATE_COLOUR), (story.final, FINAL_COLOUR)):
         if pose is not None:
-            _arrows(axes, pose[None], colour, label)
-    axes.legend(loc="best", fontsize=8, framealpha=0.9)
+            _arrows(axes, pose[None], colour)
+    if story.truth is not None:
+        axes.plot(*story.truth[:2], **_TRUTH, zorder=6)
+    axes.figure.canvas.draw()  # the layout, which says how much room a label has
+    labels = Labels(axes)
+    for number, depth in reversed(list(enumerate(story.depths))):  # where there is no room for all, the last ones
+        if depth.truth is not None:
+            axes.plot(*depth.truth[:2], **_MEETPOINT, zorder=4)
+            labels.add(depth.truth[:2], str(number), fontsize=8, zorder=7, bbox=_PAPER)
 
 
 def _draw_depth(axes: Any, grid: GridMap, depth: Depth, number: int, low: np.ndarray, high: np.ndarray) -> None:
     _ground(axes, grid, low, high)
     if len(depth.candidates):
-        _arrows(axes, depth.candidates, CANDIDATE_COLOUR, "")
+        _arrows(axes, depth.candidates, CANDIDATE_COLOUR)
     if depth.truth is not None:
-        axes.plot(
-            depth.truth[0],
-            depth.truth[1],
-            "o",
-            markersize=9,
-            markerfacecolor="none",
-            markeredgecolor=TRUE_COLOUR,
-            markeredgewidth=1.8,
-            zorder=5,
-        )
+        axes.plot(*depth.truth[:2], **_TRUTH, zorder=6)
     count = len(depth.candidates)
     axes.set_title(f"depth {number}: {count} candidate{'s' * (count != 1)}; {depth.text}", fontsize=8)
 
 
-def _arrows(axes: Any, poses: np.ndarray, colour: str, label: str) -> None:
+def _arrows(axes: Any, poses: np.ndarray, colour: str) -> None:
+    """As long on the paper in any building."""
     axes.quiver(
         poses[:, 0],
         poses[:, 1],
@@ -136,9 +134,42 @@ def _arrows(axes: Any, poses: np.ndarray, colour: str, label: str) -> None:
         np.sin(poses[:, 2]),
         color=colour,
         angles="xy",
-        scale_units="xy",
-        scale=0.9,
-        width=0.004,
+        units="inches",
+        scale_units="inches",
+        scale=4.0,
+        width=0.03,
         zorder=5,
-        label=label or None,
     )
+
+
+_RING = {"linestyle": "none", "marker": "o", "markerfacecolor": "none"}
+_START = {"linestyle": "none", "marker": "o", "color": SEARCH_COLOUR, "markersize": 7}
+_MEETPOINT = {"linestyle": "none", "marker": "s", "color": SEARCH_COLOUR, "markersize": 4}
+_TRUTH = {**_RING, "markersize": 11, "markeredgecolor": TRUE_COLOUR, "markeredgewidth": 2.0}
+_PAPER = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
+
+
+def _marks(story: WakeUpStory) -> List[Any]:
+    """The legend of all marks that are drawn."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    def arrow(colour: str, label: str) -> Any:
+        return Line2D([], [], linestyle="none", marker=r"$\rightarrow$", markersize=14, color=colour, label=label)
+
+    path = {"color": SEARCH_COLOUR, "linestyle": "--", "linewidth": 1.8}
+    marks = [
+        (bool(len(story.search_m)), Line2D([], [], label="true path during the search", **path)),
+        (bool(len(story.search_m)), Line2D([], [], label="where it woke up", **_START)),
+        (
+            any(depth.truth is not None for depth in story.depths),
+            Line2D([], [], label="meetpoint, with its search depth", **_MEETPOINT),
+        ),
+        (bool(len(story.tour_m)), Line2D([], [], color=TOUR_COLOUR, linewidth=3.2, label="true path of the tour")),
+        (bool(story.depths), arrow(CANDIDATE_COLOUR, "candidate; above: the pose handed over")),
+        (story.final is not None, arrow(FINAL_COLOUR, "pose by the localization at the end")),
+        (True, Line2D([], [], label="true place; above: at the end", **_TRUTH)),
+        (True, Patch(facecolor=str(WALL_BLACK), label="wall or glass on the map")),
+        (True, Patch(facecolor=str(UNKNOWN_GREY), edgecolor="0.6", label="unknown on the map")),
+    ]
+    return [mark for drawn, mark in marks if drawn]

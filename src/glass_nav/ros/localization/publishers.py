@@ -13,8 +13,9 @@ from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan, PointCloud2
 from visualization_msgs.msg import MarkerArray
 
-from glass_nav.localization.localizer import Estimate, Localizer
+from glass_nav.localization.localizer import Estimate
 from glass_nav.localization.map_to_odom import MapToOdom, StampedTransform
+from glass_nav.localization.method import PoseFilter
 from glass_nav.msg import BeamCases, LocalizationStatus
 from glass_nav.rate_limiter import RateLimiter, period_s
 from glass_nav.ros import conversions, legend
@@ -65,7 +66,9 @@ class Publishers:
         self._glass_is_news = True
 
     def send(self, placed: PlacedScan, estimate: Estimate, now_s: float, pose_is_news: bool) -> None:
-        """Publish everything about one scan that was used.
+        """Publish everything about one scan that was used: first what the robot drives by, last what people look at.
+
+        A topic that is not latched costs nothing while nobody listens.
 
         Args:
             placed: the scan.
@@ -75,7 +78,11 @@ class Publishers:
         """
         self._was_localized = self._was_localized or estimate.state == LocalizationState.LOCALIZED
         self.send_transform(estimate.stamp_ns, estimate.map_from_odom)
-        self._surfaces.publish(conversions.surface_scan_msg(placed, estimate.surface_scan))
+        pose_goes_out = estimate.updated or pose_is_news
+        if pose_goes_out:
+            self._poses.publish(conversions.pose_msg(estimate, self._frame))
+        if self._surfaces.get_num_connections():
+            self._surfaces.publish(conversions.surface_scan_msg(placed, estimate.surface_scan))
         self._status.publish(
             conversions.status_msg(
                 estimate.stamp_ns,
@@ -87,10 +94,8 @@ class Publishers:
                 estimate.levels,
             )
         )
-        if estimate.updated or pose_is_news:
-            self._poses.publish(conversions.pose_msg(estimate, self._frame))
-            if self._particles_pace.is_due(now_s, period_s(self._p.gui_publish_rate)) or pose_is_news:
-                self._particles.publish(conversions.pose_array(estimate.stamp_ns, self._frame, estimate.particles))
+        if pose_goes_out and (self._particles_pace.is_due(now_s, period_s(self._p.gui_publish_rate)) or pose_is_news):
+            self._particles.publish(conversions.pose_array(estimate.stamp_ns, self._frame, estimate.particles))
         self._glass_is_news = self._glass_is_news or estimate.updated
         if self._beam_cases.get_num_connections():
             self._beam_cases.publish(conversions.beam_cases_msg(placed.scan, estimate.cases))
@@ -139,7 +144,7 @@ class Publishers:
                 MarkerArray([beam_displays.status_marker(where, self._frame, state, trouble, NOT_KNOWN)])
             )
 
-    def send_glass_map(self, localizer: Localizer, grid_map: GridMap, stamp_ns: int, now_s: float) -> None:
+    def send_glass_map(self, localizer: PoseFilter, grid_map: GridMap, stamp_ns: int, now_s: float) -> None:
         """The glass map, if it has changed, somebody listens and it is due."""
         listeners = self._glass_map.get_num_connections() + self._wall_markers.get_num_connections()
         if not (self._glass_is_news and listeners and self._glass_pace.is_due(now_s, self._p.glass_map_period_s)):

@@ -70,7 +70,7 @@ def turn_choice_msg(turn: Turn, frame: str) -> TurnChoiceMsg:
 
 
 def status_msg(status: SearchStatus, frame: str) -> TopologyStatus:
-    """With an estimate also depth, candidates and turn."""
+    """With an estimate also depth, candidates and turn; CONFIRMED also the relation of the frames."""
     msg = TopologyStatus(
         header=conversions.header(status.stamp_ns, frame),
         state=status.state.code,
@@ -79,8 +79,15 @@ def status_msg(status: SearchStatus, frame: str) -> TopologyStatus:
     )
     estimate = status.estimate
     if estimate is not None:
-        msg.depth, msg.candidates = estimate.depth, len(estimate.dart)
+        msg.depth, msg.candidates = estimate.depth, estimate.candidates
         msg.turn = estimate.choice.name if estimate.choice else ""
+    relation = status.relation
+    if relation is not None:
+        msg.has_relation = True
+        msg.map_from_environment = conversions.pose_from_planar(relation.map_from_environment)
+        if relation.node is not None and relation.node_from_environment is not None:
+            msg.has_node, msg.node = True, relation.node
+            msg.node_from_environment = conversions.pose_from_planar(relation.node_from_environment)
     return msg
 
 

@@ -28,6 +28,7 @@ BEARING_AT_M = 0.5  # a dart's bearing is measured from its node to the point th
 ORDER_SLACK_RAD = 1e-3  # rounding may turn two darts of one node past each other by this angle
 CHORD_SLACK_M = 1e-3  # rounding may make a straight edge shorter than its chord by this length
 MAX_DIFFERING_SHARE = 1e-3  # of the free cells: another drawing of the same map, not another map
+MIN_MISSES = 3  # lately, before a node counts as usually missed
 POLYLINE_SLACK_M = 0.5  # the line of an edge may end this far from its node: meetpoints lie between cells
 
 
@@ -118,7 +119,10 @@ class MapReference:
 
 @dataclass(frozen=True)
 class Visits:
-    """Measurements of robots so far: Welford's running count, mean and sum of squared deviations."""
+    """Measurements of robots so far: Welford's running count, mean and sum of squared deviations.
+
+    And how often the detector missed a node lately: one more with each miss, halved by each visit.
+    """
 
     node_count: np.ndarray  # (N,) int
     node_r_mean_m: np.ndarray  # (N,) 0 without a visit
@@ -126,6 +130,12 @@ class Visits:
     edge_count: np.ndarray  # (E,) int
     edge_length_mean_m: np.ndarray  # (E,)
     edge_length_m2: np.ndarray  # (E,) [m^2]
+    node_missed: np.ndarray  # (N,) int
+
+    @property
+    def usually_missed(self) -> np.ndarray:
+        """(N,) bool: nodes that robots pass without seeing them, as at a door that is shut for weeks."""
+        return np.asarray(self.node_missed >= MIN_MISSES)
 
     @classmethod
     def none(cls, nodes: int, edges: int) -> "Visits":
@@ -136,11 +146,18 @@ class Visits:
             np.zeros(edges, np.int64),
             np.zeros(edges),
             np.zeros(edges),
+            np.zeros(nodes, np.int64),
         )
 
     def add_nodes(self, node: np.ndarray, r_m: np.ndarray) -> None:
         """Add equidistances measured at nodes (K,), in this order; NaN counts as a visit without a measurement."""
         _welford(self.node_count, self.node_r_mean_m, self.node_r_m2, node, r_m)
+        for at in node.tolist():
+            self.node_missed[at] //= 2
+
+    def add_misses(self, node: np.ndarray) -> None:
+        """Nodes (K,) that robots passed without seeing them."""
+        np.add.at(self.node_missed, node, 1)
 
     def add_edges(self, edge: np.ndarray, length_m: np.ndarray) -> None:
         """Add lengths travelled along edges (K,), in this order."""
@@ -408,3 +425,6 @@ def _refuse_bad_visits(visits: Visits, nodes: int, edges: int) -> None:
         _refuse(f"visits of {what}", count < 0, count, "the count must be >= 0")
         _refuse(f"visits of {what}", ~_not_negative(mean), mean, "the mean must be finite and >= 0 m")
         _refuse(f"visits of {what}", ~_not_negative(m2), m2, "m2 must be finite and >= 0 m^2")
+    if visits.node_missed.shape != (nodes,):
+        raise AtlasError(f"visits of {nodes} nodes need missed ({nodes},), got {visits.node_missed.shape}")
+    _refuse("visits of node", visits.node_missed < 0, visits.node_missed, "missed must be >= 0")

@@ -24,6 +24,7 @@ _NODE = ("id", "kind", "x", "y", "r", "sigma_r", "darts")
 _EDGE = ("id", "from", "to", "length", "chord", "sigma", "clearance", "bearing_from", "bearing_to")
 _EDGE_MAY = ("polyline", "segments_from", "segments_to", "visits")
 _VISITS = ("count", "mean", "m2")
+_NODE_VISITS_MAY = ("missed",)
 _MAP, _MAP_MAY = ("name", "sha256"), ("place", "free")
 _MISSING = object()
 
@@ -62,7 +63,8 @@ def _node_rows(atlas: Atlas) -> List[Row]:
             "sigma_r": _metres(nodes.sigma_r_m[i]),
             "darts": atlas.rings[i].tolist(),
         }
-        rows.append({**row, **_visits_entry(visits.node_count[i], visits.node_r_mean_m[i], visits.node_r_m2[i])})
+        seen = visits.node_count[i], visits.node_r_mean_m[i], visits.node_r_m2[i]
+        rows.append({**row, **_visits_entry(*seen, missed=int(visits.node_missed[i]))})
     return rows
 
 
@@ -98,8 +100,11 @@ def _metres(value: float) -> float:
     return round(float(value), _PLACES_M)
 
 
-def _visits_entry(count: int, mean: float, m2: float) -> Row:
-    return {"visits": {"count": int(count), "mean": float(mean), "m2": float(m2)}} if count else {}
+def _visits_entry(count: int, mean: float, m2: float, missed: int = 0) -> Row:
+    if not (count or missed):
+        return {}
+    entry = {"count": int(count), "mean": float(mean), "m2": float(m2)}
+    return {"visits": {**entry, "missed": missed} if missed else entry}
 
 
 def load(path: Path) -> Atlas:
@@ -132,7 +137,7 @@ def load(path: Path) -> Atlas:
         _edges(edges),
         _darts(edges),
         _rings(nodes),
-        Visits(*_visits("node", nodes), *_visits("edge", edges)),
+        _visits(nodes, edges),
     )
 
 
@@ -192,14 +197,24 @@ def _rings(rows: List[Row]) -> Ragged:
         raise AtlasError(f"darts must be numbers below 2^63, got {max(flat, key=abs)}") from err
 
 
-def _visits(what: str, rows: List[Row]) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _visits(nodes: List[Row], edges: List[Row]) -> Visits:
+    of_nodes, of_edges = _visits_entries("node", nodes, _NODE_VISITS_MAY), _visits_entries("edge", edges, ())
+    missed = _integers("visits of node", [{"missed": 0, **entry} for entry in of_nodes], "missed")
+    return Visits(*_measured("node", of_nodes), *_measured("edge", of_edges), missed)
+
+
+def _visits_entries(what: str, rows: List[Row], may: Sequence[str]) -> List[Row]:
     entries: List[Row] = []
     for i, row in enumerate(rows):
         entry = row.get("visits", {"count": 0, "mean": 0.0, "m2": 0.0})
         if not isinstance(entry, dict):
             raise AtlasError(f"{what} {i}: visits must be an object with {', '.join(_VISITS)}, got {_short(entry)}")
-        _refuse_keys(f"{what} {i}: visits", entry, _VISITS, ())
+        _refuse_keys(f"{what} {i}: visits", entry, _VISITS, may)
         entries.append(entry)
+    return entries
+
+
+def _measured(what: str, entries: List[Row]) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
     owner = f"visits of {what}"
     return _integers(owner, entries, "count"), _numbers(owner, entries, "mean"), _numbers(owner, entries, "m2")
 

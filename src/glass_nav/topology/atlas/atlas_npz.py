@@ -40,6 +40,7 @@ _NPZ_INT = (
 )
 _NPZ_TEXT = ("format", "name", "map_name", "map_sha256")
 _NPZ_MAY = ("map_place", "map_free")
+_NPZ_MISSED = "visits_node_missed"  # files of older versions lack it
 
 
 def arrays_of(atlas: Atlas) -> Dict[str, np.ndarray]:
@@ -73,6 +74,7 @@ def arrays_of(atlas: Atlas) -> Dict[str, np.ndarray]:
         "visits_edge_count": visits.edge_count,
         "visits_edge_length_mean_m": visits.edge_length_mean_m,
         "visits_edge_length_m2": visits.edge_length_m2,
+        _NPZ_MISSED: visits.node_missed,
     }
 
 
@@ -99,7 +101,8 @@ def load(path: Path) -> Atlas:
             raise AtlasError(
                 f"{name} must be float64 of {dimensions} dimensions, got {arrays[name].dtype} of {arrays[name].ndim}"
             )
-    for name in _NPZ_INT:
+    arrays.setdefault(_NPZ_MISSED, np.zeros(len(arrays["visits_node_count"]), np.int64))
+    for name in (*_NPZ_INT, _NPZ_MISSED):
         if arrays[name].dtype.kind != "i" or arrays[name].ndim != 1:
             raise AtlasError(f"{name} must be integers of 1 dimension, got {arrays[name].dtype} of {arrays[name].ndim}")
         if name != "node_kind":
@@ -126,6 +129,7 @@ def load(path: Path) -> Atlas:
             a["visits_edge_count"],
             a["visits_edge_length_mean_m"],
             a["visits_edge_length_m2"],
+            a[_NPZ_MISSED],
         ),
     )
 

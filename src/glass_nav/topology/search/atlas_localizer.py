@@ -18,6 +18,7 @@ from glass_nav.geometry import angles
 from glass_nav.hypotheses.followed_poses import MAX_LEAD, FollowedPoses, MapScans, Standing
 from glass_nav.topology.atlas.atlas import Atlas, Visits
 from glass_nav.topology.observations import Meetpoint, Traversal
+from glass_nav.topology.search import learnt_atlas
 from glass_nav.topology.search.graph_verdict import GraphVerdict
 from glass_nav.topology.search.matching import Explained, Matcher, poses_at
 from glass_nav.topology.search.passed_edges import PassedEdges
@@ -50,7 +51,7 @@ class AtlasLocalizer:
         self._atlas = atlas
         self._params = params
         self._matcher = Matcher(
-            atlas,
+            learnt_atlas.of(atlas, params.tolerances),
             params.tolerances,
             params.use_edge_angles and not params.document,
             None if params.document else params.segments,
@@ -129,14 +130,24 @@ class AtlasLocalizer:
             return estimate.map_from_base[None]
         return self.map_from_base(estimate.dart[:most])
 
+    def node(self, estimate: SearchEstimate) -> Optional[int]:
+        """Of the first candidate; None without one, as where only scans found the place."""
+        return int(self._atlas.darts.node[estimate.dart[0]]) if len(estimate.dart) else None
+
+    @property
+    def environment_from_base(self) -> Optional[np.ndarray]:
+        """(3,) dead reckoning at the last meetpoint, if it was reported."""
+        return self._forest.meetpoints[-1].odom_from_base
+
     def path(self, dart: int) -> np.ndarray:
         """Darts (K,) along the path of a candidate, the reference dart of the first meetpoint first."""
         return np.array([found for _, found, _ in self._forest.path(dart)], np.int64)
 
     def count_visits(self, visits: Visits) -> None:
-        """Add what was measured on the path of the confirmed candidate to the statistics of the atlas.
+        """Add what was measured on the path of the confirmed candidate to the statistics of the atlas, and what was
+        missed on it.
 
-        Edges and meetpoints with detection errors are left out; nothing is counted if only scans found the place.
+        Edges with detection errors are left out; nothing is counted if only scans found the place.
         """
         assert self._estimate is not None
         if not len(self._estimate.dart):
@@ -144,12 +155,17 @@ class AtlasLocalizer:
         (dart,) = self._estimate.dart
         nodes: List[Tuple[int, float]] = []
         edges: List[Tuple[int, float]] = []
+        before = -1
         for depth, passed, plain in self._forest.path(int(dart)):
             nodes.append((int(self._atlas.darts.node[passed]), self._forest.meetpoints[depth].r_m))
-            if plain:
+            if (
+                plain and self._atlas.darts.node[passed ^ 1] == before
+            ):  # not joined at a meetpoint that is usually missed
                 edges.append((passed >> 1, self._forest.traversals[depth - 1].length_m))
+            before = nodes[-1][0]
         visits.add_nodes(np.array([n for n, _ in nodes], np.int64), np.array([r for _, r in nodes]))
         visits.add_edges(np.array([e for e, _ in edges], np.int64), np.array([length for _, length in edges]))
+        visits.add_misses(np.array(self._forest.missed_along(int(dart)), np.int64))
 
     # -- judgement
 

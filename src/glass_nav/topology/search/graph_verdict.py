@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Optional, Set
 
 import numpy as np
@@ -54,8 +55,10 @@ class GraphVerdict:
 
     def _by_document(self, dart: np.ndarray, errors: np.ndarray) -> SearchEstimate:
         self._claim = None
-        count = len(dart) if self._forest.depth else len(np.unique(self._atlas.darts.node[dart]))
-        return self._searching(f"{count} candidates", dart, errors, vote.seed(self._matcher, dart))
+        nodes = None if self._forest.depth else len(np.unique(self._atlas.darts.node[dart]))
+        count = len(dart) if nodes is None else nodes
+        estimate = self._searching(f"{count} candidates", dart, errors, vote.seed(self._matcher, dart))
+        return replace(estimate, node_count=nodes)
 
     def _among_several(self, dart: np.ndarray, errors: np.ndarray) -> SearchEstimate:
         depth, count = self._forest.depth, len(dart)

@@ -163,6 +163,11 @@ class Matcher:
         return fits
 
     @property
+    def some_usually_missed(self) -> bool:
+        """Whether the atlas has nodes that robots usually miss."""
+        return bool(self.atlas.visits.usually_missed.any())
+
+    @property
     def judges_scans(self) -> bool:
         """Whether scans at meetpoints are evidence."""
         return self._explained is not None

@@ -35,6 +35,13 @@ class SearchEstimate:
     choice: Optional[TurnChoice]  # None: nothing is left to find out
     map_from_base: Optional[np.ndarray] = None  # (3,) CONFIRMED by the scans: the pose; dart is empty where the graph
     # does not have it
+    node_count: Optional[int] = None  # nodes among the candidates, where those are the document's: at the first
+    # meetpoint it has a candidate for each node
+
+    @property
+    def candidates(self) -> int:
+        """How many places fit: as many as the reason says."""
+        return len(self.dart) if self.node_count is None else self.node_count
 
     @property
     def done(self) -> bool:

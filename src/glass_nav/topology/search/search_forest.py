@@ -18,6 +18,9 @@ when no candidate without errors is left. Rules for the row of depth d with e er
 * the node it came from, if it turned round at a spurious meetpoint (a spurious dead end);
 * anywhere, if all meetpoints before this one were spurious: e = d, after an edge at least as long as the distance
   travelled; with one more error a meetpoint may have been missed on it.
+
+A meetpoint that robots usually miss (Visits.usually_missed), as at a door that is shut for weeks, joins edges without
+an error; whoever sees it all the same finds it in its place.
 """
 
 from __future__ import annotations
@@ -33,6 +36,7 @@ from glass_nav.topology.observations import UNKNOWN, Meetpoint, Traversal, refus
 from glass_nav.topology.search.matching import Matcher
 
 NO_PARENT = -1
+_USUALLY_MISSED = 3  # on one traversal, at most
 
 
 @dataclass(frozen=True)
@@ -165,6 +169,31 @@ class SearchForest:
                 return found[::-1]
             (depth, errors), index = before, parent
 
+    def missed_along(self, dart: int) -> List[int]:
+        """Nodes that a candidate of the current depth passed without seeing them, in order."""
+        found: List[int] = []
+        came = self.path(dart)
+        for (depth, before, _), (after, arrival, _) in zip(came, came[1:]):
+            if after == depth + 1:
+                (departure,) = self._departures(np.array([before]), depth).tolist()
+                found += self._between(departure, arrival, self._traversals[depth])
+        return found
+
+    def _between(self, departure: int, arrival: int, traversal: Traversal) -> List[int]:
+        """Nodes on the path from a departure to an arrival that fits the length driven best; none on a plain edge."""
+        atlas, most = self._matcher.atlas, self._max_errors + _USUALLY_MISSED
+        best_m, best = math.inf, []
+        ways: List[Tuple[int, float, List[int]]] = [(departure, 0.0, [])]
+        for last, length_m, passed in ways:  # grows
+            length_m += float(atlas.edges.length_m[last >> 1])
+            off_m = abs(length_m - traversal.length_m)
+            if last ^ 1 == arrival and off_m < best_m:
+                best_m, best = off_m, passed
+            if len(passed) < most and length_m < traversal.length_m:
+                node = int(atlas.darts.node[last ^ 1])
+                ways += [(each, length_m, [*passed, node]) for each in atlas.rings[node].tolist() if each != last ^ 1]
+        return best
+
     def has_rival(self, dart: int) -> bool:
         """Whether the last traversal of a candidate also matches a path over a missed meetpoint to the next one."""
         came = self.path(dart)
@@ -227,11 +256,16 @@ class SearchForest:
             return
         traversal = course.traversal
         departure = self._departures(self._rows[origin].dart, origin[0])
-        if missed:
-            departure, arrival, parent = self._joined_edges(departure, traversal, missed)
-        else:
-            parent = self._matcher.edges_along(departure, traversal)
-            arrival = twin(departure[parent])
+        if not missed:
+            along = self._matcher.edges_along(departure, traversal)
+            self._add_arrivals(found, twin(departure[along]), along, depth, origin)
+        if missed or (self._matcher.some_usually_missed and not course.turned_round):
+            _, arrival, parent = self._joined_edges(departure, traversal, missed)
+            self._add_arrivals(found, arrival, parent, depth, origin)
+
+    def _add_arrivals(
+        self, found: _Found, arrival: np.ndarray, parent: np.ndarray, depth: int, origin: Tuple[int, int]
+    ) -> None:
         here = self._matcher.at(arrival, self._meetpoints[depth])
         found.add(arrival[here], parent[here], *origin)
 
@@ -255,20 +289,29 @@ class SearchForest:
     def _joined_edges(
         self, departure: np.ndarray, traversal: Traversal, missed: int
     ) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Paths over this number of missed meetpoints that match: departures, arrivals, indices of the departures."""
-        edges, matcher = self._matcher.atlas.edges, self._matcher
-        longest = matcher.longest_m(traversal, missed + 1)
+        """Paths over this number of missed meetpoints that match: departures, arrivals, indices of the departures.
+
+        Meetpoints that are usually missed do not count.
+        """
+        atlas, matcher = self._matcher.atlas, self._matcher
+        passes = missed + (_USUALLY_MISSED if matcher.some_usually_missed else 0)
+        counts = ~atlas.visits.usually_missed
+        longest = matcher.longest_m(traversal, passes + 1)
         parent, last, length = np.arange(len(departure)), departure, matcher.length_m[departure >> 1]
-        variance = edges.sigma_m[departure >> 1] ** 2
-        for _ in range(missed):
-            short = length < longest
-            parent, last, length, variance = parent[short], last[short], length[short], variance[short]
-            onward, beside = matcher.others(twin(last))
-            parent, last = parent[beside], onward
-            length = length[beside] + matcher.length_m[onward >> 1]
-            variance = variance[beside] + edges.sigma_m[onward >> 1] ** 2
-        near = np.flatnonzero((length <= longest) & (length >= 2.0 * traversal.length_m - longest))
-        parent, last, length, variance = parent[near], last[near], length[near], variance[near]
+        variance = atlas.edges.sigma_m[departure >> 1] ** 2
+        left = np.full(len(departure), missed)  # meetpoints still to be missed
+        ends: List[Tuple[np.ndarray, ...]] = []
+        for _ in range(passes):
+            left = left - counts[atlas.darts.node[twin(last)]]
+            going = np.flatnonzero((length < longest) & (left >= 0))
+            last, beside = matcher.others(twin(last[going]))
+            beside = going[beside]
+            parent, left = parent[beside], left[beside]
+            length = length[beside] + matcher.length_m[last >> 1]
+            variance = variance[beside] + atlas.edges.sigma_m[last >> 1] ** 2
+            near = (left == 0) & (length <= longest) & (length >= 2.0 * traversal.length_m - longest)
+            ends.append((parent[near], last[near], length[near], variance[near]))
+        parent, last, length, variance = (np.concatenate(part) for part in zip(*ends))
         fits = matcher.paths_along(departure[parent], twin(last), length, np.sqrt(variance), traversal)
         return departure[parent[fits]], twin(last[fits]), parent[fits]
 

@@ -30,6 +30,8 @@ def example() -> Data:
 def test_an_atlas_comes_back_from_its_file(suffix: str, seed: int, tmp_path: Path) -> None:
     atlas = made_atlases.rotation_system(np.random.default_rng(seed))
     atlas.visits.add_nodes(np.array([0, 0]), np.array([1.1, 1.2]))
+    atlas.visits.add_misses(np.array([0, 0, 0]))
+    atlas.visits.add_misses(np.array([0, 0, 0]))
     path = tmp_path / f"atlas.{suffix}"
     atlas_file.save(atlas, path)
     back = atlas_file.load(path)
@@ -117,6 +119,18 @@ IN_SCHEMA = [
     (set_("nodes", 0, "visits", 3), "node 0: visits must be an object with count, mean, m2, got 3"),
     (set_("nodes", 0, "visits", {"count": 1}), "node 0: visits: mean is missing, needed are count, mean, m2"),
     (set_("nodes", 0, "visits", {"count": -1, "mean": 1, "m2": 0}), "visits of node 0: the count must be >= 0, got -1"),
+    (
+        set_("nodes", 0, "visits", {"count": 0, "mean": 0, "m2": 0, "missed": -1}),
+        "visits of node 0: missed must be >= 0, got -1",
+    ),
+    (
+        set_("nodes", 0, "visits", {"count": 0, "mean": 0, "m2": 0, "missed": 0.5}),
+        "visits of node 0: missed must be an integer, got 0.5",
+    ),
+    (
+        set_("edges", 0, "visits", {"count": 0, "mean": 0, "m2": 0, "missed": 1}),
+        "edge 0: visits: unknown key 'missed', allowed are count, mean, m2",
+    ),
     (drop("edges", 2, "chord"), "edge 2: chord is missing"),
     (set_("edges", 2, "id", "a"), "edge 2: id must be its place in the list, 2, got 'a'"),
     (set_("edges", 2, "to", 1.5), "edge 2: to must be an integer, got 1.5"),

@@ -65,7 +65,7 @@ class WiredRobot:
             decisions.Command: self._hear_command,
             decisions.TraversalReport: self._hear_traversal,
             decisions.MeetpointReport: self._hear_meetpoint,
-            decisions.SearchRestart: lambda _: self._tell(session.restart()),
+            decisions.SearchRestart: lambda _: self.restart_search(),
             decisions.DriveStatus: self._hear_driver,
             decisions.GoalEnd: self.ends.append,
             search_session.SearchStatus: self._hear_search,
@@ -78,14 +78,18 @@ class WiredRobot:
     def wake_up(self, grid_map: GridMap) -> None:
         """Start all nodes; the map is served."""
         self._tell(self.session.start())
-        self._tell(self.session.map_served(grid_map, "that of the benchmark"))
-        self.driver.map_served(grid_map, "that of the benchmark")
+        self._tell(self.session.map_served(grid_map, "that of the simulation"))
+        self.driver.map_served(grid_map, "that of the simulation")
 
     def localize(self, localizer: Localizer) -> None:
         """Continue tracking from the pose that the search found."""
         assert self.map_from_base is not None
         localizer.set_pose(self.map_from_base, INITIAL_COVARIANCE)
         self._localizer = localizer
+
+    def restart_search(self) -> None:
+        """The next meetpoint begins another search."""
+        self._tell(self.session.restart())
 
     def goto(self, node: int) -> None:
         """Ask the driver for a node of the atlas."""

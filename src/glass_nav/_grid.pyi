@@ -17,14 +17,16 @@ class _Surfaces(TypedDict):
     mirrored_m: np.ndarray
     mirrored_cell: np.ndarray
 
+class FreeRanges: ...  # made by _mrpt_rays
+
 class Grid:
     def __init__(
         self,
         occupancy: np.ndarray,  # (H, W) int8
         resolution_m: float,
         occupied_percent: int,
-        backend: str,
         unknown_stops: bool,
+        guide: FreeRanges | None,
     ) -> None: ...
     def cast(
         self,
@@ -56,8 +58,11 @@ class Grid:
         min_gap_m: float,
         threads: int,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...  # (4, P, B) float64 ranges, float64 cosines, int32 cells
-    def simulate_scan_ray_raw(self, poses: np.ndarray, angles: np.ndarray, max_range_m: float) -> np.ndarray: ...
+    def free_ranges(
+        self, rays: FreeRanges, poses: np.ndarray, angles: np.ndarray, max_range_m: float
+    ) -> np.ndarray: ...  # (P, B) float64
     def normals(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...  # (H * W,) float32 each
+    def walls_at(self, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...  # float32, like (...) int32
     def redraw(
         self, occupancy: np.ndarray, first_row: int, first_column: int, rows: int, columns: int
     ) -> None: ...  # occupancy: (H, W) int8, as before but for a box
