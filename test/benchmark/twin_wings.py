@@ -104,6 +104,8 @@ def _hall(corridor_m: float, copies: int) -> List[np.ndarray]:
     for k in range(4):
         turned = np.array([0.0, 0.0, 0.5 * math.pi * k])
         is_open = copies == 4 or k % 2 == 0
-        lines = [[[half, -half], [half, -gap]], [[half, gap], [half, half]]] if is_open else [[[half, -half], [half, half]]]
+        lines = (
+            [[[half, -half], [half, -gap]], [[half, gap], [half, half]]] if is_open else [[[half, -half], [half, half]]]
+        )
         walls += [se2.transform_points(turned, np.array(line)) for line in lines]
     return walls
