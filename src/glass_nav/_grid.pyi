@@ -62,6 +62,7 @@ class Grid:
         self, rays: FreeRanges, poses: np.ndarray, angles: np.ndarray, max_range_m: float
     ) -> np.ndarray: ...  # (P, B) float64
     def normals(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...  # (H * W,) float32 each
+    def walls_at(self, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...  # float32, like (...) int32
     def redraw(
         self, occupancy: np.ndarray, first_row: int, first_column: int, rows: int, columns: int
     ) -> None: ...  # occupancy: (H, W) int8, as before but for a box

@@ -1,7 +1,8 @@
-"""What the computer has."""
+"""What the computer has, and what of it this process takes."""
 
 from __future__ import annotations
 
+import ctypes
 import os
 import resource
 from pathlib import Path
@@ -18,6 +19,18 @@ def free_bytes() -> int:
         return memory_bytes()
     available = [int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:")]
     return min([*available, memory_bytes()])
+
+
+def resident_bytes() -> int:
+    """Main memory that this process takes."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def give_back_memory() -> None:
+    """Return freed memory to the system, which the C library otherwise keeps: after large arrays were made and freed."""
+    libc = ctypes.CDLL(None)
+    if hasattr(libc, "malloc_trim"):  # glibc's
+        libc.malloc_trim(0)
 
 
 def memory_bytes() -> int:

@@ -245,7 +245,7 @@ class LocalizationStart(unittest.TestCase):
         for bad, words in (
             ({"laser_z_hit": -1.0}, "~laser_z_hit must be in [0, 100], got -1.0"),
             ({"min_particles": 251}, "~min_particles must be in [1, ~max_particles = 250], got 251"),
-            ({"max_particles": 1234567890}, "~max_particles must be in [1, 100000], got 1234567890"),
+            ({"max_particles": 1234567890}, "~max_particles must be in [1, 1000000], got 1234567890"),
             ({"vote_mode": "none"}, "~vote_mode must be one of soft, paper, got 'none'"),
             (
                 {"transform_tolerance": float("nan"), "laser_z_hit": 0.5},

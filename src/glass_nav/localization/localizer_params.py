@@ -24,10 +24,9 @@ from glass_nav.panes.pane_finder import PaneFinderParams
 from glass_nav.params import choice, number
 from glass_nav.sensing.raycast import BACKENDS
 
-BYTES_PER_PARTICLE_BEAM = 50  # measured: 36 kB a particle with 720 beams, weight_mode field
-_MAX_BEAMS = 2000  # of a scan
+BYTES_PER_PARTICLE = 2000  # at most, with what the filter needs for itself; measured: 0.2 to 1.2 kB
 _MEMORY_SHARE = 0.5  # of the computer's, for the particles
-_ALWAYS_BYTES = 5000 * 720 * BYTES_PER_PARTICLE_BEAM  # the defaults start on any computer
+_ALWAYS_BYTES = 5000 * BYTES_PER_PARTICLE  # the defaults start on any computer
 
 
 @dataclass(frozen=True)
@@ -90,13 +89,11 @@ class LocalizerParams:
     bearings: BearingMixture = field(default_factory=BearingMixture)
 
     def __post_init__(self) -> None:
-        beams = min(self.mixture.laser_max_beams, _MAX_BEAMS)
-        needed = self.count.max_particles * beams * BYTES_PER_PARTICLE_BEAM
-        allowed = max(_MEMORY_SHARE * machine.memory_bytes(), _ALWAYS_BYTES)
-        if needed > allowed:
+        allowed = int(max(_MEMORY_SHARE * machine.memory_bytes(), _ALWAYS_BYTES)) // BYTES_PER_PARTICLE
+        if self.count.max_particles > allowed:
             raise ValueError(
-                f"~max_particles must be <= {allowed / (beams * BYTES_PER_PARTICLE_BEAM):.0f} on this computer: with "
-                f"{beams} beams more take over {allowed * 1e-9:.1f} GB of memory, got {self.count.max_particles}"
+                f"~max_particles must be <= {allowed} on this computer: more may take over "
+                f"{allowed * BYTES_PER_PARTICLE * 1e-9:.2f} GB of memory, got {self.count.max_particles}"
             )
 
     @property

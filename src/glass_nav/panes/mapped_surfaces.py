@@ -16,6 +16,7 @@ from glass_nav.sensing.raycast import RayCaster
 from glass_nav.world.grid_map import GridMap
 
 _ALL_AROUND = np.ones((3, 3), bool)
+_SURFACE, _NEAR, _SPECK = np.uint8(1), np.uint8(2), np.uint8(4)  # flags of a cell: see is_surface() and the others
 
 
 class MappedSurfaces:
@@ -32,9 +33,9 @@ class MappedSurfaces:
         solid = _without_specks(grid_map, speck_m)
         self._caster = RayCaster(replace(grid_map, occupancy=np.where(solid, 100, 0).astype(np.int8)))
         reach = max(1, int(np.ceil(near_m / grid_map.resolution_m)))
-        self._near = ndimage.maximum_filter(solid, size=2 * reach + 1)
-        self._solid = solid
-        self._occupied = ndimage.binary_dilation(grid_map.occupied, _ALL_AROUND)
+        self._flags = _SURFACE * solid
+        self._flags += _NEAR * ndimage.maximum_filter(solid, size=2 * reach + 1)
+        self._flags += _SPECK * ndimage.binary_dilation(grid_map.occupied, _ALL_AROUND)
 
     @property
     def resolution_m(self) -> float:
@@ -46,20 +47,21 @@ class MappedSurfaces:
 
     def is_near(self, points_m: np.ndarray) -> np.ndarray:
         """(...) bool: points (..., 2) belong to a surface."""
-        return self._at(self._near, points_m)
+        return self._has(_NEAR, points_m)
 
     def is_speck(self, points_m: np.ndarray) -> np.ndarray:
         """(...) bool: points (..., 2) lie in an occupied cell or beside one."""
-        return self._at(self._occupied, points_m)
+        return self._has(_SPECK, points_m)
 
     def is_surface(self, points_m: np.ndarray) -> np.ndarray:
         """(...) bool: points (..., 2) lie in a cell of a surface."""
-        return self._at(self._solid, points_m)
+        return self._has(_SURFACE, points_m)
 
-    def _at(self, cells: np.ndarray, points_m: np.ndarray) -> np.ndarray:
+    def _has(self, flag: np.uint8, points_m: np.ndarray) -> np.ndarray:
         rows, columns = self._grid_map.cells(points_m)
         inside = self._grid_map.contains(rows, columns)
-        return inside & cells[np.where(inside, rows, 0), np.where(inside, columns, 0)]
+        flags = self._flags[np.where(inside, rows, 0), np.where(inside, columns, 0)]
+        return inside & (flags & flag).astype(bool)
 
 
 def _without_specks(grid_map: GridMap, speck_m: float) -> np.ndarray:

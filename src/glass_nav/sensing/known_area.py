@@ -14,6 +14,7 @@ from glass_nav.geometry import se2
 from glass_nav.world.grid_map import UNKNOWN, GridMap
 
 _BESIDE_CELLS = 3  # next to an unknown cell: what is there may be drawn, or end, one or two cells off
+_KNOWN, _UNMAPPED = np.uint8(1), np.uint8(2)  # flags of a cell
 _NEAR_WALL_M = 0.5  # what is this close to a mapped wall is compared with it, also behind it
 
 
@@ -25,9 +26,9 @@ class KnownArea:
         near = int(round(_NEAR_WALL_M / grid_map.resolution_m))
         self._border = near + 1  # cells around the grid
         unknown = np.pad(grid_map.occupancy == UNKNOWN, self._border, constant_values=True)
-        near_wall = _grown(np.pad(grid_map.occupied, self._border), near)
-        self._known = (~_grown(unknown, _BESIDE_CELLS) | near_wall).ravel()
-        self._unknown = unknown.ravel()
+        known = ~_grown(unknown, _BESIDE_CELLS)
+        known |= _grown(np.pad(grid_map.occupied, self._border), near)
+        self._flags = (_KNOWN * known + _UNMAPPED * unknown).ravel()
         self._stride = unknown.shape[1]
         self._last = np.array(unknown.shape) - 1
 
@@ -41,11 +42,11 @@ class KnownArea:
             (...) bool; False in unknown cells, outside of the grid, and within 3 cells of either, unless a wall is
             within half a metre.
         """
-        return self._known[self._cell(points_m)]
+        return self._has(_KNOWN, points_m)
 
     def is_unmapped(self, points_m: np.ndarray) -> np.ndarray:
         """(...) bool: the mapper did not see points (..., 2) [m]: unknown cells, and all outside of the grid."""
-        return self._unknown[self._cell(points_m)]
+        return self._has(_UNMAPPED, points_m)
 
     def ends(self, points_m: np.ndarray, map_from_base: np.ndarray) -> np.ndarray:
         """Which beams of a scan end where the map knows something, seen from each pose.
@@ -58,6 +59,9 @@ class KnownArea:
             (P, B) bool.
         """
         return self.contains(se2.transform_points(np.asarray(map_from_base, float)[:, None], points_m))
+
+    def _has(self, flag: np.uint8, points_m: np.ndarray) -> np.ndarray:
+        return (self._flags[self._cell(points_m)] & flag).astype(bool)
 
     def _cell(self, points_m: np.ndarray) -> np.ndarray:
         rows, columns = self._grid_map.cells(points_m)

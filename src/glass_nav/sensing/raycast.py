@@ -219,6 +219,17 @@ class RayCaster:
         """
         return self._walls()[2]
 
+    def walls_at(self, cell: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """normals() and wall_offsets_m() at flat cells (...) alone: normal_rad, linearity, offset_m, each (...) float32.
+
+        NaN, 0 and NaN for a cell without a normal, and for -1.
+
+        Raises:
+            ValueError: a cell that the map has not.
+        """
+        normal_rad, linearity, offset_m = self._grid.walls_at(cell)
+        return self._in_map(normal_rad), linearity, offset_m
+
     def _walls(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         if self._normals is None:  # two threads may both compute it: the same arrays
             normal_rad, linearity, offset_m = self._grid.normals()

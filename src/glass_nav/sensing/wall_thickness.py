@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from glass_nav.world.grid_map import GridMap
+from glass_nav.world.grid_map import OCCUPIED_PERCENT, GridMap
 
 SOLID_M = 0.8
+_STRIP_ROWS = 256
 
 
 def wall_thickness(grid_map: GridMap, solid_m: float = SOLID_M) -> np.ndarray:
@@ -19,17 +20,32 @@ def wall_thickness(grid_map: GridMap, solid_m: float = SOLID_M) -> np.ndarray:
 
     Twice the largest distance to the outside near the cell; 0 for cells that are not occupied.
     """
-    return _of(grid_map.occupied, grid_map.resolution_m, solid_m).ravel()
+    thickness_m = np.zeros(grid_map.occupancy.size, np.float32)
+    height, width = grid_map.occupancy.shape
+    for first in range(0, height, _STRIP_ROWS):  # the transform takes 28 bytes a cell
+        _draw(thickness_m, grid_map, slice(first, min(first + _STRIP_ROWS, height)), slice(0, width), solid_m)
+    return thickness_m
 
 
 def redraw(thickness_m: np.ndarray, grid_map: GridMap, rows: slice, columns: slice) -> None:
     """Bring the thickness (H * W,) of all walls, with SOLID_M, up to date after cells in a box of the map changed."""
-    reach = 2 * (int(round(0.5 * SOLID_M / grid_map.resolution_m)) + 1)  # a climb, and the distance it ends at
-    near = tuple(slice(max(0, box.start - reach), box.stop + reach) for box in (rows, columns))
-    around = tuple(slice(max(0, box.start - reach), box.stop + reach) for box in near)
-    middle = tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(near, around))
-    fresh = _of(grid_map.occupied[around], grid_map.resolution_m, SOLID_M)
-    thickness_m.reshape(grid_map.occupancy.shape)[near] = fresh[middle]
+    reach = _reach(grid_map.resolution_m, SOLID_M)
+    near = [slice(max(0, box.start - reach), box.stop + reach) for box in (rows, columns)]
+    _draw(thickness_m, grid_map, near[0], near[1], SOLID_M)
+
+
+def _reach(resolution_m: float, solid_m: float) -> int:
+    """How far off [cells] another cell counts: a climb, and the distance it ends at."""
+    return 2 * (int(round(0.5 * solid_m / resolution_m)) + 1)
+
+
+def _draw(thickness_m: np.ndarray, grid_map: GridMap, rows: slice, columns: slice, solid_m: float) -> None:
+    """Put the thickness of the walls in a box into that (H * W,) of all."""
+    reach = _reach(grid_map.resolution_m, solid_m)
+    around = tuple(slice(max(0, box.start - reach), box.stop + reach) for box in (rows, columns))
+    middle = tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip((rows, columns), around))
+    fresh = _of(grid_map.occupancy[around] >= OCCUPIED_PERCENT, grid_map.resolution_m, solid_m)
+    thickness_m.reshape(grid_map.occupancy.shape)[rows, columns] = fresh[middle]
 
 
 def _of(occupied: np.ndarray, resolution: float, solid_m: float) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from glass_nav.geometry import se2
+from glass_nav.sensing import distance_field
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.world.grid_map import GridMap
 
@@ -114,3 +115,12 @@ def test_a_beam_does_not_end_deep_inside_what_is_drawn_solid():
 def test_a_map_of_walls_alone_is_all_wall():
     distance, _, _ = DistanceField(grid_map(np.ones((6, 6), bool))).at(np.array([0.3]), np.array([0.3]))
     np.testing.assert_array_equal(distance, 0.0)
+
+
+@pytest.mark.parametrize("rows", [1, 7, 24])
+def test_made_in_strips_it_is_the_same(monkeypatch, rows):
+    there = scattered(1, TURNED)
+    points = there.centres(*np.indices(there.occupied.shape)).reshape(-1, 2).T
+    whole = DistanceField(there, max_distance_m=0.5).distance(*points)
+    monkeypatch.setattr(distance_field, "_STRIP_ROWS", rows)
+    np.testing.assert_array_equal(DistanceField(there, max_distance_m=0.5).distance(*points), whole)

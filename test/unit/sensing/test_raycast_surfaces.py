@@ -373,3 +373,20 @@ def test_threads_do_not_change_the_surfaces():
 def test_limits_out_of_bounds_are_refused_in_one_line(limits, text):
     with pytest.raises(ValueError, match=f"^ray caster: {text}$"):
         hits(three_walls(), [1.0, 10.0, 0.0], 0.0, **limits)
+
+
+def test_the_walls_at_cells_are_those_of_the_whole_map():
+    cells = np.where(np.random.default_rng(0).random((40, 30)) < 0.4, 100, 0).astype(np.int8)
+    caster = RayCaster(GridMap(cells, CELL_M, np.array([1.0, 2.0, 0.5])))
+    asked = np.arange(cells.size, dtype=np.int32).reshape(30, 40)
+    for at_cells, everywhere in zip(caster.walls_at(asked), (*caster.normals(), caster.wall_offsets_m())):
+        np.testing.assert_array_equal(at_cells, everywhere.reshape(30, 40))
+    assert [float(each) for each in caster.walls_at(np.array([-1]))] == pytest.approx(
+        [np.nan, 0.0, np.nan], nan_ok=True
+    )
+
+
+@pytest.mark.parametrize("cell", [-2, 1200])
+def test_walls_at_cells_that_are_none_are_refused(cell):
+    with pytest.raises(ValueError, match="cells must be of the grid, or -1"):
+        RayCaster(GridMap(np.zeros((40, 30), np.int8), CELL_M, np.zeros(3))).walls_at(np.array([0, cell]))

@@ -94,3 +94,12 @@ def test_a_redrawn_box_is_as_if_all_was_worked_out(seed):
     thickness_m = wall_thickness(maps[0])
     walls.redraw(thickness_m, maps[1], *changed_box(*maps))
     np.testing.assert_array_equal(thickness_m, wall_thickness(maps[1]))
+
+
+@pytest.mark.parametrize("rows", [1, 7, 59])
+@pytest.mark.parametrize("share", [0.3, 0.95])
+def test_made_in_strips_it_is_the_same(monkeypatch, rows, share):
+    occupied = np.random.default_rng(rows).random((60, 50)) < share
+    whole = thickness_of(occupied)
+    monkeypatch.setattr(walls, "_STRIP_ROWS", rows)
+    np.testing.assert_array_equal(thickness_of(occupied), whole)

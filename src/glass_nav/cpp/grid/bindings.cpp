@@ -173,6 +173,30 @@ py::tuple normals(const GridRaycaster& grid) {
   return py::make_tuple(normal_rad, linearity, offset_m);
 }
 
+py::tuple walls_at(const GridRaycaster& grid, const Array<std::int32_t>& cell) {
+  const std::int32_t* from = cell.data();
+  const py::ssize_t count = cell.size();
+  const std::int64_t cells = static_cast<std::int64_t>(grid.width()) * grid.height();
+  if (std::any_of(from, from + count, [&](std::int32_t each) { return each < -1 || each >= cells; })) {
+    throw std::invalid_argument("cells must be of the grid, or -1");
+  }
+  const std::vector<py::ssize_t> shape(cell.shape(), cell.shape() + cell.ndim());
+  py::array_t<float> normal_rad(shape), linearity(shape), offset_m(shape);
+  float *angle_to = normal_rad.mutable_data(), *linearity_to = linearity.mutable_data();
+  float* offset_to = offset_m.mutable_data();
+  {
+    py::gil_scoped_release unlocked;
+    const WallNormals& walls = grid.normals();
+    for (py::ssize_t i = 0; i < count; ++i) {
+      const WallNormals::Normal normal = walls.at(from[i]);
+      angle_to[i] = std::atan2(normal.y, normal.x);
+      linearity_to[i] = normal.linearity;
+      offset_to[i] = static_cast<float>(normal.offset * grid.resolution_m());
+    }
+  }
+  return py::make_tuple(normal_rad, linearity, offset_m);
+}
+
 std::shared_ptr<MatchGrid> make_match_grid(const Array<std::uint8_t>& scores, const Array<std::uint8_t>& allowed) {
   if (scores.ndim() != 2 || allowed.ndim() != 2 || scores.shape(0) != allowed.shape(0) ||
       scores.shape(1) != allowed.shape(1)) {
@@ -223,6 +247,7 @@ PYBIND11_MODULE(_grid, module) {
            py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"), py::arg("threads"))
       .def("free_ranges", &free_ranges, py::arg("rays"), py::arg("poses"), py::arg("angles"), py::arg("max_range_m"))
       .def("normals", &normals)
+      .def("walls_at", &walls_at, py::arg("cell"))
       .def("redraw", &redraw, py::arg("occupancy"), py::arg("first_row"), py::arg("first_column"), py::arg("rows"),
            py::arg("columns"));
   py::class_<MatchGrid, std::shared_ptr<MatchGrid>>(module, "MatchGrid")

@@ -50,14 +50,14 @@ GridRaycaster::GridRaycaster(const std::int8_t* occupancy, int height, int width
   const std::int64_t count = static_cast<std::int64_t>(width) * height;
   if (count > std::numeric_limits<std::int32_t>::max())
     throw std::invalid_argument("a grid has at most 2^31 - 1 cells");
-  surface_.resize(static_cast<std::size_t>(count));
+  if (unknown_stops) unknown_.resize(static_cast<std::size_t>(count));
   chessboard_distance_ = std::make_unique<ChessboardDistance>(drawn(occupancy, {0, 0, width, height}), width, height);
 }
 
 void GridRaycaster::redraw(const std::int8_t* occupancy, const CellBox& box) {
   chessboard_distance_->redraw(box, drawn(occupancy, box));
   if (guide_ != nullptr) guide_->redraw(occupancy, box);
-  if (normals_ != nullptr) normals_ = std::make_unique<const WallNormals>(surface_, width_, height_, *normals_, box);
+  if (normals_ != nullptr) normals_ = std::make_unique<const WallNormals>(surfaces(), width_, height_, *normals_, box);
 }
 
 std::vector<std::uint8_t> GridRaycaster::drawn(const std::int8_t* occupancy, const CellBox& box) {
@@ -68,18 +68,26 @@ std::vector<std::uint8_t> GridRaycaster::drawn(const std::int8_t* occupancy, con
       const std::size_t cell = static_cast<std::size_t>(y) * width_ + x;
       const bool unknown = occupancy[cell] < 0, occupied = !unknown && occupancy[cell] >= occupied_percent_;
       blocked.push_back(occupied || (unknown && unknown_stops_) ? 1 : 0);
-      surface_[cell] = occupied ? 1 : 0;
+      if (unknown_stops_) unknown_[cell] = unknown ? 1 : 0;
     }
   }
   return blocked;
 }
 
+std::vector<std::uint8_t> GridRaycaster::surfaces() const {
+  const GridCells grid = cells();
+  std::vector<std::uint8_t> occupied(static_cast<std::size_t>(width_) * height_);
+  for (std::size_t i = 0; i < occupied.size(); ++i) occupied[i] = grid.occupied(static_cast<std::int32_t>(i)) ? 1 : 0;
+  return occupied;
+}
+
 const WallNormals& GridRaycaster::normals() const {
-  std::call_once(normals_once_, [this] { normals_ = std::make_unique<const WallNormals>(surface_, width_, height_); });
+  std::call_once(normals_once_,
+                 [this] { normals_ = std::make_unique<const WallNormals>(surfaces(), width_, height_); });
   return *normals_;
 }
 
-GridCells GridRaycaster::cells() const { return {width_, height_, surface_.data(), chessboard_distance_.get()}; }
+GridCells GridRaycaster::cells() const { return {width_, height_, chessboard_distance_.get(), unknown_stops_ ? unknown_.data() : nullptr}; }
 
 template <class Use>
 void GridRaycaster::with_ray_marcher(const Use& use) const {

@@ -91,15 +91,16 @@ class GridRaycaster {
   template <class Reach, class Store>
   void find_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const Reach& t_max, const Store& store) const;
 
-  /// Keeps which cells of a box are surfaces; which of them end a ray, row by row.
+  /// Keeps which cells of a box are unknown, if those stop rays; which of its cells end a ray, row by row.
   std::vector<std::uint8_t> drawn(const std::int8_t* occupancy, const CellBox& box);
+  std::vector<std::uint8_t> surfaces() const;  // of each cell, not 0: occupied
 
   int width_, height_;
   double resolution_m_;
   int occupied_percent_;
   bool unknown_stops_;
   std::shared_ptr<FreeRanges> guide_;
-  std::vector<std::uint8_t> surface_;                        // of each cell, not 0: occupied
+  std::vector<std::uint8_t> unknown_;  // of each cell, not 0: unknown; empty unless those stop rays
   std::unique_ptr<ChessboardDistance> chessboard_distance_;  // between the cells where a ray may end
   mutable std::once_flag normals_once_;
   mutable std::unique_ptr<const WallNormals> normals_;

@@ -15,16 +15,16 @@ namespace glass_nav {
 /// The cells as rays see them; all arrays are row-major and belong to the raycaster.
 struct GridCells {
   int width, height;
-  const std::uint8_t* surface;  // not 0: occupied
-  const ChessboardDistance* chessboard_distance;
+  const ChessboardDistance* chessboard_distance;  // to the cells that end a ray
+  const std::uint8_t* unknown;                    // not 0: ends a ray without being a surface; null: no cell does
 
   /// A surface.
-  bool occupied(std::int32_t cell) const { return surface[cell] != 0; }
+  bool occupied(std::int32_t cell) const { return blocked(cell) && (unknown == nullptr || unknown[cell] == 0); }
 
-  /// A cell that ends a ray without being a surface (unknown, if those are to stop a ray).
-  bool stops(std::int32_t cell) const {
-    return chessboard_distance->towards(false, false)[cell] == 0 && !occupied(cell);
-  }
+  /// A cell that ends a ray without being a surface.
+  bool stops(std::int32_t cell) const { return unknown != nullptr && blocked(cell) && unknown[cell] != 0; }
+
+  bool blocked(std::int32_t cell) const { return chessboard_distance->towards(false, false)[cell] == 0; }
 
   /// The occupied cell that the ray meets at the present step: its own or one beside the corner; -1 none. Where the
   /// ray leaves the grid at a corner there is still one beside it.

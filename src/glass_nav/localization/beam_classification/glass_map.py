@@ -80,13 +80,13 @@ class GlassMap:
 
     def __init__(self, grid_map: GridMap, evidence: GlassEvidence) -> None:
         self._shape = grid_map.occupancy.shape
-        self._occupied = np.pad(grid_map.occupied, 2).ravel()
-        self._mapped = self._occupied
+        self._stride = self._shape[1] + 4  # cells are counted as if the map had a border of 2
+        self._mapped = self._walls(grid_map)
         self._drawn_in = np.zeros(0, np.int64)  # cells of panes that the map lacks
-        self._stride = self._shape[1] + 4
-        # Log odds that beams added: can be seen through, and is there though it can; bordered by 2 cells.
-        self._log_odds = np.zeros((2, len(self._occupied)), np.float32)
-        self._crossed = np.zeros(len(self._occupied), bool)
+        self._wall = self._mapped  # (W,) cells of the walls and of those panes, ascending; what follows is of each
+        # Log odds that beams added: can be seen through, and is there though it can.
+        self._log_odds = np.zeros((2, len(self._wall)), np.float32)
+        self._crossed = np.zeros(len(self._wall), bool)
         self._kernel = self._neighbours()
         self.weigh_by(evidence)
 
@@ -102,24 +102,30 @@ class GlassMap:
             grid_map: with the panes.
             panes: of each, its flat cells and its probability.
         """
-        self._occupied = np.pad(grid_map.occupied, 2).ravel()
         before, self._drawn_in = self._drawn_in, np.zeros(0, np.int64)
+        odds: Dict[int, float] = {}  # of new cells
         for cell, probability in panes:
-            cells = self._bordered(cell)
-            cells = cells[~self._mapped[cells]]
-            new = np.setdiff1d(cells, before)
-            odds = min(np.log(probability / max(1.0 - probability, 1e-9)), self._evidence.glass_memory)
-            self._log_odds[:, new], self._crossed[new] = odds - np.minimum(self._prior, 0.0), True
+            cells = np.setdiff1d(self._bordered(cell), self._mapped)
+            believed = min(np.log(probability / max(1.0 - probability, 1e-9)), self._evidence.glass_memory)
+            odds.update(dict.fromkeys(np.setdiff1d(cells, before).tolist(), believed))
             self._drawn_in = np.union1d(self._drawn_in, cells)
-        gone = np.setdiff1d(before, self._drawn_in)
-        self._log_odds[:, gone], self._crossed[gone] = 0.0, False
+        old, log_odds, crossed = self._wall, self._log_odds, self._crossed
+        self._wall = np.union1d(self._walls(grid_map), self._mapped)
+        self._log_odds = np.zeros((2, len(self._wall)), np.float32)
+        self._crossed = np.zeros(len(self._wall), bool)
+        kept, at = self._numbers(old)
+        self._log_odds[:, at[kept]], self._crossed[at[kept]] = log_odds[:, kept], crossed[kept]
+        new, at = self._numbers(np.array(list(odds), np.int64))
+        added = np.array(list(odds.values())) - np.minimum(self._prior, 0.0)
+        self._log_odds[:, at[new]], self._crossed[at[new]] = added[:, new], True
 
     def chances(self, cell: np.ndarray) -> np.ndarray:
         """(2, ...) probabilities for flat cells (...) of the map: that it can be seen through, and if so that it is there,
         that is glass and no object that is gone; the priors for -1.
         """
-        at = self._bordered(np.maximum(cell, 0)).ravel()
-        log_odds = np.where(cell.ravel() >= 0, self._log_odds[:, at], 0.0)
+        found, at = self._numbers(np.where(cell >= 0, self._bordered(cell), -1).ravel())
+        log_odds = np.zeros((2, cell.size))
+        log_odds[:, found] = self._log_odds[:, at[found]]
         return _chance(self._prior + log_odds).reshape(2, *cell.shape)
 
     def occupancy(self) -> np.ndarray:
@@ -129,14 +135,15 @@ class GlassMap:
         """
         prior = np.stack([self._prior[0], [0.0]])
         chances = _chance(prior + self._log_odds[:, self._crossed])
-        percent = np.full(len(self._crossed), UNKNOWN, np.int8)
-        percent[self._crossed] = np.rint(100.0 * np.prod(chances, axis=0))
-        return percent.reshape(-1, self._stride)[2:-2, 2:-2].copy()
+        percent = np.full(self._shape, UNKNOWN, np.int8)
+        row, column = np.divmod(self._wall[self._crossed], self._stride)
+        percent[row - 2, column - 2] = np.rint(100.0 * np.prod(chances, axis=0))
+        return percent
 
     def arrays(self) -> Dict[str, np.ndarray]:
         """What was learnt, by name, for restore()."""
-        learnt = np.flatnonzero(self._crossed)
-        return {"glass_cell": learnt.astype(np.int32), "glass_log_odds": self._log_odds[:, learnt]}
+        learnt = self._crossed
+        return {"glass_cell": self._wall[learnt].astype(np.int32), "glass_log_odds": self._log_odds[:, learnt]}
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """What arrays() of the same map gave.
@@ -147,9 +154,10 @@ class GlassMap:
         cell, log_odds = (arrays.get(name, np.zeros(0)) for name in ("glass_cell", "glass_log_odds"))
         if cell.ndim != 1 or log_odds.shape != (2, len(cell)) or not np.isfinite(log_odds).all():
             raise ValueError(f"a glass map needs cells (C,) and log odds (2, C), got {cell.shape}, {log_odds.shape}")
-        if len(cell) and not (cell.dtype.kind == "i" and 0 <= cell.min() and cell.max() < len(self._crossed)):
+        if len(cell) and not (cell.dtype.kind == "i" and 0 <= cell.min() and cell.max() < self._cells):
             raise ValueError("the cells of a glass map must be whole numbers within its map")
-        self._log_odds[:, cell], self._crossed[cell] = log_odds, True
+        found, at = self._numbers(cell)
+        self._log_odds[:, at[found]], self._crossed[at[found]] = log_odds[:, found], True
 
     def learn(self, cell: np.ndarray, incidence_rad: np.ndarray, passed: np.ndarray) -> None:
         """Learn from one scan.
@@ -166,15 +174,16 @@ class GlassMap:
         at = (self._bordered(cell)[:, None] + offsets).ravel()
         share = np.tile(weights, len(cell))
         touched, group = np.unique(at, return_inverse=True)
-        walls = self._occupied[touched]
+        walls, number = self._numbers(touched)
+        number = number[walls]
         total = np.bincount(group, share)
         limit = self._evidence.glass_memory
         for log_odds, added_odds, scan_share in zip(self._log_odds, evidence, self._SCAN_SHARE):
             # Many beams of one scan at a wall cell are one piece of evidence.
             mean = np.bincount(group, share * np.repeat(added_odds, len(offsets))) / total
             added = scan_share * mean[walls] * np.minimum(total[walls], 1.0)
-            log_odds[touched[walls]] = np.clip(log_odds[touched[walls]] + added, -limit, limit)
-        self._crossed[touched[walls]] = True
+            log_odds[number] = np.clip(log_odds[number] + added, -limit, limit)
+        self._crossed[number] = True
 
     def _evidence_of(self, incidence_rad: np.ndarray, passed: np.ndarray) -> "Tuple[np.ndarray, np.ndarray]":
         """(B,) log odds of glass against wall, and against gone. The lidar is not known: it may be any."""
@@ -184,6 +193,23 @@ class GlassMap:
             np.where(passed, np.log((1.0 - low) / leak), np.log(high / (1.0 - leak))),
             np.where(passed, np.log((1.0 - low) / (1.0 - _GONE_RETURNS)), np.log(high / _GONE_RETURNS)),
         )
+
+    @property
+    def _cells(self) -> int:
+        """Of the map with its border."""
+        return (self._shape[0] + 4) * self._stride
+
+    def _walls(self, grid_map: GridMap) -> np.ndarray:
+        """(W,) occupied cells, ascending."""
+        row, column = np.nonzero(grid_map.occupied)
+        return (row + 2) * self._stride + column + 2
+
+    def _numbers(self, cell: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """For cells (C,): which of them are walls, and the number of each that is; (C,) bool, (C,) int."""
+        if not len(self._wall):
+            return np.zeros(len(cell), bool), np.zeros(len(cell), np.intp)
+        at = np.minimum(np.searchsorted(self._wall, cell), len(self._wall) - 1)
+        return self._wall[at] == cell, at
 
     def _bordered(self, cell: np.ndarray) -> np.ndarray:
         row, column = np.divmod(cell, self._shape[1])

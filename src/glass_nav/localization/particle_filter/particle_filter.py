@@ -32,6 +32,7 @@ from glass_nav.world.landmark_map import LandmarkMap
 
 ONE_PLACE = np.array([1.0, 1.0, 0.7])  # deviations [m, m, rad] that preliminary samples can cover
 _MIN_ENDS = 20  # beams of known case that a registration is refined by
+_BLOCK = 2**15  # beams of particles weighed at a time
 _FULL_FIT = 20.0  # log likelihood ratio of a scan that fits everywhere to one that fits nowhere
 
 
@@ -264,21 +265,32 @@ class ParticleFilter:
 
     def _log_weights(self, scan: Scan, cases: BeamCases, classifier: BeamClassifier) -> np.ndarray:
         """(P,) log likelihoods of the scan."""
-        mixture = self._params.mixture
-        if mixture.weight_mode == "field":
-            chosen = spread_evenly(importance_weights.known_ends(cases.case), mixture.laser_max_beams)
-            ends_m = scan.points_in_base()[chosen]
-            return importance_weights.by_field(self._field, self.particles, ends_m, classifier.residuals, mixture)
-        chosen = spread_evenly(cases.case, mixture.laser_max_beams)
+        mixture, particles = self._params.mixture, self.particles
+        used = importance_weights.known_ends(cases.case) if mixture.weight_mode == "field" else cases.case
+        chosen = spread_evenly(used, mixture.laser_max_beams)
+        log_weights = self._by_field if mixture.weight_mode == "field" else self._by_ranges
+        together = max(1, _BLOCK // max(1, len(chosen)))  # particles: all of them times the beams would take gigabytes
+        blocks = [particles[first : first + together] for first in range(0, len(particles), together)]
+        return np.concatenate([log_weights(block, scan, cases, chosen, classifier) for block in blocks])
+
+    def _by_field(
+        self, particles: np.ndarray, scan: Scan, cases: BeamCases, chosen: np.ndarray, classifier: BeamClassifier
+    ) -> np.ndarray:
+        ends_m = scan.points_in_base()[chosen]
+        return importance_weights.by_field(self._field, particles, ends_m, classifier.residuals, self._params.mixture)
+
+    def _by_ranges(
+        self, particles: np.ndarray, scan: Scan, cases: BeamCases, chosen: np.ndarray, classifier: BeamClassifier
+    ) -> np.ndarray:
         return importance_weights.by_ranges(
             classifier.caster,
             classifier.thickness_m,
-            se2.compose(self.particles, scan.base_from_laser),
+            se2.compose(particles, scan.base_from_laser),
             scan.angles_rad[chosen],
             scan.ranges_m[chosen],
             cases.case[chosen],
             classifier.residuals,
-            mixture,
+            self._params.mixture,
             scan.range_max_m,
             classifier.max_glass_thickness_m,
             classifier.min_linearity,

@@ -19,8 +19,8 @@ _BIN = np.array([0.5, 0.5, np.radians(10.0)])  # AMCL's: m, m, rad
 class ParticleCount:
     """How many particles; the names and meanings are AMCL's."""
 
-    min_particles: int = number(300, 1, 100_000)
-    max_particles: int = number(5000, 1, 100_000)
+    min_particles: int = number(300, 1, 1_000_000)
+    max_particles: int = number(5000, 1, 1_000_000)
     kld_err: float = number(0.01, 1e-6, 1.0)  # largest error between the true and the estimated distribution
     kld_z: float = number(0.99, 0.0, 10.0)  # upper normal quantile of the probability that the error is below kld_err
 

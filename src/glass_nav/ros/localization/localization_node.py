@@ -41,6 +41,7 @@ from nav_msgs.srv import SetMap, SetMapRequest, SetMapResponse
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse, Trigger, TriggerRequest, TriggerResponse
 
+from glass_nav import machine
 from glass_nav.localization import health, initial_pose
 from glass_nav.localization.health import LocalizationHealth, Situation
 from glass_nav.localization.pose_memory import PoseMemory
@@ -214,6 +215,7 @@ class LocalizationNode:
         if not self._session.use_map(grid_map, origin):
             return
         self._outputs.glass_is_news()
+        machine.give_back_memory()  # of the message, and of what the map was looked through with
         if conversions.frame_id(frame) != self._p.node.global_frame_id:
             rospy.logwarn(
                 f"the map says it is in frame {frame!r}, ~global_frame_id is "

@@ -43,7 +43,7 @@ def test_every_number_has_limits_and_its_default_lies_between_them(described):
         if each["type"] in ("int", "double"):
             assert -1e7 < each["min"] <= each["default"] <= each["max"] < 1e7, name
             assert type(each["min"]) is type(each["max"]) is type(each["default"]), name
-    assert (described["max_particles"]["min"], described["max_particles"]["max"]) == (1, 100_000)
+    assert (described["max_particles"]["min"], described["max_particles"]["max"]) == (1, 1_000_000)
 
 
 def test_the_groups_are_the_sections_of_the_parameter_file():
