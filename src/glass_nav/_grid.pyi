@@ -58,6 +58,33 @@ class Grid:
         min_gap_m: float,
         threads: int,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...  # (4, P, B) float64 ranges, float64 cosines, int32 cells
+    def expected_ranges(
+        self,
+        occupancy: np.ndarray,  # (H, W) int8
+        thickness_m: np.ndarray,  # (H * W,) float32
+        poses: np.ndarray,  # (N, 3) float64
+        angles: np.ndarray,
+        measured_m: np.ndarray,  # (B,) float64
+        reach_m: np.ndarray,  # (B,) float64
+        gate_m: float,
+        depth_share: float,
+        max_range_m: float,
+        max_thickness_m: float,
+        min_linearity: float,
+        min_gap_m: float,
+        mirrored_by_line: bool,
+        grid_yaw: float,
+        threads: int,
+    ) -> tuple[
+        np.ndarray,  # (4, N, B) float64 ranges
+        np.ndarray,  # (4, N, B) float64 cosines
+        np.ndarray,  # (4, N, B) float32 thicknesses
+        np.ndarray,  # (4, N, B) int32 cells
+        np.ndarray,  # (1, B) float64 incidences of the first sample
+        np.ndarray,  # (4, B) float64 ranges by lines
+        np.ndarray,  # (4, B) float64 axes
+        np.ndarray,  # (4, B) bool, seen side
+    ]: ...
     def free_ranges(
         self, rays: FreeRanges, poses: np.ndarray, angles: np.ndarray, max_range_m: float
     ) -> np.ndarray: ...  # (P, B) float64

@@ -57,8 +57,7 @@ class Job(NamedTuple):
     lidar: str
     opaque: bool
     seed: int
-    judge: bool  # candidates by the scans
-    follow: bool  # poses by the scans, too
+    scans: bool  # are evidence
     tour: bool
     believed: str  # building whose map and atlas the robot is given
     anywhere: bool  # also behind gaps that no robot gets through
@@ -79,8 +78,8 @@ class Trial:
         self.drive = DriveParams()
         session = SearchSession(
             lambda: (self.atlas.name, self.atlas),
-            SessionParams(judge_by_scans=job.judge),
-            SearchParams(follow_places=4 if job.follow else 0),
+            SessionParams(),
+            SearchParams(use_scans=job.scans),
         )
         self.robot = WiredRobot(self.simulation, self.drive, self.atlas, session)
         if job.verbose:
@@ -121,7 +120,7 @@ class Trial:
         if estimate is not None and arrival is not None:
             print(
                 f"{self.now_s:7.1f} s depth {estimate.depth} {estimate.state}: {estimate.reason}; rank "
-                f"{estimate.choice.rank if estimate.choice else '-'}; {self._truth(arrival)}{self._scans_say()}",
+                f"{estimate.choice.rank if estimate.choice else '-'}; {self._truth(arrival)}{self._belief()}",
                 flush=True,
             )
 
@@ -135,16 +134,15 @@ class Trial:
             f"r {arrival.meetpoint.r_m:.2f} of {self.atlas.nodes.r_m[node]:.2f} m{self._edge_truth(arrival, node)}"
         )
 
-    def _scans_say(self) -> str:
-        """How the followed pose that explains most compares, and its error."""
-        localizer = self.robot.session.localizer
-        standing = None if localizer is None else localizer.standing
-        if standing is None:
+    def _belief(self) -> str:
+        """The likeliest place, and its error."""
+        belief = self.robot.session.status.belief
+        if belief is None or not len(belief):
             return ""
-        off_m = float(np.hypot(*(standing.map_from_base - self.simulation.map_from_base)[:2]))
+        off_m = float(np.hypot(*(belief.poses[0] - self.simulation.map_from_base)[:2]))
         return (
-            f"; scans: {standing.places} places, {standing.share:.2f}, lead {standing.lead:.2f}, now "
-            f"{standing.share_now:.2f}, lead {standing.lead_now:.2f}, {off_m:.2f} m off"
+            f"; belief: {len(belief)} places, {belief.share[0]:.4f}, elsewhere {belief.elsewhere:.4f}, scans "
+            f"{belief.scan_nats[0]:.1f}, graph {belief.graph_nats[0]:.1f}, {off_m:.2f} m off"
         )
 
     def _edge_truth(self, arrival: Arrival, node: int) -> str:
@@ -267,8 +265,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=2, help="robots in each building with each lidar")
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--no-scans", action="store_true", help="candidates are not judged by scans")
-    parser.add_argument("--graph-only", action="store_true", help="no poses are followed by the scans")
+    parser.add_argument("--graph-only", action="store_true", help="scans are no evidence")
     parser.add_argument(
         "--believed",
         choices=list(shipped_buildings.shipped()),
@@ -290,7 +287,6 @@ def main() -> None:
             name,
             arguments.opaque,
             seed,
-            not arguments.no_scans,
             not arguments.graph_only,
             not arguments.no_tour,
             arguments.believed or building,

@@ -22,7 +22,7 @@ from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap, GetMapResponse
 from room_robot import BEAMS, Robot, changed, pose_message
 from room_with_pane import PANE_COLUMN, LidarAndPane, room_with_a_pane
-from rostest_support import Heard, LogLines, wait_until
+from rostest_support import Heard, LogLines, busy_threads, process_of, wait_until
 from sensor_msgs.msg import Image, LaserScan
 from std_srvs.srv import Empty
 from tf2_msgs.msg import TFMessage
@@ -250,6 +250,15 @@ class LocalizationOutputs(unittest.TestCase):
             self.assertTrue(wait_until(lambda legend=legend: len(legend), 30.0), "no ~legend within 30 s")
             self.assertEqual((legend.last.encoding, legend.last.step), ("rgb8", 3 * legend.last.width))
             self.assertEqual(len(legend.last.data), legend.last.height * legend.last.step)
+
+    # -- the process
+
+    def test_one_thread_of_the_node_uses_the_cpu(self) -> None:
+        """OpenBLAS keeps its threads to itself."""
+        for _ in range(10):
+            self.update()
+            self.robot.make_steps(1)
+        self.assertEqual(busy_threads(process_of(NODE)), 1)
 
     # -- tf
 

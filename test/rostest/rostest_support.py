@@ -10,8 +10,10 @@ import threading
 import time
 from pathlib import Path
 from typing import Any, Callable, Dict, Iterator, List, Optional
+from xmlrpc.client import ServerProxy
 
 import rosbag
+import rosgraph
 import rospy
 from rosgraph_msgs.msg import Clock, Log
 
@@ -41,6 +43,21 @@ def data_dir() -> Optional[Path]:
     """The folder of recorded logs; None if it is not on this machine."""
     folder = Path(os.environ.get("GLASS_NAV_DATA") or REPO.parent / "shared" / "data")
     return folder if (folder / "logs").is_dir() else None
+
+
+def process_of(node: str) -> int:
+    """The number of the process of a running node."""
+    uri = rosgraph.Master(rospy.get_name()).lookupNode(node)
+    code, message, pid = ServerProxy(uri).getPid(rospy.get_name())
+    assert code == 1, message
+    return int(pid)
+
+
+def busy_threads(pid: int) -> int:
+    """How many threads of a process used more than a quarter of the CPU time that all of them used."""
+    stats = [(task / "stat").read_text() for task in Path(f"/proc/{pid}/task").iterdir()]
+    ticks = [sum(map(int, stat.rpartition(")")[2].split()[11:13])) for stat in stats]  # user, system
+    return sum(each > 0.25 * sum(ticks) for each in ticks)
 
 
 class Heard:

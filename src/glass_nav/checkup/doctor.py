@@ -7,7 +7,15 @@ from typing import Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from glass_nav.checkup import frame_checks, glass_checks, map_checks, motion_checks, scan_checks, time_checks
+from glass_nav.checkup import (
+    frame_checks,
+    glass_checks,
+    map_checks,
+    motion_checks,
+    scan_checks,
+    time_checks,
+    wheel_checks,
+)
 from glass_nav.checkup.finding import Finding
 from glass_nav.checkup.map_checks import ScansOnMap
 from glass_nav.checkup.scan_motion import FARTHEST_M
@@ -221,7 +229,10 @@ def _check_motion_and_map(
     if in_order and np.isfinite(in_order[0][1]).all():
         moves = motion_checks.measure([_points(scan) for scan, _ in in_order], np.array([pose for _, pose in in_order]))
         opposite = motion_checks.turns_are_opposite(moves)
-        yield from motion_checks.check(moves, lidar, robot.link, opposite)
+        of_motion = [*motion_checks.check(moves, lidar, robot.link, opposite)]
+        yield from of_motion
+        if not (opposite or moves.idle or of_motion):
+            yield from wheel_checks.check(moves, robot.link)
     found: List[Finding] = []
     if grid_map is not None:
         found = [*map_checks.check(ScansOnMap(grid_map, [_in_base(scan) for scan, _ in in_order]), opposite)]

@@ -102,7 +102,7 @@ class Ratio:
 
 def way_ratio(moves: Moves) -> Ratio:
     """Of the distances between scans with little turn."""
-    by_odometry, by_scans = _straight(moves)
+    by_odometry, by_scans = straight(moves)
     return _ratio(np.hypot(by_scans[:, 0], by_scans[:, 1]) / np.hypot(by_odometry[:, 0], by_odometry[:, 1]))
 
 
@@ -112,7 +112,8 @@ def turn_ratio(moves: Moves) -> Ratio:
     return _ratio(moves.by_scans[turning, 2] / moves.by_odometry[turning, 2])
 
 
-def _straight(moves: Moves) -> Tuple[np.ndarray, np.ndarray]:
+def straight(moves: Moves) -> Tuple[np.ndarray, np.ndarray]:
+    """Of the pairs with little turn, (M, 3) each: how the lidar moved by odometry, and by scans."""
     way_m, turn = np.hypot(moves.by_odometry[:, 0], moves.by_odometry[:, 1]), np.abs(moves.by_odometry[:, 2])
     straight = (way_m >= 0.6 * _WAY_M) & (turn < 0.25)
     return moves.by_odometry[straight], moves.by_scans[straight]
@@ -161,7 +162,7 @@ def check(moves: Moves, lidar: str, link: str, opposite: bool) -> Iterator[Findi
             "odometry-turn-scale",
             f"for each degree that {link} turns the scans turn {turns.middle:.2f} degrees ({turns.count} "
             "pairs of scans)",
-            f"divide the distance between the wheels in the base's driver by {turns.middle:.2f}; for a "
+            f"divide the distance between left and right wheel in the base's driver by {turns.middle:.2f}; for a "
             "gyro, look at its scale",
         )
     if not opposite:
@@ -169,7 +170,7 @@ def check(moves: Moves, lidar: str, link: str, opposite: bool) -> Iterator[Findi
 
 
 def _askew(moves: Moves, lidar: str) -> Iterator[Finding]:
-    by_odometry, by_scans = _straight(moves)
+    by_odometry, by_scans = straight(moves)
     if len(by_odometry) < _MIN_PAIRS:
         return
     off = angles.wrap(np.arctan2(by_odometry[:, 1], by_odometry[:, 0]) - np.arctan2(by_scans[:, 1], by_scans[:, 0]))

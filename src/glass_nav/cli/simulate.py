@@ -26,6 +26,7 @@ from glass_nav.simulation import (
 )
 from glass_nav.simulation.building import Building
 from glass_nav.simulation.lidar import ECHOES, LidarModel
+from glass_nav.simulation.odometry import JOINTS
 from glass_nav.simulation.path_follower import FIRST, PathFollowerParams
 from glass_nav.simulation.robot import KINDS, RobotParams
 from glass_nav.simulation.simulation import Frame, Simulation
@@ -193,6 +194,8 @@ def write_frame(bag: BagWriter, frame: Frame, period_s: float) -> None:
     """All that was recorded since the frame before, and the truth of this one."""
     for reading in frame.odometry:
         bag.odometry(reading.stamp_ns, reading.odom_from_base, reading.velocity)
+        if reading.wheels_rad is not None:
+            bag.wheels(reading.stamp_ns, JOINTS, reading.wheels_rad)
     bag.scan(frame.scan, period_s)
     bag.truth(frame.stamp_ns, frame.map_from_base, frame.truth.case, frame.truth.exact_m, frame.truth.crossing_m)
 

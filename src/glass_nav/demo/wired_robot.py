@@ -112,6 +112,7 @@ class WiredRobot:
         self._scans[frame.scan.stamp_ns] = frame.scan
         if len(self._scans) > KEPT_SCANS:
             del self._scans[min(self._scans)]
+        self._tell(self.session.scan(frame.scan, frame.odom_from_base))
         self.driver.see(self._localize(frame), frame.odom_from_base)
         for _ in range(round(self.simulation.scan_period_s / CONTROL_S)):
             self.driver.at(self._now_s)

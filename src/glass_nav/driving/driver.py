@@ -38,7 +38,7 @@ from glass_nav.health import Health, Level
 from glass_nav.log_line import LogLine
 from glass_nav.sensing.scan import Scan
 from glass_nav.topology.atlas.atlas import Atlas
-from glass_nav.vocabulary import DriverPhase, LocalizationState, Outcome, SearchState
+from glass_nav.vocabulary import SEARCH_IS_OVER, DriverPhase, LocalizationState, Outcome, SearchState
 from glass_nav.world.grid_map import GridMap
 
 QUIET_S = 0.5  # zeros are sent for so long after a task, then nothing: others may steer
@@ -180,6 +180,8 @@ class Driver:
                 self._say(DriverPhase.FAILED, why)
             elif self._job.action is None:
                 self._finish(self._job, Ending(Outcome.REFUSED, why))
+        elif began and self._search_is(*SEARCH_IS_OVER) and self._job is not None and self._job.action is None:
+            self._finish(self._job, Ending(Outcome.PREEMPTED, f"the search is over: {state}"))
         return self._decided()
 
     def localization_reports(self, state: LocalizationState, reason: str) -> None:

@@ -1,7 +1,7 @@
 """Poses, odometry, scores -> the same poses further on, each place once, the best first.
 
-What everything shares that follows many poses at once: GlobalSearch, whose score is a log likelihood, and FollowedPoses,
-whose score is the mean share of the scans that the map explains. K poses.
+What everything shares that follows many poses at once: GlobalSearch and PoseBelief, whose scores are log likelihoods.
+K poses.
 """
 
 from __future__ import annotations

@@ -9,12 +9,14 @@ slide to where the scan fits best, since it is known to about a decimetre.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Optional, Tuple
 
 import numpy as np
 
 from glass_nav.geometry import angles, se2
 from glass_nav.hypotheses import scan_alignment
+from glass_nav.hypotheses.place_search import PlaceSearch
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.known_area import KnownArea
@@ -29,6 +31,16 @@ _SLIDES_M, _SLIDES_RAD = 0.5, np.radians(15.0)  # a pose that would slide furthe
 _AT_ONCE = 64  # poses
 _MIN_BEAMS = 10
 _MIN_KNOWN = 0.25  # of the beams that returned; where the map knows fewer of them it cannot judge
+
+
+@dataclass(frozen=True)
+class BeamsExplained:
+    """Of B beams of a scan, seen from P poses."""
+
+    poses: np.ndarray  # (P, 3) where the scan fits best
+    ends_m: np.ndarray  # (B, 2) of the beams, in the robot's frame
+    explained: np.ndarray  # (P, B) bool: the map explains the beam
+    known: np.ndarray  # (P, B) bool: the beam is evidence; it did not end where the map knows nothing
 
 
 class ScanExplanation:
@@ -67,27 +79,39 @@ class ScanExplanation:
         Returns:
             (C, 3) poses, and (C,) shares in [0, 1] as of shares(); poses as given and NaN if hardly any beam returned.
         """
-        beams = _used_beams(scan)
+        beams = self.beams(scan, map_from_base, most_m, most_rad)
         if beams is None:
             return np.array(map_from_base, float), np.full(len(map_from_base), np.nan)
-        points = scan.points_in_base()[beams]
-        poses, shares = [np.zeros((0, 3))], [np.zeros(0)]
+        count = beams.known.sum(axis=1)
+        few = count < max(_MIN_BEAMS, _MIN_KNOWN * len(beams.ends_m))
+        return beams.poses, np.where(few, np.nan, beams.explained.sum(axis=1) / np.maximum(count, 1))
+
+    def beams(self, scan: Scan, map_from_base: np.ndarray, most_m: float, most_rad: float) -> Optional[BeamsExplained]:
+        """As fitted(), beam by beam; None if hardly any beam returned."""
+        used = _used_beams(scan)
+        if used is None:
+            return None
+        points = scan.points_in_base()[used]
+        poses = [np.zeros((0, 3))]
+        explained, known = [np.zeros((0, len(used)), bool)], [np.zeros((0, len(used)), bool)]
         for first in range(0, len(map_from_base), _AT_ONCE):
             slid = self._slid(points, map_from_base[first : first + _AT_ONCE], most_m, most_rad)
             poses.append(slid)
-            shares.append(self._explained(scan, beams, points, slid))
-        return np.concatenate(poses), np.concatenate(shares)
+            of_pose = self._explained(scan, used, points, slid)
+            explained.append(of_pose[0])
+            known.append(of_pose[1])
+        return BeamsExplained(np.concatenate(poses), points, np.concatenate(explained), np.concatenate(known))
 
-    def places(self, scan: Scan, most: int) -> np.ndarray:
-        """(K, 3) poses from all over the map where the beams end near walls, K <= most, the best first; none if hardly
-        any beam returned. Neighbouring ones may belong to one place.
+    def search(self, scan: Scan, odom_from_base: np.ndarray) -> Optional[PlaceSearch]:
+        """A search of the whole map for poses from which the scan may have been taken; None if hardly any beam
+        returned.
         """
-        beams = _used_beams(scan)
-        if beams is None:
-            return np.zeros((0, 3))
+        used = _used_beams(scan)
+        if used is None:
+            return None
         if self._matcher is None:
             self._matcher = ScanMatcher(self._grid_map, self._field)
-        return self._matcher.search(scan.points_in_base()[beams], most).poses
+        return PlaceSearch(self._matcher, self._field, scan.points_in_base()[used], odom_from_base)
 
     def _slid(self, points_m: np.ndarray, poses: np.ndarray, most_m: float, most_rad: float) -> np.ndarray:
         slid = scan_alignment.align(self._field, points_m, poses, last_scale_m=0.1).poses
@@ -95,7 +119,10 @@ class ScanExplanation:
         kept = (np.hypot(off[:, 0], off[:, 1]) < most_m) & (np.abs(angles.wrap(off[:, 2])) < most_rad)
         return np.where(kept[:, None], slid, poses)
 
-    def _explained(self, scan: Scan, beams: np.ndarray, points_m: np.ndarray, poses: np.ndarray) -> np.ndarray:
+    def _explained(
+        self, scan: Scan, beams: np.ndarray, points_m: np.ndarray, poses: np.ndarray
+    ) -> Tuple[np.ndarray, np.ndarray]:
+        """(P, B) bool: explained; known."""
         hits = self._caster.cast_surfaces(
             se2.compose(poses, scan.base_from_laser),
             scan.angles_rad[beams],
@@ -105,10 +132,7 @@ class ScanExplanation:
         measured = scan.ranges_m[beams]
         offered = np.stack([hits.first_m, hits.second_m, hits.third_m, hits.mirrored_m])  # (4, P, B)
         explained = (np.abs(offered - measured) <= self._near_m).any(axis=0)
-        known = explained | (hits.first_m < measured) | self._known_area.ends(points_m, poses)
-        count = known.sum(axis=1)
-        few = count < max(_MIN_BEAMS, _MIN_KNOWN * len(beams))
-        return np.where(few, np.nan, explained.sum(axis=1) / np.maximum(count, 1))
+        return explained, explained | (hits.first_m < measured) | self._known_area.ends(points_m, poses)
 
 
 def _used_beams(scan: Scan) -> Optional[np.ndarray]:

@@ -12,7 +12,7 @@ from typing import List, Optional, Sequence
 import numpy as np
 
 from glass_nav.geometry.trajectory import Trajectory
-from glass_nav.recording import bag_messages, frames
+from glass_nav.recording import bag_messages, bag_wheels, frames
 from glass_nav.recording.bag_messages import ODOMETRY, SCAN, TF, Bag
 from glass_nav.recording.frames import FrameError, FrameTree
 from glass_nav.recording.recording import LogOptions, RecordingError, trajectory_from_samples
@@ -26,7 +26,7 @@ BASE_FRAMES = ("base_link", "base_footprint")  # tried in this order when no bas
 
 @dataclass(frozen=True)
 class OdometrySource:
-    """Where odom_from_base comes from: a frame of tf, or a topic."""
+    """Where odom_from_base comes from: a frame of tf, a topic, or counts of wheels."""
 
     frame: Optional[str] = None
     trajectory: Optional[Trajectory] = None
@@ -139,7 +139,10 @@ def _frame_tree(bag: Bag) -> FrameTree:
 
 
 def _odometry(bag: Bag, tree: FrameTree, options: LogOptions, notes: List[str]) -> OdometrySource:
-    """From tf, unless a topic is asked for or tf has no odometry."""
+    """From tf, unless wheels or a topic are asked for or tf has no odometry."""
+    if options.wheels.wheel_topics:
+        notes.append(f"odometry from the counts of {' and '.join(options.wheels.wheel_topics)}")
+        return OdometrySource(trajectory=bag_wheels.trajectory(bag, options.wheels, options.wheel_base_m))
     odom_frame = (options.odom_frame or "odom").lstrip("/")
     bases = BASE_FRAMES if options.base_frame is None else (options.base_frame.lstrip("/"),)
     if options.odom_topic is None:

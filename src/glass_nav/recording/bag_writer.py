@@ -1,11 +1,13 @@
 """A simulated robot -> a ROS 1 bag as of a real robot, plus the ground truth.
 
-/scan, /odom, /tf (odom -> base_link), /tf_static (base_link -> laser), /clock; and the truth: /ground_truth in the
+/scan, /odom, /tf (odom -> base_link), /joint_states (of two wheels), /tf_static (base_link -> laser), /clock; and the truth: /ground_truth in the
 frame map, /true_beams with the stamps of /scan.
 B beams.
 """
 
 from __future__ import annotations
+
+from typing import Sequence
 
 import numpy as np
 
@@ -24,6 +26,7 @@ class BagWriter(MessageWriter):
         "/scan": "sensor_msgs/msg/LaserScan",
         "/odom": "nav_msgs/msg/Odometry",
         "/tf": TF_TYPE,
+        "/joint_states": "sensor_msgs/msg/JointState",
         "/tf_static": TF_TYPE,
         "/clock": "rosgraph_msgs/msg/Clock",
         "/ground_truth": "geometry_msgs/msg/PoseStamped",
@@ -59,6 +62,18 @@ class BagWriter(MessageWriter):
                 "geometry_msgs/PoseWithCovariance", pose=self._pose(odom_from_base), covariance=np.zeros(36)
             ),
             twist=self._new("geometry_msgs/TwistWithCovariance", twist=twist, covariance=np.zeros(36)),
+        )
+
+    def wheels(self, stamp_ns: int, joints: Sequence[str], turned_rad: np.ndarray) -> None:
+        """/joint_states: how far wheels have turned, by the names of their joints."""
+        self._send(
+            "/joint_states",
+            stamp_ns,
+            header=self._header(stamp_ns, ""),
+            name=list(joints),
+            position=np.asarray(turned_rad, float),
+            velocity=np.zeros(0),
+            effort=np.zeros(0),
         )
 
     def scan(self, scan: Scan, period_s: float) -> None:

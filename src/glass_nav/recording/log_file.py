@@ -24,4 +24,6 @@ def open_log(path: "Union[AnyPath, Sequence[AnyPath]]", options: LogOptions = Lo
         return bag_recording.open_log(paths, options)
     if len(paths) > 1:
         raise RecordingError(f"{rawlogs[0]}: only bags can be parts of one run, got {len(paths)} logs")
+    if options.wheels.wheel_topics:
+        raise RecordingError(f"{paths[0]}: a rawlog has no topics, so that ~wheel_topics need a bag")
     return rawlog_file.open_log(paths[0], options)

@@ -9,6 +9,7 @@ import numpy as np
 
 from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.sensing.scan import Scan
+from glass_nav.sensing.wheel_odometry import WheelParams
 
 
 class RecordingError(ValueError):
@@ -84,6 +85,8 @@ class LogOptions:
     ground_truth: Optional[str] = None  # a topic, a file or "tf:FRAME"; "none": none is looked for
     true_beams: Optional[str] = None  # a topic; "none": none is looked for
     deskew: bool = True  # where the log has the time between beams
+    wheels: WheelParams = WheelParams()  # with topics: odometry from their counts
+    wheel_base_m: float = 0.4
     laser_max_range: float = -1.0  # [m] where a lidar sets no range_max; < 0: the longest range that it shows
 
 

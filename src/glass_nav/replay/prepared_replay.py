@@ -90,6 +90,8 @@ def _source(given: LogOptions, settings: ReplayParams) -> LogOptions:
         base_frame=given.base_frame or base_frame,
         odom_frame=given.odom_frame or odom_frame,
         deskew=settings.deskew.deskew,
+        wheels=settings.wheels,
+        wheel_base_m=settings.localizer.odometry.wheel_base_m,
         laser_max_range=settings.localizer.limits.laser_max_range,
     )
 

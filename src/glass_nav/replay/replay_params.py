@@ -15,6 +15,7 @@ from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.method import Method
 from glass_nav.params import ParamError
 from glass_nav.sensing.deskew import Deskew
+from glass_nav.sensing.wheel_odometry import WheelParams
 
 # Of localization_node, beside AMCL's: without a meaning for the replay of a log.
 NODE_ONLY = frozenset(
@@ -31,6 +32,7 @@ NODE_ONLY = frozenset(
         "pose_file_max_speed_m_s",
         "panes_file",
         "landmark_file",
+        "publish_wheel_tf",
     ]
 )
 
@@ -50,6 +52,7 @@ class ReplayParams:
     frames: Frames = field(default_factory=Frames)
     start: StartPose = field(default_factory=StartPose)
     deskew: Deskew = field(default_factory=Deskew)
+    wheels: WheelParams = field(default_factory=WheelParams)
     method: Method = field(default_factory=Method)
     localizer: LocalizerParams = field(default_factory=LocalizerParams)
 

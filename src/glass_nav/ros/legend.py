@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import List
+from typing import Any, Callable, List
 
 import rospy
 from sensor_msgs.msg import Image as ImageMsg
@@ -14,12 +14,23 @@ TOPIC = "legend"  # of all nodes: the picture is the same, and rviz shows it whi
 
 
 def publish(map_frame: str, *topics: str) -> List[rospy.Publisher]:
-    """Publish it, latched, on TOPIC and on further topics; the publishers are to be kept."""
-    picture = image_msg(map_frame)
-    publishers = [rospy.Publisher(topic, ImageMsg, queue_size=1, latch=True) for topic in (TOPIC, *topics)]
-    for publisher in publishers:
-        publisher.publish(picture)
-    return publishers
+    """Offer it, latched, on TOPIC and on further topics; the publishers are to be kept."""
+    return [
+        rospy.Publisher(topic, ImageMsg, subscriber_listener=_Drawing(map_frame), queue_size=1, latch=True)
+        for topic in (TOPIC, *topics)
+    ]
+
+
+class _Drawing(rospy.SubscribeListener):
+    """Draws the legend when somebody comes: most robots run without rviz, and drawing loads matplotlib."""
+
+    def __init__(self, map_frame: str) -> None:
+        self._map_frame, self._is_drawn = map_frame, False
+
+    def peer_subscribe(self, _topic: str, publish: Callable[[ImageMsg], Any], _publish_to_it: Any) -> None:
+        if not self._is_drawn:
+            self._is_drawn = True
+            publish(image_msg(self._map_frame))
 
 
 def image_msg(map_frame: str) -> ImageMsg:

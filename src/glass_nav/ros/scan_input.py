@@ -14,7 +14,7 @@ from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.tf_transforms import TfTransforms
 from glass_nav.sensing.deskew import Deskew
 from glass_nav.sensing.range_limits import RangeLimits
-from glass_nav.sensing.scan_placement import ScanPlacement
+from glass_nav.sensing.scan_placement import ScanPlacement, Transforms
 from glass_nav.sensing.scan_queue import ScanQueue
 
 
@@ -28,8 +28,17 @@ class ScanInput(ScanQueue):
         tf: tf2_ros.Buffer,
         log: LogThrottle,
         laser_max_range_m: float = -1.0,
+        transforms: Optional[Transforms] = None,
     ) -> None:
-        self._tf = tf
+        """
+        Args:
+            p, deskew: parameters of the node.
+            tf: where transforms are looked up.
+            log: of the node.
+            laser_max_range_m: where a lidar sets none.
+            transforms: in place of tf's.
+        """
+        self._tf, self._transforms = tf, transforms
         self._limits = RangeLimits(laser_max_range_m)
         super().__init__(self._placement_by_tf(p, deskew), p.transform_wait_s, rospy.get_time(), log.warn)
         self._topics = p.scan_topics or ("scan",)
@@ -67,5 +76,5 @@ class ScanInput(ScanQueue):
         )
 
     def _placement_by_tf(self, p: LocalizationNodeParams, deskew: Deskew) -> ScanPlacement:
-        transforms = TfTransforms(self._tf, p.odom_frame_id, p.base_frame_id)
+        transforms = self._transforms or TfTransforms(self._tf, p.odom_frame_id, p.base_frame_id)
         return ScanPlacement(transforms, deskew.deskew, self._limits)

@@ -60,6 +60,20 @@ class Paths:
     cell: np.ndarray  # int32 flat index of the cell met, -1: none
 
 
+@dataclass(frozen=True)
+class ExpectedPaths:
+    """The four paths along each ray as in Paths, of N poses; of the first pose in more detail."""
+
+    range_m: np.ndarray  # (4, N, B) whole length, inf: none
+    cos_incidence: np.ndarray  # (4, N, B) |u . n| where it ends, 1 where nothing or no normal is
+    thickness_m: np.ndarray  # (4, N, B) float32 of the wall that is met
+    cell: np.ndarray  # (4, N, B) int32 flat index of the cell met, -1: none
+    pane_incidence: np.ndarray  # (1, B) angle to the normal of the first pose's first surface [rad], NaN without one
+    line_m: np.ndarray  # (4, B) range of the first pose by the lines of the walls, half a cell behind the near faces
+    axis_rad: np.ndarray  # (4, B) axes of their normals in map, up to half a turn; NaN: none. Of mirrored ones: image's
+    seen_side: np.ndarray  # (4, B) bool: the surfaces are met from a side that is not unknown
+
+
 class RayCaster:
     """Casts rays on one map. Safe to share between threads."""
 
@@ -186,17 +200,68 @@ class RayCaster:
             ValueError: as cast_surfaces().
         """
         _check_limits(max_thickness_m, min_linearity, min_gap_m)
-        reach_m = np.asarray(reach_m, float)
-        if reach_m.shape != np.shape(angles_rad):
-            raise ValueError(
-                f"ray caster: reach must have the shape of the angles {np.shape(angles_rad)}, got {reach_m.shape}"
-            )
-        if not (np.isfinite(reach_m) & (reach_m > 0.0)).all():
-            raise ValueError(f"ray caster: reach must be finite and > 0 m, got {reach_m.min()} to {reach_m.max()}")
+        reach_m = _checked_reach(reach_m, angles_rad)
         poses, angles_rad = self._checked(poses, angles_rad, 1.0)
         return Paths(
             *self._grid.cast_paths(poses, angles_rad, reach_m, max_thickness_m, min_linearity, min_gap_m, self._threads)
         )
+
+    def expected_paths(
+        self,
+        thickness_m: np.ndarray,
+        poses: np.ndarray,
+        angles_rad: np.ndarray,
+        max_range_m: float,
+        measured_m: np.ndarray,
+        reach_m: np.ndarray,
+        gate_m: float = np.inf,
+        depth_share: float = 1.0,
+        max_thickness_m: float = 0.3,
+        min_linearity: float = 0.9,
+        min_gap_m: float = 0.1,
+        mirrored_by_line: bool = True,
+    ) -> ExpectedPaths:
+        """What beams may measure from poses near the first of them.
+
+        Ranges are as of cast_paths(), but from all poses except the first every other beam passes surfaces without a
+        normal. With a gate, paths that cannot have ended a beam are left out: where the first pose sees nothing
+        along a beam and those beside it that may have ended it, other than the first surface, only that one is cast.
+
+        Args:
+            thickness_m: (H * W,) float32 of the map's walls.
+            poses: (N, 3) in map, N > 0.
+            angles_rad, max_thickness_m, min_linearity, min_gap_m: as for cast_paths().
+            max_range_m: how far to look from the first pose.
+            measured_m: (B,) ranges by REP 117; for the gate.
+            reach_m: (B,) how far to look along each beam from the others.
+            gate_m: across a surface; one that is farther from the end of a beam did not end it. inf: any may have.
+            depth_share: of the drawn thickness of a wall: how deep in it beams end, 0 to 1; for the gate.
+            mirrored_by_line: mirrored ranges are those by the lines of both walls; else all are by their cells.
+
+        Raises:
+            ValueError: as cast_paths(); no pose.
+        """
+        _check_limits(max_thickness_m, min_linearity, min_gap_m)
+        reach_m = _checked_reach(reach_m, angles_rad)
+        poses, angles_rad = self._checked(poses, angles_rad, max_range_m)
+        found = self._grid.expected_ranges(
+            self._grid_map.occupancy,
+            thickness_m,
+            poses,
+            angles_rad,
+            measured_m,
+            reach_m,
+            gate_m,
+            depth_share,
+            max_range_m,
+            max_thickness_m,
+            min_linearity,
+            min_gap_m,
+            mirrored_by_line,
+            float(self._grid_map.map_from_grid[2]),
+            self._threads,
+        )
+        return ExpectedPaths(*found)
 
     def simulate_scan_ray_raw(self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float) -> np.ndarray:
         """As cast(), by MRPT's simulateScanRay as it is, faults included: to be compared with, not to be used."""
@@ -275,6 +340,17 @@ def changed_box(before: GridMap, after: GridMap) -> Tuple[slice, slice]:
     if not len(rows):
         return slice(0, 0), slice(0, 0)
     return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
+def _checked_reach(reach_m: np.ndarray, angles_rad: np.ndarray) -> np.ndarray:
+    reach_m = np.asarray(reach_m, float)
+    if reach_m.shape != np.shape(angles_rad):
+        raise ValueError(
+            f"ray caster: reach must have the shape of the angles {np.shape(angles_rad)}, got {reach_m.shape}"
+        )
+    if not (np.isfinite(reach_m) & (reach_m > 0.0)).all():
+        raise ValueError(f"ray caster: reach must be finite and > 0 m, got {reach_m.min()} to {reach_m.max()}")
+    return reach_m
 
 
 def _mrpt_rays(grid_map: GridMap) -> _grid.FreeRanges:

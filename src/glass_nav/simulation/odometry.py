@@ -14,6 +14,8 @@ import numpy as np
 
 from glass_nav.simulation.robot import moved
 
+WHEEL_RADIUS_M = 0.1
+JOINTS = ("left_wheel_joint", "right_wheel_joint")
 SPIN_S = 0.2  # time until a slipping wheel regains its grip
 DRAWS = 7  # random numbers per step, used or not: the events of one step do not change the others
 
@@ -70,6 +72,7 @@ class Odometry:
                 [[forward, mismatch, 0.0], [-mismatch, forward, 0.0], [mismatch / half_m, 0.0, turn]]
             )
         self.odom_from_base = np.zeros(3)
+        self.rolled_m = np.zeros(2) if kind == "diff" else None  # (2,) as the left and the right wheel count it
         self.velocity = np.zeros(3)  # as reported: forward, left [m/s], turn [rad/s]
         self._spin, self._spin_left_s = np.zeros(3), 0.0  # velocity reported by a spinning wheel, and its time left
 
@@ -93,6 +96,9 @@ class Odometry:
         reported += spun_s * self._spin
         self._spin_left_s -= spun_s
         self.odom_from_base = moved(self.odom_from_base, reported)
+        if self.rolled_m is not None:
+            half_m = 0.5 * p.wheel_base_m * reported[2]
+            self.rolled_m = self.rolled_m + [reported[0] - half_m, reported[0] + half_m]
         self.velocity = reported / dt_s
 
     def _spinning(self, how_far: float, which: float) -> np.ndarray:

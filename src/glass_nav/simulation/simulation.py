@@ -19,7 +19,7 @@ from glass_nav.simulation import lidar, path_follower, turning
 from glass_nav.simulation.building import Building
 from glass_nav.simulation.landmark_scanner import LandmarkScanner, ScannerModel, Turn
 from glass_nav.simulation.lidar import LidarModel, TrueScan
-from glass_nav.simulation.odometry import Odometry, OdometryParams
+from glass_nav.simulation.odometry import WHEEL_RADIUS_M, Odometry, OdometryParams
 from glass_nav.simulation.path_follower import PathFollower, PathFollowerParams
 from glass_nav.simulation.robot import Obstacles, Robot, RobotParams
 
@@ -41,6 +41,7 @@ class OdometrySample:
     stamp_ns: int
     odom_from_base: np.ndarray  # (3,)
     velocity: np.ndarray  # (3,) forward, left [m/s], turn [rad/s]
+    wheels_rad: Optional[np.ndarray] = None  # (2,) how far the left and the right wheel turned; None: it has others
 
 
 @dataclass(frozen=True)
@@ -140,7 +141,9 @@ class Simulation:
     @property
     def reading(self) -> OdometrySample:
         """What the wheels report now."""
-        return OdometrySample(self.stamp_ns, self._wheels.odom_from_base, self._wheels.velocity)
+        rolled_m = self._wheels.rolled_m
+        wheels_rad = None if rolled_m is None else rolled_m / WHEEL_RADIUS_M
+        return OdometrySample(self.stamp_ns, self._wheels.odom_from_base, self._wheels.velocity, wheels_rad)
 
     @property
     def blocked(self) -> bool:

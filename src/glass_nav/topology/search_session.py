@@ -19,12 +19,14 @@ import numpy as np
 
 from glass_nav.log_line import LogLine
 from glass_nav.params import number
+from glass_nav.sensing.scan import Scan
 from glass_nav.topology import frame_relation
 from glass_nav.topology.atlas import atlas_file
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.topology.frame_relation import FrameRelation
 from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search.belief import Belief
 from glass_nav.topology.search.search_estimate import SearchEstimate, TurnChoice
 from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.topology.search.served_explanation import ServedExplanation
@@ -40,7 +42,7 @@ class SessionParams:
 
     check_map: bool = True  # refuse the atlas if another map is served than it was made from
     end_without_atlas: bool = False  # when the atlas is refused, rather than wait for its map
-    judge_by_scans: bool = True  # judge candidates by the scan at a meetpoint, where there are scans and a map
+    judge_by_scans: bool = True  # as use_scans of the search, which has taken its place
     search_at_start: bool = True  # with the first meetpoint; else when asked
     publish_initial_pose: bool = True
     listed_candidates: int = number(1000, 1, 100_000)  # at most, with their poses
@@ -86,6 +88,7 @@ class SearchStatus:
     estimate: Optional[SearchEstimate] = None  # of the search; None before its first meetpoint
     poses: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # (K, 3) map_from_base of the first candidates
     relation: Optional[FrameRelation] = None  # of the frames, if it is CONFIRMED and dead reckoning is known
+    belief: Optional[Belief] = None  # of scans and forest; None: no scan has been evidence yet
 
     @property
     def map_from_base(self) -> Optional[np.ndarray]:
@@ -174,8 +177,19 @@ class SearchSession:
 
     @property
     def uses_scans(self) -> bool:
-        """Whether candidates are judged by the scan of a meetpoint, if it has one."""
-        return self._p.judge_by_scans and self._explanation.has_map
+        """Whether scans are evidence."""
+        return self.takes_scans and self._explanation.has_map
+
+    @property
+    def is_looking(self) -> bool:
+        """Whether scans are of use now."""
+        searching = self._status.state in (SearchState.WAITING, SearchState.SEARCHING, SearchState.TENTATIVE)
+        return searching and self.uses_scans and self._localizer is not None
+
+    @property
+    def takes_scans(self) -> bool:
+        """Whether scans are asked for, with or without a map."""
+        return self._p.judge_by_scans and self._search_params.use_scans and not self._search_params.document
 
     # -- events
 
@@ -204,6 +218,25 @@ class SearchSession:
         self._unpaired_meetpoint = meetpoint
         return self._pair("meetpoint")
 
+    def scan(self, scan: Scan, odom_from_base: np.ndarray) -> List[Decision]:
+        """The robot sees something, wherever it is.
+
+        Args:
+            scan: one revolution of a lidar.
+            odom_from_base: (3,) of the robot by dead reckoning at its stamp.
+        """
+        localizer = self._localizer
+        if localizer is None or not self.is_looking:
+            return []
+        is_new, final = localizer.look(scan, odom_from_base)
+        if final is not None:
+            self._unpaired_meetpoint, self._unpaired_traversal = None, None
+            return self._judge(localizer, final, scan.stamp_ns)
+        if not is_new:
+            return []
+        self._status = replace(self._status, belief=localizer.belief)
+        return [self._status]
+
     def edge_traversal(self, traversal: Traversal, stamp_ns: int) -> List[Decision]:
         """The robot reports an edge that it drove, before or after the meetpoint at its end.
 
@@ -221,7 +254,7 @@ class SearchSession:
             grid_map: it.
             name: for people, as "that of topic /map".
         """
-        if self._p.judge_by_scans:
+        if self.takes_scans:
             self._explanation.take(grid_map)
         if not self._p.check_map:
             return []
@@ -294,8 +327,7 @@ class SearchSession:
                 warning = atlas.check_map(*self._map)
             except AtlasError as err:
                 raise AtlasError(f"{found_at}: {err}") from err
-        scans = (self._explanation.shares, self._explanation) if self._p.judge_by_scans else (None, None)
-        self._localizer = AtlasLocalizer(atlas, self._search_params, *scans)
+        self._localizer = AtlasLocalizer(atlas, self._search_params, self._explanation if self.takes_scans else None)
         text = f"{found_at}: {len(atlas.nodes)} nodes, {len(atlas.edges)} edges"
         return LogLine(f"{text}; it {warning}", logging.WARNING) if warning else LogLine(text)
 
@@ -318,6 +350,8 @@ class SearchSession:
     def _show(self, state: SearchState, reason: str, stamp_ns: int = 0) -> SearchStatus:
         """A state outside of searches: what was known is forgotten."""
         self._unpaired_meetpoint, self._unpaired_traversal = None, None
+        if self._localizer is not None:
+            self._localizer.begin()
         self._status = SearchStatus(state, reason, stamp_ns)
         return self._status
 
@@ -365,7 +399,7 @@ class SearchSession:
         if gives_up:
             estimate = replace(estimate, choice=None)  # nobody is to drive on
         poses = localizer.poses(estimate, self._p.listed_candidates)
-        status = SearchStatus(estimate.state, estimate.reason, stamp_ns, estimate, poses)
+        status = SearchStatus(estimate.state, estimate.reason, stamp_ns, estimate, poses, belief=localizer.belief)
         if status.map_from_base is not None:
             node = localizer.node(estimate)
             relation = frame_relation.of(localizer.atlas, node, status.map_from_base, localizer.environment_from_base)

@@ -116,8 +116,10 @@ def test_where_nothing_is_known_the_truth_is_among_the_places_proposed_and_expla
     building, explanation = office()
     for number, truth in enumerate(PLACES):
         scan = scan_at(building, truth, 20 + number)
-        places = explanation.places(scan, 200)
-        assert places.shape == (200, 3)
+        search = explanation.search(scan, np.zeros(3))
+        while not search.advance():
+            pass
+        places = search.places(np.zeros(3))[:200]
         poses, shares = explanation.fitted(scan, places, 0.5, np.radians(15.0))
         best = poses[shares.argmax()] - truth
         assert np.hypot(*best[:2]) < 0.1 and abs(np.sin(best[2])) < 0.03
@@ -139,5 +141,6 @@ def test_a_pose_slides_no_further_than_is_allowed():
 def test_a_scan_in_which_hardly_a_beam_came_back_proposes_nothing_and_moves_nothing():
     _, explanation = office()
     nothing = Scan(0, np.full(60, np.inf), np.linspace(-2.0, 2.0, 60), 0.1, 25.0, LASER)
-    assert explanation.places(nothing, 10).shape == (0, 3)
+    assert explanation.search(nothing, np.zeros(3)) is None
+    assert explanation.beams(nothing, PLACES, 0.5, 0.5) is None
     np.testing.assert_array_equal(explanation.fitted(nothing, PLACES, 0.5, 0.5)[0], PLACES)

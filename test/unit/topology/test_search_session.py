@@ -7,8 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, List, Optional, Tuple
 
+import made_scans
 import numpy as np
 import pytest
+from made_scans import MadeScans
 
 from glass_nav.geometry import se2
 from glass_nav.sensing.scan import Scan
@@ -496,34 +498,66 @@ def test_a_map_need_not_be_that_of_the_atlas_where_nobody_checks() -> None:
     assert session.status.state == SearchState.WAITING and not session.uses_scans
 
 
-class _Room:
-    """A map whose scans fit nowhere."""
+class _Map(MadeScans):
+    """A served map that explains all scans of a robot that began at (50, 0), half of those of others."""
 
     has_map = False
+
+    def __init__(self) -> None:
+        super().__init__(
+            lambda poses: np.where(np.abs(poses[:, 0] - 50.0) < 20.0, 0.95, 0.5), np.array([[50.0, 0.0, 0.0]])
+        )
 
     def take(self, grid_map: GridMap) -> None:
         self.has_map = True
 
-    def shares(self, scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
-        return np.full(len(map_from_base), 0.1)
 
-    def fitted(self, scan: Scan, map_from_base: np.ndarray, most_m: float, most_rad: float) -> Any:
-        return map_from_base, self.shares(scan, map_from_base)
-
-    def places(self, scan: Scan, most: int) -> np.ndarray:
-        return np.zeros((0, 3))
-
-
-def test_scans_judge_candidates_once_there_is_a_map(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(search_session, "ServedExplanation", _Room)
-    session = SearchSession(example, SessionParams(check_map=False), SearchParams(searches=1))
+def looking(monkeypatch: pytest.MonkeyPatch) -> SearchSession:
+    """A session whose map was served."""
+    monkeypatch.setattr(search_session, "ServedExplanation", _Map)
+    session = SearchSession(example, SessionParams(check_map=False), SearchParams())
     session.start()
-    scan = Scan(T_0, np.ones(3), np.zeros(3), 0.1, 10.0, np.zeros(3))
-    assert not session.uses_scans
-    session.meetpoint(meetpoint(scan=scan))
-    assert len(session.status.estimate.dart) == 6  # nothing to judge by: all that fit the meetpoint
     session.map_served(served("glass_atrium"), "that of topic /map")
-    assert session.uses_scans
+    return session
+
+
+def seen(session: SearchSession, x: float, stamp_ns: int) -> List[Decision]:
+    return session.scan(made_scans.scan(stamp_ns), np.array([x, 0.0, 0.0]))
+
+
+def test_scans_find_the_place_once_there_is_a_map_and_before_the_first_meetpoint(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    session = looking(monkeypatch)
+    assert session.uses_scans and session.is_looking
+    told = [each for k in range(3) for each in seen(session, 0.0, T_0 + k)]
+    assert states(told) == [SearchState.WAITING] and session.status.belief is not None
+    np.testing.assert_allclose(session.status.belief.poses, [[50.0, 0.0, 0.0]])
+    end = [each for k in range(3) for each in seen(session, 1.0 + k, T_0 + 10 + k)]
+    assert kinds(end) == [SearchStatus, LogLine, InitialPose]
+    assert (session.status.state, session.status.stamp_ns) == (SearchState.CONFIRMED, T_0 + 10)
+    assert session.status.estimate is not None and session.status.estimate.depth == 0
+    np.testing.assert_allclose(only(end, InitialPose).map_from_base, [51.0, 0.0, 0.0])
+    assert not session.is_looking and seen(session, 9.0, T_0 + 20) == []
     session.restart()
-    session.meetpoint(meetpoint(scan=scan))
-    assert len(session.status.estimate.dart) == 0
+    assert session.status.belief is None and session.is_looking
+
+
+def test_a_goal_may_succeed_on_the_way_to_a_meetpoint(monkeypatch: pytest.MonkeyPatch) -> None:
+    session = looking(monkeypatch)
+    session.goal(Goal())
+    told = [each for k in range(6) for each in seen(session, max(0.0, k - 2.0), T_0 + k)]
+    assert only(told, GoalEnd).outcome == GoalOutcome.SUCCEEDED
+
+
+def test_without_a_map_or_if_they_are_not_asked_for_scans_are_not_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert not started(check_map=False).is_looking  # the procedure of the document
+    monkeypatch.setattr(search_session, "ServedExplanation", _Map)
+    for session in (
+        SearchSession(example, SessionParams(check_map=False, judge_by_scans=False), SearchParams()),
+        SearchSession(example, SessionParams(check_map=False), SearchParams(use_scans=False)),
+        SearchSession(example, SessionParams(check_map=False, search_at_start=False), SearchParams()),
+    ):
+        session.start()
+        session.map_served(served("glass_atrium"), "that of topic /map")
+        assert not session.is_looking and seen(session, 0.0, T_0) == []

@@ -11,6 +11,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include "expected_ranges.hpp"
 #include "grid_raycaster.hpp"
 #include "scan_matcher.hpp"
 
@@ -140,6 +141,46 @@ py::tuple cast_paths(const GridRaycaster& grid, const Array<double>& poses, cons
   return py::make_tuple(range_m, cos, cell);
 }
 
+py::tuple expected_ranges(const GridRaycaster& grid, const Array<std::int8_t>& occupancy,
+                          const Array<float>& thickness_m, const Array<double>& poses, const Array<double>& angles,
+                          const Array<double>& measured_m, const Array<double>& reach_m, double gate_m,
+                          double depth_share, double max_range_m, double max_thickness_m, double min_linearity,
+                          double min_gap_m, bool mirrored_by_line, double grid_yaw, int threads) {
+  const RayBatch rays = batch_of(poses, angles, max_range_m, threads);
+  if (rays.pose_count < 1) throw std::invalid_argument("poses must be (P, 3), P > 0");
+  if (reach_m.size() != angles.size() || measured_m.size() != angles.size()) {
+    throw std::invalid_argument("measured and reach must be (B,)");
+  }
+  const py::ssize_t cells = static_cast<py::ssize_t>(grid.width()) * grid.height();
+  if (occupancy.size() != cells || thickness_m.size() != cells) {
+    throw std::invalid_argument("occupancy must be (H, W), and thicknesses (H * W,)");
+  }
+  const py::ssize_t paths = kPathCount, beams = angles.shape(0);
+  const std::vector<py::ssize_t> of_samples{paths, poses.shape(0), beams}, of_pose{paths, beams}, of_beams{1, beams};
+  py::array_t<double> range_m(of_samples), cos(of_samples), incidence_rad(of_beams), line_m(of_pose), axis_rad(of_pose);
+  py::array_t<float> thickness_to(of_samples);
+  py::array_t<std::int32_t> cell(of_samples);
+  py::array_t<bool> seen_side(of_pose);
+  const Expectation wanted{rays,
+                           measured_m.data(),
+                           reach_m.data(),
+                           gate_m,
+                           depth_share,
+                           occupancy.data(),
+                           thickness_m.data(),
+                           {max_thickness_m, min_linearity, min_gap_m},
+                           mirrored_by_line,
+                           grid_yaw};
+  const ExpectedArrays out{range_m.mutable_data(),  cos.mutable_data(),           thickness_to.mutable_data(),
+                           cell.mutable_data(),     incidence_rad.mutable_data(), line_m.mutable_data(),
+                           axis_rad.mutable_data(), seen_side.mutable_data()};
+  {
+    py::gil_scoped_release unlocked;
+    expect_ranges(grid, wanted, out);
+  }
+  return py::make_tuple(range_m, cos, thickness_to, cell, incidence_rad, line_m, axis_rad, seen_side);
+}
+
 py::array_t<double> free_ranges(const GridRaycaster& grid, const FreeRanges& rays, const Array<double>& poses,
                                 const Array<double>& angles, double max_range_m) {
   const RayBatch batch = batch_of(poses, angles, max_range_m, 1);
@@ -164,12 +205,11 @@ py::tuple normals(const GridRaycaster& grid) {
   std::fill(angle_to, angle_to + count, std::numeric_limits<float>::quiet_NaN());
   std::fill(linearity_to, linearity_to + count, 0.0F);
   std::fill(offset_to, offset_to + count, std::numeric_limits<float>::quiet_NaN());
-  for (const std::int32_t cell : walls->cells()) {
-    const WallNormals::Normal normal = walls->at(cell);
+  walls->for_each([&](std::int32_t cell, const WallNormals::Normal& normal) {
     angle_to[cell] = std::atan2(normal.y, normal.x);
     linearity_to[cell] = normal.linearity;
     offset_to[cell] = static_cast<float>(normal.offset * grid.resolution_m());
-  }
+  });
   return py::make_tuple(normal_rad, linearity, offset_m);
 }
 
@@ -245,6 +285,10 @@ PYBIND11_MODULE(_grid, module) {
            py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"), py::arg("threads"))
       .def("cast_paths", &cast_paths, py::arg("poses"), py::arg("angles"), py::arg("reach_m"),
            py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"), py::arg("threads"))
+      .def("expected_ranges", &expected_ranges, py::arg("occupancy"), py::arg("thickness_m"), py::arg("poses"),
+           py::arg("angles"), py::arg("measured_m"), py::arg("reach_m"), py::arg("gate_m"), py::arg("depth_share"),
+           py::arg("max_range_m"), py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"),
+           py::arg("mirrored_by_line"), py::arg("grid_yaw"), py::arg("threads"))
       .def("free_ranges", &free_ranges, py::arg("rays"), py::arg("poses"), py::arg("angles"), py::arg("max_range_m"))
       .def("normals", &normals)
       .def("walls_at", &walls_at, py::arg("cell"))

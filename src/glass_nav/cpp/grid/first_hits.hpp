@@ -27,10 +27,11 @@ class FirstHits {
   explicit FirstHits(const GridCells& cells)
       : cells_(cells), marcher_(cells), small_(std::max(cells.width, cells.height) <= kMostCells) {}
 
+  /// @param t_max  t_max(beam): how far to follow a ray
   /// @param rays   next() and at_new_origin(), see RayStream
   /// @param found  found(i, t, cell): once for every i < count, in any order; cell -1: nothing up to t_max
-  template <class Rays, class Found>
-  void along_all(std::size_t count, double t_max, Rays& rays, const Found& found) const {
+  template <class Reach, class Rays, class Found>
+  void along_all(std::size_t count, const Reach& t_max, Rays& rays, const Found& found) const {
     std::array<Lane, kLanes> lanes;  // several rays at a time, for the reasons of ExactRayMarcher
     std::vector<Doubtful> doubtful;
     Origin origin;
@@ -38,14 +39,15 @@ class FirstHits {
     const auto fill = [&](Lane& lane) {  // false if no ray is left
       while (next < count) {
         const bool moved = next == 0 || rays.at_new_origin();
+        const double reach = t_max(rays.beam());
         const Ray ray = rays.next();
         if (moved) origin = origin_of(ray);
         const std::size_t i = next++;
         if (origin.plain) {
-          begin(lane, origin, ray, i);
+          begin(lane, origin, ray, reach, i);
           return true;
         }
-        doubtful.push_back({ray, i});
+        doubtful.push_back({ray, reach, i});
       }
       return false;
     };
@@ -53,17 +55,17 @@ class FirstHits {
     while (busy > 0) {
       for (std::size_t k = 0; k < busy; ++k) {
         Lane& lane = lanes[k];
-        const Step step = advance(lane, t_max);
+        const Step step = advance(lane);
         if (step == Step::on) continue;
         if (step == Step::doubt) {
-          doubtful.push_back({lane.ray, lane.index});
+          doubtful.push_back({lane.ray, lane.t_max, lane.index});
         } else {
           found(lane.index, lane.t, step == Step::hit ? static_cast<std::int32_t>(lane.cell) : -1);
         }
         if (!fill(lane)) lane = lanes[--busy];  // it is processed in the next round
       }
     }
-    decide(doubtful, t_max, found);
+    decide(doubtful, found);
   }
 
  private:
@@ -77,6 +79,7 @@ class FirstHits {
 
   struct Doubtful {
     Ray ray;
+    double t_max;
     std::size_t index;
   };
 
@@ -121,6 +124,7 @@ class FirstHits {
   struct Lane {
     Axis x, y;
     double t;  // where the ray entered the present cell
+    double t_max;
     const std::uint8_t* free_square;
     std::ptrdiff_t cell;                    // flat index of the present cell
     std::ptrdiff_t cell_0, step_x, step_y;  // that of the cell which is (0, 0) after mirroring, and steps from it
@@ -136,12 +140,13 @@ class FirstHits {
     return {{ray.x, cells_.width}, {ray.y, cells_.height}, true};
   }
 
-  void begin(Lane& lane, const Origin& origin, const Ray& ray, std::size_t index) const {
+  void begin(Lane& lane, const Origin& origin, const Ray& ray, double t_max, std::size_t index) const {
     const std::ptrdiff_t width = cells_.width, height = cells_.height;
     const bool minus_x = turned(ray.dx), minus_y = turned(ray.dy);
     lane.x.begin(origin.x, ray.dx, minus_x);
     lane.y.begin(origin.y, ray.dy, minus_y);
     lane.t = 0.0;
+    lane.t_max = t_max;
     lane.free_square = cells_.chessboard_distance->towards(minus_x, minus_y);
     lane.cell = origin.y.cell[0] * width + origin.x.cell[0];
     // Products, not branches: the signs of directions are unpredictable.
@@ -153,7 +158,7 @@ class FirstHits {
   }
 
   /// Checks the present cell and skips ahead.
-  Step advance(Lane& lane, double t_max) const {
+  Step advance(Lane& lane) const {
     const int edge = lane.free_square[lane.cell];
     if (edge == 0) return cells_.occupied(static_cast<std::int32_t>(lane.cell)) ? Step::hit : Step::end;
     lane.t = std::min(lane.x.crossing(edge), lane.y.crossing(edge));
@@ -163,7 +168,7 @@ class FirstHits {
     if (static_cast<std::uint32_t>(x | y) < 2 * kNudge) return Step::doubt;
     lane.x.cell = x >> kPointBits;
     lane.y.cell = y >> kPointBits;
-    if (lane.t > t_max || lane.x.cell >= cells_.width || lane.y.cell >= cells_.height) return Step::end;
+    if (lane.t > lane.t_max || lane.x.cell >= cells_.width || lane.y.cell >= cells_.height) return Step::end;
     lane.cell = lane.cell_0 + lane.x.cell * lane.step_x + lane.y.cell * lane.step_y;
     __builtin_prefetch(lane.free_square + lane.cell);
     return Step::on;
@@ -171,9 +176,9 @@ class FirstHits {
 
   /// Casts the rays that are not plain, from their origins on.
   template <class Found>
-  void decide(const std::vector<Doubtful>& doubtful, double t_max, const Found& found) const {
+  void decide(const std::vector<Doubtful>& doubtful, const Found& found) const {
     const auto start = [&](std::size_t j) {
-      return Search{doubtful[j].ray, GridWalk(doubtful[j].ray, cells_.width, cells_.height, t_max)};
+      return Search{doubtful[j].ray, GridWalk(doubtful[j].ray, cells_.width, cells_.height, doubtful[j].t_max)};
     };
     marcher_.march_all(
         doubtful.size(), start, NothingIgnored{},

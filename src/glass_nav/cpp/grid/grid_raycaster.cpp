@@ -100,7 +100,16 @@ void GridRaycaster::with_ray_marcher(const Use& use) const {
 }
 
 void GridRaycaster::cast_first(const RayBatch& batch, double* range_m, std::int32_t* cell) const {
-  const double t_max = batch.max_range_m / resolution_m_;
+  find_first(batch, [t_max = batch.max_range_m / resolution_m_](std::size_t) { return t_max; }, range_m, cell);
+}
+
+void GridRaycaster::cast_first(const RayBatch& batch, const double* reach_m, double* range_m,
+                               std::int32_t* cell) const {
+  find_first(batch, [&](std::size_t beam) { return reach_m[beam] / resolution_m_; }, range_m, cell);
+}
+
+template <class Reach>
+void GridRaycaster::find_first(const RayBatch& batch, const Reach& t_max, double* range_m, std::int32_t* cell) const {
   const GridCells grid = cells();
   const auto store = [&](std::size_t i, double t, std::int32_t met) {
     range_m[i] = met < 0 ? kInfinity : t * resolution_m_;
@@ -117,8 +126,9 @@ void GridRaycaster::cast_first(const RayBatch& batch, double* range_m, std::int3
   const GuidedRayMarcher marcher(grid, *guide_);
   for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
     const auto start = [&](std::size_t) {
+      const double reach = t_max(rays.beam());
       const Ray ray = rays.next();
-      return Search{ray, GridWalk(ray, grid.width, grid.height, t_max)};
+      return Search{ray, GridWalk(ray, grid.width, grid.height, reach)};
     };
     marcher.march_all(count, start, NothingIgnored{},
                       [&](std::size_t i, const GridWalk& walk, std::int32_t met) { store(first + i, walk.t(), met); });

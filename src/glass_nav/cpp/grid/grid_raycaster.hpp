@@ -71,6 +71,9 @@ class GridRaycaster {
   /// First occupied cell along every ray: range_m inf and cell -1 where there is none. `cell` may be null.
   void cast_first(const RayBatch& batch, double* range_m, std::int32_t* cell) const;
 
+  /// The same; beam b is followed up to reach_m[b].
+  void cast_first(const RayBatch& batch, const double* reach_m, double* range_m, std::int32_t* cell) const;
+
   /// First, second and third surface along every ray, with what lies between.
   void cast_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const SurfaceArrays& out) const;
 
@@ -88,6 +91,8 @@ class GridRaycaster {
   GridCells cells() const;
   template <class Use>
   void with_ray_marcher(const Use& use) const;  // use(GridCells, marcher)
+  template <class Reach>
+  void find_first(const RayBatch& batch, const Reach& t_max, double* range_m, std::int32_t* cell) const;
   template <class Reach, class Store>
   void find_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const Reach& t_max, const Store& store) const;
 

@@ -150,24 +150,20 @@ WallNormals::Normal normal_at(int x, int y, Patch& patch) {
 }  // namespace
 
 template <class NormalAt>
-void WallNormals::collect(const std::vector<std::uint8_t>& boundary, int height, const NormalAt& normal_at) {
-  row_begin_.reserve(height + 1);
-  for (int y = 0; y < height; ++y) {
-    row_begin_.push_back(static_cast<std::int32_t>(cells_.size()));
-    for (int x = 0; x < width_; ++x) {
-      const std::int32_t cell = y * width_ + x;
-      if (boundary[cell] == 0) continue;
-      cells_.push_back(cell);
-      normals_.push_back(normal_at(x, y));
-    }
+void WallNormals::collect(const std::vector<std::uint8_t>& boundary, const NormalAt& normal_at) {
+  boundary_.resize((boundary.size() + kBits - 1) / kBits);
+  for (std::size_t cell = 0; cell < boundary.size(); ++cell) {
+    if (cell % kBits == 0) before_.push_back(static_cast<std::uint32_t>(normals_.size()));
+    if (boundary[cell] == 0) continue;
+    boundary_[cell / kBits] |= std::uint64_t{1} << (cell % kBits);
+    normals_.push_back(normal_at(static_cast<int>(cell % width_), static_cast<int>(cell / width_)));
   }
-  row_begin_.push_back(static_cast<std::int32_t>(cells_.size()));
 }
 
 WallNormals::WallNormals(const std::vector<std::uint8_t>& occupied, int width, int height) : width_(width) {
   const std::vector<std::uint8_t> boundary = boundary_of(occupied, width, height);
   Patch patch(boundary, width, height);
-  collect(boundary, height, [&](int x, int y) { return normal_at(x, y, patch); });
+  collect(boundary, [&](int x, int y) { return normal_at(x, y, patch); });
 }
 
 WallNormals::WallNormals(const std::vector<std::uint8_t>& occupied, int width, int height, const WallNormals& before,
@@ -177,15 +173,15 @@ WallNormals::WallNormals(const std::vector<std::uint8_t>& occupied, int width, i
   const std::vector<std::uint8_t> boundary = boundary_of(occupied, width, height);
   const CellBox near = changed.grown(kReach, kReach, kReach, kReach, width, height);
   Patch patch(boundary, width, height);
-  collect(boundary, height,
+  collect(boundary,
           [&](int x, int y) { return near.contains(x, y) ? normal_at(x, y, patch) : before.at(y * width_ + x); });
 }
 
 WallNormals::Normal WallNormals::at(std::int32_t cell) const {
-  const std::int32_t row = cell / width_;
-  const auto begin = cells_.begin() + row_begin_[row], end = cells_.begin() + row_begin_[row + 1];
-  const auto found = std::lower_bound(begin, end, cell);
-  return found != end && *found == cell ? normals_[found - cells_.begin()] : kNone;
+  const std::size_t word = static_cast<std::size_t>(cell) / kBits;
+  const std::uint64_t bit = std::uint64_t{1} << (static_cast<std::size_t>(cell) % kBits);
+  if ((boundary_[word] & bit) == 0) return kNone;
+  return normals_[before_[word] + __builtin_popcountll(boundary_[word] & (bit - 1))];
 }
 
 }  // namespace glass_nav

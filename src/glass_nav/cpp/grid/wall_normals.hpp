@@ -1,6 +1,7 @@
 /// The normals of the walls of a grid.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -33,18 +34,28 @@ class WallNormals {
   /// Normal of one cell; {NaN, NaN, 0, NaN} for a cell inside a wall or without neighbours.
   Normal at(std::int32_t cell) const;
 
-  /// Flat indices of the boundary cells, ascending.
-  const std::vector<std::int32_t>& cells() const { return cells_; }
+  /// Calls use(flat index, normal) for each boundary cell, ascending.
+  template <class Use>
+  void for_each(const Use& use) const {
+    std::size_t found = 0;
+    for (std::size_t word = 0; word < boundary_.size(); ++word) {
+      for (std::uint64_t bits = boundary_[word]; bits != 0; bits &= bits - 1) {
+        use(static_cast<std::int32_t>(kBits * word) + __builtin_ctzll(bits), normals_[found++]);
+      }
+    }
+  }
 
  private:
-  template <class NormalAt>
-  void collect(const std::vector<std::uint8_t>& boundary, int height, const NormalAt& normal_at);
+  static constexpr std::size_t kBits = 64;
 
-  // Sparse, since one cell in twenty is on a boundary: the cells of row y are cells_[row_begin_[y] .. row_begin_[y+1]].
+  template <class NormalAt>
+  void collect(const std::vector<std::uint8_t>& boundary, const NormalAt& normal_at);
+
+  // One cell in twenty is on a boundary: a bit for each cell, and how many are set in the words before.
   int width_;
-  std::vector<std::int32_t> row_begin_;
-  std::vector<std::int32_t> cells_;
-  std::vector<Normal> normals_;
+  std::vector<std::uint64_t> boundary_;
+  std::vector<std::uint32_t> before_;
+  std::vector<Normal> normals_;  // of the boundary cells, ascending
 };
 
 }  // namespace glass_nav

@@ -99,7 +99,9 @@ class BeamClassifier:
             for_weights: whether particles are weighed by the cases; if not, fewer samples vote.
         """
         samples = preliminary_samples.around(map_from_base, covariance, self._samples(for_weights))
-        behind_m = max(case_votes.reach_m(self.residuals, self._params.vote), glass_map.reach_m(self.residuals))
+        behind_m = case_votes.reach_m(self.residuals, self._params.vote)
+        if for_weights:  # the glass map learns from them, too
+            behind_m = max(behind_m, glass_map.reach_m(self.residuals))
         expected = self._expected(scan, samples, behind_m)
         glass = self.glass_map.chances(expected.cell[[0, 2], 0])
         cases = case_votes.classify(
@@ -181,6 +183,8 @@ class BeamClassifier:
         return replace(samples, sample_count=-(-samples.sample_count // _FEWER_SAMPLES))
 
     def _expected(self, scan: Scan, samples: np.ndarray, behind_m: float) -> ExpectedRanges:
+        vote = self._params.vote
+        on_cells = vote.vote_mode == "paper"  # the document casts on the cells
         return expected_ranges.of(
             self.caster,
             self.thickness_m,
@@ -189,5 +193,7 @@ class BeamClassifier:
             self.max_glass_thickness_m,
             self.min_linearity,
             behind_m,
-            mirrored_by_line=self._params.vote.vote_mode != "paper",  # the document casts on the cells
+            gate_m=np.inf if on_cells else case_votes.gate_m(self.residuals, vote),
+            depth_share=self.residuals.depth_share,
+            mirrored_by_line=not on_cells,
         )

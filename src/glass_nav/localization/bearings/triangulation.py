@@ -18,7 +18,7 @@ from functools import lru_cache
 from typing import List, Optional, Tuple
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from glass_nav.geometry import angles, se2
 from glass_nav.localization.bearings import inscribed_circles
@@ -292,7 +292,7 @@ def _fit(seen: Sightings, pose: np.ndarray) -> Optional[_Fit]:
 @lru_cache(maxsize=64)
 def _chi2_limit(freedom: int, chance: float) -> float:
     """inf without a degree of freedom: three bearings always fit."""
-    return float(stats.chi2.ppf(1.0 - chance, freedom)) if freedom > 0 else float("inf")
+    return float(special.chdtri(freedom, chance)) if freedom > 0 else float("inf")
 
 
 # -- which to believe

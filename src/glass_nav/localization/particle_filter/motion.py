@@ -3,7 +3,9 @@
 Thrun, Burgard, Fox, Probabilistic Robotics (2005), sec. 5.4, table 5.6, as AMCL has it: turning on the
 spot has no first rotation, and driving backwards is not a turn by 180 degrees. In the plain models
 "diff" and "omni" AMCL takes the variance for a standard deviation; its "-corrected" ones do not.
-P particles.
+"wheels" is the glass document's base (seed glass_localization.txt, equations 2 to 4): the increments of its left and right
+wheel, each with its own noise, whose variance grows with the distance that the wheel rolls (Chong, Kleeman, Accurate
+odometry and error modelling for a mobile robot, 1997). P particles.
 """
 
 from __future__ import annotations
@@ -13,16 +15,17 @@ from typing import Tuple
 
 import numpy as np
 
-from glass_nav.geometry import angles, se2
+from glass_nav.geometry import angles, se2, wheel_steps
 from glass_nav.params import choice, number
 
-MODELS = ("diff", "omni", "diff-corrected", "omni-corrected")
+WHEELS = "wheels"
+MODELS = ("diff", "omni", "diff-corrected", "omni-corrected", WHEELS)
 _ON_THE_SPOT_M = 0.01  # below this distance the direction of travel is noise
 
 
 @dataclass(frozen=True)
 class OdometryNoise:
-    """How wrong odometry is; the names and meanings are AMCL's."""
+    """How wrong odometry is; the names and meanings are AMCL's, except those of wheels."""
 
     odom_model_type: str = choice("diff-corrected", MODELS)
     odom_alpha1: float = number(0.02, 0.0, 100.0)  # turn from turn (variance [rad2/rad2] in the corrected models)
@@ -30,14 +33,27 @@ class OdometryNoise:
     odom_alpha3: float = number(0.02, 0.0, 100.0)  # distance from distance [m2/m2]
     odom_alpha4: float = number(0.01, 0.0, 100.0)  # distance from turn [m2/rad2]
     odom_alpha5: float = number(0.02, 0.0, 100.0)  # sideways from distance, omni only [m2/m2]
+    wheel_base_m: float = number(0.4, 0.01, 100.0)  # between the wheels, for wheels and wheel_topics
+    wheel_left_noise_m: float = number(2e-4, 0.0, 100.0)  # variance for each metre that it rolls, wheels only [m2/m]
+    wheel_right_noise_m: float = number(2e-4, 0.0, 100.0)
 
     def __post_init__(self) -> None:
         if self.odom_model_type not in MODELS:
             raise ValueError(f"~odom_model_type must be one of {', '.join(MODELS)}, got {self.odom_model_type!r}")
-        for name in ("odom_alpha1", "odom_alpha2", "odom_alpha3", "odom_alpha4", "odom_alpha5"):
+        for name in (
+            "odom_alpha1",
+            "odom_alpha2",
+            "odom_alpha3",
+            "odom_alpha4",
+            "odom_alpha5",
+            "wheel_left_noise_m",
+            "wheel_right_noise_m",
+        ):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0.0):
                 raise ValueError(f"~{name} must be finite and >= 0, got {value}")
+        if not self.wheel_base_m > 0.0:
+            raise ValueError(f"~wheel_base_m must be > 0 m, got {self.wheel_base_m}")
 
 
 def sample(
@@ -55,7 +71,12 @@ def sample(
         (P, 3) particles after the step.
     """
     count = len(map_from_base)
-    if noise.odom_model_type.startswith("omni"):
+    if noise.odom_model_type == WHEELS:
+        (left_m, right_m, turned), deviations = _wheels(before_from_after, noise)
+        rolled = rng.normal(left_m, deviations[0], count), rng.normal(right_m, deviations[1], count)
+        steps = se2.compose(np.array([0.0, 0.0, turned]), wheel_steps.step_of(*rolled, noise.wheel_base_m))
+        steps[:, 2] -= turned
+    elif noise.odom_model_type.startswith("omni"):
         bearing, mean, deviations = _omni(before_from_after, noise)
         distances, turns, sideways = (rng.normal(m, s, count) for m, s in zip(mean, deviations))
         cos, sin = np.cos(bearing), np.sin(bearing)
@@ -73,7 +94,15 @@ def covariance(before_from_after: np.ndarray, noise: OdometryNoise) -> np.ndarra
     Args:
         before_from_after, noise: as for sample().
     """
-    if noise.odom_model_type.startswith("omni"):
+    if noise.odom_model_type == WHEELS:
+        (left_m, right_m, turned), deviations = _wheels(before_from_after, noise)
+        forward_m, turn = 0.5 * (left_m + right_m), (right_m - left_m) / noise.wheel_base_m
+        cos, sin = np.cos(turned + 0.5 * turn), np.sin(turned + 0.5 * turn)
+        by_forward, by_turn = np.array([cos, sin, 0.0]), np.array([-0.5 * forward_m * sin, 0.5 * forward_m * cos, 1.0])
+        by_error = np.stack(
+            [0.5 * by_forward - by_turn / noise.wheel_base_m, 0.5 * by_forward + by_turn / noise.wheel_base_m], axis=-1
+        )
+    elif noise.odom_model_type.startswith("omni"):
         bearing, _, deviations = _omni(before_from_after, noise)
         cos, sin = np.cos(bearing), np.sin(bearing)
         by_error = np.array([[cos, 0.0, -sin], [sin, 0.0, cos], [0.0, 1.0, 0.0]])  # of distance, turn, sideways
@@ -83,6 +112,12 @@ def covariance(before_from_after: np.ndarray, noise: OdometryNoise) -> np.ndarra
         by_error = np.array([[-distance * sin, cos, 0.0], [distance * cos, sin, 0.0], [1.0, 0.0, 1.0]])
     scaled = by_error * deviations
     return scaled @ scaled.T
+
+
+def _wheels(step: np.ndarray, noise: OdometryNoise) -> Tuple[np.ndarray, np.ndarray]:
+    """Increments left, right [m] and how far their arc is turned [rad] (3,); deviations of the increments (2,) [m]."""
+    increments = np.array(wheel_steps.increments_of(step, noise.wheel_base_m))
+    return increments, np.sqrt(np.abs(increments[:2]) * [noise.wheel_left_noise_m, noise.wheel_right_noise_m])
 
 
 def _deviation(variance: float, noise: OdometryNoise) -> float:

@@ -16,6 +16,7 @@ from glass_nav.ros.landmarks import bearing_messages
 from glass_nav.ros.localization.params import LocalizationNodeParams
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.sensing import bearings
+from glass_nav.sensing.scan_placement import Transforms
 from glass_nav.world import landmark_file, landmark_map
 
 WAITING = 100  # messages that may wait for a scan
@@ -24,12 +25,12 @@ WAITING = 100  # messages that may wait for a scan
 class BearingInput:
     """Stores bearings until a scan that is not older, and logs unusable ones; inactive without ~landmark_file."""
 
-    def __init__(self, p: LocalizationNodeParams, tf: tf2_ros.Buffer, log: LogThrottle) -> None:
+    def __init__(self, p: LocalizationNodeParams, tf: tf2_ros.Buffer, transforms: Transforms, log: LogThrottle) -> None:
         """
         Raises:
             LandmarkError: the landmark file is unusable; one line.
         """
-        self._p, self._tf, self._log = p, tf, log
+        self._p, self._tf, self._transforms, self._log = p, tf, transforms, log
         self._landmarks = landmark_file.load(p.landmark_file) if p.landmark_file else landmark_map.NONE
         self._waiting: Deque[LandmarkBearings] = deque(maxlen=WAITING)
 
@@ -72,14 +73,7 @@ class BearingInput:
         if len(known) < len(msg.ids):
             self._log.warn(f"bearings to landmarks that are not in {self._p.landmark_file} are not used")
         if known:
-            odometry = np.array([self._odom_from_base(bearing.stamp_ns) for bearing in known])
+            odometry = np.array([self._transforms.odom_from_base(bearing.stamp_ns) for bearing in known])
             localizer.add_bearings(
                 bearings.collected(known, odometry, mounting.base_from_laser), self._landmarks, odometry[-1]
             )
-
-    def _odom_from_base(self, stamp_ns: int) -> np.ndarray:
-        return conversions.planar_from_transform(
-            self._tf.lookup_transform(
-                self._p.odom_frame_id, self._p.base_frame_id, conversions.stamp_from_ns(stamp_ns)
-            ).transform
-        )

@@ -4,8 +4,10 @@ Wiring only; the Localizer computes the answer. Callbacks only store, and send t
 
 Subscribes: scan (LaserScan; or each of ~scan_topics), initialpose (PoseWithCovarianceStamped), map (OccupancyGrid, if
     ~use_map_topic), global_localization_area (PolygonStamped in the map's frame: where to search for the robot),
-    landmark_bearings (LandmarkBearings, if ~landmark_file is given), tf odom <- base <- laser.
+    landmark_bearings (LandmarkBearings, if ~landmark_file is given), tf odom <- base <- laser, each of ~wheel_topics
+    (JointState, an array of two numbers, or a number each), in place of tf odom <- base.
 Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseArray, latched), tf map -> odom,
+    tf odom -> base (if ~publish_wheel_tf),
     ~status (LocalizationStatus, latched), ~beam_cases (BeamCases), /diagnostics;
     scan_surfaces (LaserScan): the scan for a costmap, with each beam cut at the first surface of the map that it
     passed or was mirrored at. Stamp, frame and beams are the scan's; its `intensities` are 0 as measured, 1 cut,
@@ -59,6 +61,7 @@ from glass_nav.ros.localization.reconfigure import ReconfigureServer
 from glass_nav.ros.localization.segment_service import SegmentService
 from glass_nav.ros.localization.sender_watch import SenderWatch
 from glass_nav.ros.localization.shown_parameters import ShownParameters
+from glass_nav.ros.localization.wheel_input import WheelTransforms
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
@@ -88,12 +91,14 @@ class LocalizationNode:
         self._next_report_s = 0.0  # by the monotonic clock
 
         self._tf = tf2_ros.Buffer(rospy.Duration(LONGEST_TURN_S) if p.node.landmark_file else None)
-        self._scans = ScanInput(p.node, p.deskew, self._tf, self._log, p.localizer.limits.laser_max_range)
-        self._bearings = BearingInput(p.node, self._tf, self._log)
+        self._wheels = WheelTransforms(p, self._tf, self._log) if p.wheels.wheel_topics else None
+        self._transforms = self._wheels or TfTransforms(self._tf, p.node.odom_frame_id, p.node.base_frame_id)
+        max_range_m = p.localizer.limits.laser_max_range
+        self._scans = ScanInput(p.node, p.deskew, self._tf, self._log, max_range_m, self._transforms)
+        self._bearings = BearingInput(p.node, self._tf, self._transforms, self._log)
         self._maps = MapSource(p.node, self._log, self._use_map)
         self._memory = PoseMemory(p.pose_file, _keep_on_server, lambda line: self._log.warn(line, period_s=60.0))
         self._outputs = Publishers(p.node)
-        self._transforms = TfTransforms(self._tf, p.node.odom_frame_id, p.node.base_frame_id)
         self._session = LocalizationSession(
             p.session,
             self._transforms.odom_from_base,
@@ -117,6 +122,8 @@ class LocalizationNode:
         # Subscribers last: they may fire at once.
         self._listener = tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
         self._sender_watch = SenderWatch(p.node, self._log)
+        if self._wheels is not None:
+            self._wheels.subscribe()
         self._scans.subscribe(self._take_scan)
         self._bearings.subscribe(self._command(self._bearings.receive))
         rospy.Subscriber("initialpose", PoseWithCovarianceStamped, self._command(self._take_guess), queue_size=2)
@@ -248,6 +255,8 @@ class LocalizationNode:
         self._session.reconfigure(p.session)
         self._p = p
         self._scans.reconfigure(p.node, p.deskew, p.localizer.limits.laser_max_range)
+        if self._wheels is not None:
+            self._wheels.reconfigure(p)
         self._outputs.reconfigure(p.node)
         self._health.warn_deviations = p.node.warn_deviations
 
@@ -307,6 +316,8 @@ class LocalizationNode:
         self._scans.restart(self._clock.now_s)
         self._bearings.restart()
         self._tf.clear()
+        if self._wheels is not None:
+            self._wheels.restart()
         self._session.restart(why, self._clock.now_s)
 
     def _report(self) -> None:

@@ -24,6 +24,7 @@ from glass_nav.localization.saved_pose import PoseFile
 from glass_nav.localization.session import SessionParams
 from glass_nav.params import ParamError, number
 from glass_nav.sensing.deskew import Deskew
+from glass_nav.sensing.wheel_odometry import WheelParams
 
 __all__ = ["LocalizationNodeParams", "LocalizationParams", "ParamError", "localization_params"]
 
@@ -40,6 +41,7 @@ class LocalizationNodeParams:
     publish_tf_before_localized: bool = True  # False: map -> odom is published once the state has been LOCALIZED
     transform_tolerance: float = number(0.1, 0.0, 100.0)  # [s] how far ahead of the scan map -> odom is stamped
     transform_wait_s: float = number(1.0, 0.0, 100.0)  # [s] how long a scan waits for odom <- base <- laser
+    publish_wheel_tf: bool = False  # odom -> base as the wheels tell it, with wheel_topics
     use_map_topic: bool = False
     first_map_only: bool = False
     # [Hz] of particlecloud, ~beam_cloud, ~beam_markers; <= 0: no limit
@@ -95,6 +97,7 @@ class LocalizationParams:
     pose_file: PoseFile = field(default_factory=PoseFile)
     panes_file: PanesFilePath = field(default_factory=PanesFilePath)
     deskew: Deskew = field(default_factory=Deskew)
+    wheels: WheelParams = field(default_factory=WheelParams)
     method: Method = field(default_factory=Method)
     localizer: LocalizerParams = field(default_factory=LocalizerParams)
 

@@ -66,7 +66,9 @@ class Publishers:
         self._glass_is_news = True
 
     def send(self, placed: PlacedScan, estimate: Estimate, now_s: float, pose_is_news: bool) -> None:
-        """Publish everything about one scan that was used.
+        """Publish everything about one scan that was used: first what the robot drives by, last what people look at.
+
+        A topic that is not latched costs nothing while nobody listens.
 
         Args:
             placed: the scan.
@@ -76,7 +78,11 @@ class Publishers:
         """
         self._was_localized = self._was_localized or estimate.state == LocalizationState.LOCALIZED
         self.send_transform(estimate.stamp_ns, estimate.map_from_odom)
-        self._surfaces.publish(conversions.surface_scan_msg(placed, estimate.surface_scan))
+        pose_goes_out = estimate.updated or pose_is_news
+        if pose_goes_out:
+            self._poses.publish(conversions.pose_msg(estimate, self._frame))
+        if self._surfaces.get_num_connections():
+            self._surfaces.publish(conversions.surface_scan_msg(placed, estimate.surface_scan))
         self._status.publish(
             conversions.status_msg(
                 estimate.stamp_ns,
@@ -88,10 +94,8 @@ class Publishers:
                 estimate.levels,
             )
         )
-        if estimate.updated or pose_is_news:
-            self._poses.publish(conversions.pose_msg(estimate, self._frame))
-            if self._particles_pace.is_due(now_s, period_s(self._p.gui_publish_rate)) or pose_is_news:
-                self._particles.publish(conversions.pose_array(estimate.stamp_ns, self._frame, estimate.particles))
+        if pose_goes_out and (self._particles_pace.is_due(now_s, period_s(self._p.gui_publish_rate)) or pose_is_news):
+            self._particles.publish(conversions.pose_array(estimate.stamp_ns, self._frame, estimate.particles))
         self._glass_is_news = self._glass_is_news or estimate.updated
         if self._beam_cases.get_num_connections():
             self._beam_cases.publish(conversions.beam_cases_msg(placed.scan, estimate.cases))

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import LaserScan
+from sensor_msgs.msg import JointState, LaserScan
 
 from glass_nav.msg import TrueBeams
 from glass_nav.ros import conversions
 from glass_nav.sensing.scan import Scan
 from glass_nav.simulation.lidar import TrueScan
+from glass_nav.simulation.odometry import JOINTS
 from glass_nav.simulation.simulation import Frame, OdometrySample
 
 START_DEVIATION = np.array([0.1, 0.1, 0.05])  # m, m, rad: of a person who points at the robot on a map
@@ -71,6 +72,12 @@ def odometry_msg(reading: OdometrySample, names: FrameNames) -> Odometry:
     twist = msg.twist.twist
     twist.linear.x, twist.linear.y, twist.angular.z = (float(value) for value in reading.velocity)
     return msg
+
+
+def wheels_msg(stamp_ns: int, wheels_rad: np.ndarray) -> JointState:
+    return JointState(
+        header=conversions.header(stamp_ns, ""), name=list(JOINTS), position=[float(angle) for angle in wheels_rad]
+    )
 
 
 def ground_truth_msg(frame: Frame, names: FrameNames) -> PoseStamped:

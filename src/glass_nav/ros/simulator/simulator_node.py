@@ -27,7 +27,7 @@ import tf2_ros
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import LaserScan
+from sensor_msgs.msg import JointState, LaserScan
 from std_msgs.msg import Bool
 from tf2_msgs.msg import TFMessage
 
@@ -144,6 +144,7 @@ class SimulatorNode:
         self._clock = rospy.Publisher("/clock", Clock, queue_size=100, tcp_nodelay=True)
         self._scans = rospy.Publisher("scan", LaserScan, queue_size=100, tcp_nodelay=True)
         self._odometry = rospy.Publisher("odom", Odometry, queue_size=100, tcp_nodelay=True)
+        self._wheels = rospy.Publisher("joint_states", JointState, queue_size=100, tcp_nodelay=True)
         self._truth = rospy.Publisher("ground_truth", PoseStamped, queue_size=100)
         self._true_beams = rospy.Publisher("true_beams", TrueBeams, queue_size=100)
         self._bearings = rospy.Publisher("landmark_bearings", LandmarkBearings, queue_size=10)
@@ -232,6 +233,8 @@ class SimulatorNode:
             )
         )
         self._odometry.publish(frame_messages.odometry_msg(reading, self._names))
+        if reading.wheels_rad is not None:
+            self._wheels.publish(frame_messages.wheels_msg(reading.stamp_ns, reading.wheels_rad))
         for turn in self._simulation.take_turns():
             self._bearings.publish(
                 bearing_messages.msg_from_bearings(turn.stamp_ns, turn.bearings, self._p.emitter_frame_id)

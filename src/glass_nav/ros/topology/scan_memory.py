@@ -1,4 +1,4 @@
-"""The last scans, placed when they are asked for by the stamp of a meetpoint."""
+"""The last scans, placed when they are asked for: by the stamp of a meetpoint, or the newest."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ from glass_nav.ros import conversions
 from glass_nav.ros.tf_transforms import TfTransforms
 from glass_nav.sensing.range_limits import RangeLimits
 from glass_nav.sensing.scan import Scan, ScanError
-from glass_nav.sensing.scan_placement import NoTransform, RawScan, ScanPlacement
+from glass_nav.sensing.scan_placement import NoTransform, PlacedScan, RawScan, ScanPlacement
 
 _KEPT = 100  # scans
 _MAX_WAIT_S, _POLL_S = 0.5, 0.02  # for a scan or a transform that is still on its way, by the wall clock
 
 
 class ScanMemory:
-    """Subscribes to scan; at() may be called from any thread."""
+    """Subscribes to scan; at() and newest() are for one other thread."""
 
     def __init__(self, odom_frame: str) -> None:
         self._odom_frame = odom_frame
         self._scans: Deque[RawScan] = deque(maxlen=_KEPT)
         self._limits = RangeLimits()
+        self._given_ns = -1  # stamp of the last of newest()
         self._came = threading.Condition()
         self._tf = tf2_ros.Buffer()
         self._listener = tf2_ros.TransformListener(self._tf)
@@ -55,6 +56,27 @@ class ScanMemory:
                 return None, str(err)
             with self._came:
                 self._came.wait(_POLL_S)
+
+    def newest(self, base_frame: str) -> Optional[PlacedScan]:
+        """The newest scan that can be placed, deskewed and with odometry; None: there is none since the last call."""
+        transforms = TfTransforms(self._tf, self._odom_frame, conversions.frame_id(base_frame))
+        placement = ScanPlacement(transforms, limits=self._limits)
+        with self._came:
+            scans = [raw for raw in self._scans if raw.stamp_ns > self._given_ns]
+        for raw in reversed(scans):
+            try:
+                placed = placement.place(raw)
+            except ScanError:  # its transforms are on their way, or it is of no use
+                continue
+            self._given_ns = raw.stamp_ns
+            return placed
+        return None
+
+    def forget(self) -> None:
+        """Time began anew."""
+        with self._came:
+            self._scans.clear()
+        self._given_ns = -1
 
     def _find(self, stamp_ns: int) -> RawScan:
         with self._came:

@@ -4,11 +4,10 @@ Wiring only: SearchSession decides. Callbacks store, one loop works: nothing els
 
 Subscribes: meetpoint (Meetpoint), edge_traversal (EdgeTraversal): of the driver, or by hand; in either order, the
     traversal and the meetpoint at its end belong together. map (OccupancyGrid, if ~check_map): the atlas must be made
-    from it. scan (LaserScan), tf ~odom_frame_id <- frame of the meetpoint <- laser, and map, if ~judge_by_scans:
-    candidates from where the map does not explain the scan of a meetpoint's stamp are ruled out; where meetpoints have
-    odometry, the poses that explain the scans are followed from one meetpoint to the next as well.
+    from it. scan (LaserScan), tf ~odom_frame_id <- ~base_frame_id <- laser, and map, if ~use_scans: scans from
+    anywhere, at meetpoints and between them, are evidence.
 Publishes: turn_choice (TurnChoice): the answer to each meetpoint while there is something to find out;
-    initialpose (PoseWithCovarianceStamped) once when CONFIRMED, with the stamp of the meetpoint;
+    initialpose (PoseWithCovarianceStamped) once when CONFIRMED, with the stamp of the meetpoint or scan;
     ~candidates (TopologyCandidates, latched), ~status (TopologyStatus, latched), ~markers (MarkerArray, latched):
     see topology_displays.py for the namespaces; legend (Image, latched): what the marks in rviz mean.
 Action: localize_globally (LocalizeGlobally): begins a search; feedback is ~status; succeeds when CONFIRMED, is aborted
@@ -67,8 +66,8 @@ class TopologyNode:
     def __init__(self, p: TopologyParams) -> None:
         self._p = p.node
         self._session = SearchSession(self._read_atlas, p.session, p.search)
-        self._scans = ScanMemory(p.node.odom_frame_id) if p.session.judge_by_scans else None
-        self._base_frame = ""  # of the last meetpoint
+        self._scans = ScanMemory(p.node.odom_frame_id) if self._session.takes_scans else None
+        self._base_frame = p.node.base_frame_id  # or that of the last meetpoint
         self._shown_atlas: Optional[Atlas] = None
         self._atlas_markers: List[Marker] = []  # of that atlas
         self._log = LogThrottle()
@@ -102,7 +101,7 @@ class TopologyNode:
             ("edge_traversal", EdgeTraversal, self._take_traversal),
         ):
             rospy.Subscriber(topic, kind, self._put_report, callback_args=take, queue_size=10, tcp_nodelay=True)
-        if p.session.check_map or p.session.judge_by_scans:
+        if p.session.check_map or self._session.takes_scans:
             rospy.Subscriber(
                 "map",
                 OccupancyGrid,
@@ -121,14 +120,25 @@ class TopologyNode:
             mail = self._inbox.take(timeout_s=0.1)
             jump = self._clock.tick()
             if jump is not None:
+                if self._scans is not None:
+                    self._scans.forget()
                 self._carry_out(self._session.time_jumped_back(jump))
             for work in [*mail["commands"], *mail["reports"]]:
                 work()
+            self._look()
             if self._session.is_to_end:
                 ending.wait(LAST_WORDS_S)
                 raise AtlasError(self._session.status.reason)
 
     # -- events
+
+    def _look(self) -> None:
+        """At the newest scan."""
+        if self._scans is None or not self._session.is_looking:
+            return
+        placed = self._scans.newest(self._base_frame)
+        if placed is not None:
+            self._carry_out(self._session.scan(placed.scan, placed.odom_from_base))
 
     def _put_report(self, msg: Any, take: Callable[[Any], None]) -> None:
         self._inbox.put("reports", lambda: take(msg))

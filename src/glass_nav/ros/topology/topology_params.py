@@ -15,12 +15,13 @@ class TopologyNodeParams:
 
     atlas: str = ""  # atlas.json, atlas.npz, the folder of one, or the name of a shipped one
     global_frame_id: str = "map"
-    odom_frame_id: str = "odom"  # of the odometry by which scans are deskewed
+    odom_frame_id: str = "odom"  # of the odometry by which scans are deskewed and poses are followed
+    base_frame_id: str = "base_link"  # of the robot, until a meetpoint names another one
     initial_pose_sigma_m: float = 0.25  # of initialpose
     initial_pose_sigma_rad: float = 0.17  # [rad] 10 degrees
 
     def __post_init__(self) -> None:
-        for name in ("global_frame_id", "odom_frame_id"):
+        for name in ("global_frame_id", "odom_frame_id", "base_frame_id"):
             object.__setattr__(self, name, getattr(self, name).lstrip("/"))
             if not getattr(self, name).strip():
                 raise ValueError(f"~{name} must name a frame, got {getattr(self, name)!r}")

@@ -1,10 +1,10 @@
 """MEETPOINT -> FOREST -> VOTE -> TURN: where in the atlas is a robot that woke up somewhere?
 
-Seed document: global_localization_procedure.txt. `vote_mode: seed` with `confirm_edges: 0` is its procedure: no edge
-angles, no detection errors, done at the first single candidate. Its rule alone claims a place for many robots that are
-not in the atlas at all; the default asks for edges that confirm it, proves ambiguity instead of driving for ever, and
-answers LOST rather than guess. Where there are scans and odometry, poses are followed beside the graph
-(followed_poses.py): they find the robot where the atlas lacks the meetpoints that are there.
+Seed document: global_localization_procedure.txt. `vote_mode: seed` with `confirm_edges: 0` and `use_scans: false` is its
+procedure: no edge angles, no detection errors, done at the first single candidate. Its rule alone claims a place for
+many robots that are not in the atlas at all; the default asks for edges that confirm it, proves ambiguity instead of
+driving for ever, and answers LOST rather than guess. Where there are scans and odometry, scans and forest share one
+belief (joint_belief.py), which finds most robots before their first edge; the forest goes on where places look alike.
 """
 
 from __future__ import annotations
@@ -14,39 +14,33 @@ from typing import List, Optional, Tuple
 
 import numpy as np
 
-from glass_nav.geometry import angles
-from glass_nav.hypotheses.followed_poses import MAX_LEAD, FollowedPoses, MapScans, Standing
+from glass_nav.hypotheses.pose_belief import MapScans
+from glass_nav.sensing.scan import Scan
 from glass_nav.topology.atlas.atlas import Atlas, Visits
 from glass_nav.topology.observations import Meetpoint, Traversal
 from glass_nav.topology.search import learnt_atlas
+from glass_nav.topology.search.belief import Belief
 from glass_nav.topology.search.graph_verdict import GraphVerdict
-from glass_nav.topology.search.matching import Explained, Matcher, poses_at
+from glass_nav.topology.search.joint_belief import JointBelief
+from glass_nav.topology.search.joint_verdict import JointVerdict
+from glass_nav.topology.search.matching import Matcher, poses_at
 from glass_nav.topology.search.passed_edges import PassedEdges
-from glass_nav.topology.search.search_estimate import SearchEstimate, TurnChoice
+from glass_nav.topology.search.search_estimate import SearchEstimate
 from glass_nav.topology.search.search_forest import SearchForest
 from glass_nav.topology.search.search_params import SearchParams
-from glass_nav.vocabulary import SearchState
-
-_AGREE_M, _AGREE_RAD = 0.7, np.radians(20.0)  # a pose of the graph and a followed one are the same place
 
 
 class AtlasLocalizer:
-    """One search at a time: start() and update() with what the robot reports, then drive as the estimate says."""
+    """One search at a time: begin(), then start() and update() with what the robot reports, look() with the scans in
+    between, and drive as the estimate says.
+    """
 
-    def __init__(
-        self,
-        atlas: Atlas,
-        params: SearchParams,
-        explained: Optional[Explained] = None,
-        scans: Optional[MapScans] = None,
-    ) -> None:
+    def __init__(self, atlas: Atlas, params: SearchParams, scans: Optional[MapScans] = None) -> None:
         """
         Args:
             atlas: of the building.
             params: of the search.
-            explained: judges candidates by the scan of a meetpoint, if it has one; not with vote_mode seed.
-            scans: of the map, by which poses are followed where meetpoints have scan and odometry; not with vote_mode
-                seed.
+            scans: of the map: they are evidence where there is odometry; not with vote_mode seed, nor without use_scans.
         """
         self._atlas = atlas
         self._params = params
@@ -55,19 +49,16 @@ class AtlasLocalizer:
             params.tolerances,
             params.use_edge_angles and not params.document,
             None if params.document else params.segments,
-            None if params.document else explained,
-            params.least_explained,
         )
         self._forest = SearchForest(self._matcher, 0 if params.document else params.max_detection_errors)
         self._by_graph = GraphVerdict(self._matcher, self._forest, params)
-        self._followed: Optional[FollowedPoses] = None
-        if scans is not None and params.follow_places > 0 and not params.document:
-            self._followed = FollowedPoses(scans)
         self._passed = PassedEdges()
-        self._seen_places = 0  # by the followed poses, when the last search began
+        self._joint: Optional[JointBelief] = None
+        if scans is not None and params.use_scans and not params.document:
+            self._joint = JointBelief(scans, self._matcher)
+        self._by_both = JointVerdict(self._matcher, self._forest, self._passed, params)
         self._estimate: Optional[SearchEstimate] = None
-        self._edges_before = 0  # driven in searches that ended LOST and were restarted
-        self._search = 1
+        self._edges_before = 0  # driven before the forest began anew
 
     @property
     def atlas(self) -> Atlas:
@@ -91,17 +82,23 @@ class AtlasLocalizer:
         return self._estimate
 
     @property
-    def standing(self) -> Optional[Standing]:
-        """How the best followed pose compares; None: no evidence yet, or no pose is followed."""
-        return None if self._followed is None else self._followed.standing
+    def belief(self) -> Optional[Belief]:
+        """Of scans and forest; None: no scan has been evidence yet."""
+        return None if self._joint is None else self._joint.belief
+
+    def begin(self) -> None:
+        """What was known is forgotten; scans may come before the first meetpoint."""
+        self._estimate, self._edges_before = None, 0
+        if self._joint is not None:
+            self._joint.forget()
 
     def start(self, meetpoint: Meetpoint) -> SearchEstimate:
-        """Begin a search; what was known before is forgotten."""
-        self._edges_before, self._search, self._seen_places = 0, 1, 0
+        """The first meetpoint. Scans since begin() stay what is known."""
+        self._edges_before = 0
         self._passed.begin(meetpoint)
-        if self._followed is not None:
-            self._followed.begin(meetpoint.odom_from_base, meetpoint.scan)
-        return self._begin(meetpoint)
+        self._by_graph.begin()
+        self._forest.begin(meetpoint)
+        return self._judged(meetpoint)
 
     def update(self, traversal: Traversal, meetpoint: Meetpoint) -> SearchEstimate:
         """Take in an edge and the meetpoint at its end.
@@ -111,9 +108,22 @@ class AtlasLocalizer:
         """
         self._forest.step(traversal, meetpoint)
         self._passed.add(traversal.rank, meetpoint, traversal.length_m)
-        if self._followed is not None:
-            self._followed.follow(meetpoint.odom_from_base, meetpoint.scan, traversal.length_m)
-        return self._judged()
+        return self._judged(meetpoint)
+
+    def look(self, scan: Scan, odom_from_base: np.ndarray) -> Tuple[bool, Optional[SearchEstimate]]:
+        """Take in a scan from anywhere, with odometry (3,) at its stamp.
+
+        Returns:
+            Whether the belief is another one now, and the estimate with which the search ends; None: it goes on.
+        """
+        if self._joint is None or not self._joint.see(scan, odom_from_base):
+            return False, None
+        belief = self._joint.belief
+        depth = self._edges_before + max(self._forest.depth, 0) if self._estimate is not None else 0
+        final = None if belief is None else self._by_both.final(belief, depth)
+        if final is not None:
+            self._estimate = final
+        return True, final
 
     def map_from_base(self, dart: np.ndarray) -> np.ndarray:
         """(C, 3) poses of the robot at the last meetpoint if it came along darts (C,).
@@ -136,8 +146,9 @@ class AtlasLocalizer:
 
     @property
     def environment_from_base(self) -> Optional[np.ndarray]:
-        """(3,) dead reckoning at the last meetpoint, if it was reported."""
-        return self._forest.meetpoints[-1].odom_from_base
+        """(3,) dead reckoning where the last estimate holds, if it was reported."""
+        belief = self.belief
+        return self._forest.meetpoints[-1].odom_from_base if belief is None else belief.odom_from_base
 
     def path(self, dart: int) -> np.ndarray:
         """Darts (K,) along the path of a candidate, the reference dart of the first meetpoint first."""
@@ -169,80 +180,17 @@ class AtlasLocalizer:
 
     # -- judgement
 
-    def _begin(self, meetpoint: Meetpoint) -> SearchEstimate:
-        self._by_graph.begin()
-        self._forest.begin(meetpoint)
-        return self._judged()
-
-    def _judged(self) -> SearchEstimate:
-        estimate = replace(self._by_graph.estimate(), depth=self._edges_before + self._forest.depth)
-        standing = self.standing
-        if standing is not None:
-            estimate = self._with_followed(estimate, standing)
-        if estimate.state == SearchState.LOST and self._may_restart():
-            estimate = self._restarted()
-        if self._edges_before and self._followed is not None and estimate.choice is not None:
-            estimate = replace(estimate, choice=self._least_passed(estimate.choice))
+    def _judged(self, meetpoint: Meetpoint) -> SearchEstimate:
+        by_graph = self._by_graph.estimate()
+        estimate = replace(by_graph, depth=self._edges_before + self._forest.depth)
+        if self._joint is not None:
+            self._joint.arrive(meetpoint, self._forest)
+            belief = self._joint.belief
+            if belief is not None:
+                if by_graph.done and not len(by_graph.dart):  # the graph is wrong somewhere: the forest begins anew
+                    self._edges_before += self._forest.depth
+                    self._by_graph.begin()
+                    self._forest.begin(meetpoint)
+                estimate = self._by_both.at_meetpoint(belief, estimate.depth)
         self._estimate = estimate
         return estimate
-
-    def _may_restart(self) -> bool:
-        """Where scans are judged, the meetpoint at which nothing matches may be the first of another search."""
-        judged = self._matcher.judges_scans and self._forest.meetpoints[-1].scan is not None
-        return judged and self._search < self._params.searches and self._forest.depth > 0
-
-    def _restarted(self) -> SearchEstimate:
-        self._search += 1
-        self._edges_before += self._forest.depth
-        begun = self._begin(self._forest.meetpoints[-1])
-        if begun.done:
-            return begun
-        which = f"search {self._search} of {self._params.searches}, as nothing matched any more"
-        return replace(begun, reason=f"{which}: {begun.reason}")
-
-    def _least_passed(self, by_graph: TurnChoice) -> TurnChoice:
-        """Where the graph was wrong once, its vote is not trusted: the edge that was passed least often instead."""
-        times = self._passed.times(self._forest.meetpoints[-1])
-        if times is None or times[by_graph.rank] == times.min():
-            return by_graph
-        least = np.flatnonzero(times == times.min())
-        return TurnChoice(int(least[-1]), by_graph.degree)  # back only if there is no other
-
-    def _with_followed(self, by_graph: SearchEstimate, standing: Standing) -> SearchEstimate:
-        """The estimate by the graph, with the evidence of the followed poses."""
-        least, lead = self._params.least_explained, self._params.follow_lead
-        if standing.share >= least and standing.places > self._seen_places:
-            self._seen_places, self._search = standing.places, 1  # there is progress: searches count from here
-        found = (
-            standing.places >= self._params.follow_places
-            and standing.share >= least
-            and standing.lead >= lead
-            and standing.share_now >= least
-            and standing.lead_now >= -lead
-        )
-        if not found:
-            return by_graph
-        off = self.map_from_base(by_graph.dart) - standing.map_from_base
-        agree = np.flatnonzero(
-            (np.hypot(off[:, 0], off[:, 1]) < _AGREE_M) & (np.abs(angles.wrap(off[:, 2])) < _AGREE_RAD)
-        )
-        if by_graph.state in (SearchState.CONFIRMED, SearchState.AMBIGUOUS):
-            if len(agree):
-                return by_graph
-            return replace(
-                by_graph, state=SearchState.LOST, reason="graph and scans contradict each other", choice=None
-            )
-        next_best = standing.share - min(standing.lead, MAX_LEAD)
-        reason = (
-            f"one pose explains {standing.share:.0%} of the scans of {standing.places} places, the next best "
-            f"{next_best:.0%}{' or less' * (standing.lead > MAX_LEAD)}"
-        )
-        return replace(
-            by_graph,
-            state=SearchState.CONFIRMED,
-            reason=reason,
-            choice=None,
-            dart=by_graph.dart[agree[:1]],
-            errors=by_graph.errors[agree[:1]],
-            map_from_base=standing.map_from_base,
-        )

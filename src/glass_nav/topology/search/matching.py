@@ -11,19 +11,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Callable, Dict, Optional, Tuple
+from typing import Dict, Optional, Tuple
 
 import numpy as np
 
 from glass_nav.geometry import angles, se2
-from glass_nav.sensing.scan import Scan
 from glass_nav.topology.atlas.atlas import Atlas, twin
 from glass_nav.topology.atlas.edge_views import poses_along
 from glass_nav.topology.observations import Meetpoint, Traversal
 from glass_nav.topology.search import edge_segments
 from glass_nav.topology.search.edge_segments import Reach, SegmentTest
 
-_MAX_JUDGED = 2000  # candidates that a scan judges: 0.1 ms each
 _MAX_COMPARED = 100  # candidates whose walls are compared: some milliseconds each
 _VIEW_STEP_M = 0.5  # between viewpoints along an edge
 _REMEMBERED = 64  # traversals whose comparisons are kept
@@ -65,9 +63,6 @@ class Tolerances:
         return self.length_sigma_m + self.length_sigma_share * length_m
 
 
-Explained = Callable[[Scan, np.ndarray], np.ndarray]  # scan, map_from_base (C, 3) -> (C,) share that the map explains
-
-
 class Matcher:
     """The tests of one atlas, with what they need of it by dart."""
 
@@ -77,8 +72,6 @@ class Matcher:
         tolerances: Tolerances,
         use_angles: bool,
         segments: Optional[SegmentTest] = None,
-        explained: Optional[Explained] = None,
-        least_explained: float = 0.0,
     ) -> None:
         """
         Args:
@@ -86,12 +79,7 @@ class Matcher:
             tolerances: of the tests on numbers.
             use_angles: whether directions of edges are evidence.
             segments: the test of walls seen along an edge; None: they are not evidence.
-            explained: judges scans at meetpoints; None: they are not evidence.
-            least_explained: share of a scan that the map must explain from a candidate's pose.
         """
-        self._explained = explained
-        self._least_explained = least_explained
-        self._judged: Dict[int, Tuple[Meetpoint, Dict[int, bool]]] = {}  # by identity of the meetpoint
         self.atlas = atlas
         self._segments = segments if segments is not None and segments.match_segments else None
         self._compared: Dict[int, Tuple[Traversal, Dict[int, bool]]] = {}  # by identity of the traversal
@@ -150,8 +138,7 @@ class Matcher:
         node = node[self._r_fits(node, meetpoint)]
         start = self.atlas.rings.offsets[node]
         dart = self.atlas.rings.values[(start[:, None] + np.arange(meetpoint.degree)).ravel()]
-        dart = np.sort(dart[self._angles_fit(dart, meetpoint)])
-        return dart[self._scan_fits(dart, meetpoint)]
+        return np.sort(dart[self._angles_fit(dart, meetpoint)])
 
     def at(self, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
         """(C,) bool: darts (C,) match the reference edge of the meetpoint."""
@@ -159,7 +146,6 @@ class Matcher:
         fits = self._degree[node] == meetpoint.degree
         fits[fits] = self._r_fits(node[fits], meetpoint)
         fits[fits] = self._angles_fit(dart[fits], meetpoint)
-        fits[fits] = self._scan_fits(dart[fits], meetpoint)
         return fits
 
     @property
@@ -167,27 +153,18 @@ class Matcher:
         """Whether the atlas has nodes that robots usually miss."""
         return bool(self.atlas.visits.usually_missed.any())
 
-    @property
-    def judges_scans(self) -> bool:
-        """Whether scans at meetpoints are evidence."""
-        return self._explained is not None
-
-    def _scan_fits(self, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
-        """(C,) bool: the map explains enough of the scan if darts (C,) are the reference edge.
-
-        All True if there are too many of them.
-        """
-        if self._explained is None or meetpoint.scan is None or not 0 < len(dart) <= _MAX_JUDGED:
-            return np.ones(len(dart), bool)
-        if id(meetpoint) not in self._judged and len(self._judged) >= _REMEMBERED:
-            self._judged.clear()
-        _, known = self._judged.setdefault(id(meetpoint), (meetpoint, {}))
-        new = [each for each in dart.tolist() if each not in known]
-        if new:
-            shares = self._explained(meetpoint.scan, poses_at(self.atlas, np.array(new, np.int64), meetpoint))
-            shares = np.where(np.isnan(shares), 1.0, shares)  # a scan without evidence rules out nothing
-            known.update(zip(new, (shares >= self._least_explained).tolist()))
-        return np.array([known[each] for each in dart.tolist()], bool)
+    def log_likelihood_at(self, dart: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
+        """(C,) log density of the meetpoint if its reference edge is one of darts (C,) that match, up to a constant."""
+        nodes, node = self.atlas.nodes, self.atlas.darts.node[dart]
+        sigma = np.hypot(self.sigma_r_m(meetpoint), nodes.sigma_r_m[node])
+        log_p = -0.5 * ((nodes.r_m[node] - meetpoint.r_m) / sigma) ** 2 - np.log(sigma)
+        if self.use_angles and len(meetpoint.bearings_rad):
+            variance = 2.0 * self.tolerances.bearing_sigma_rad**2
+            bearing, other = self.atlas.darts.bearing_rad, dart
+            for gap in meetpoint.gaps_rad[1:]:
+                other = self._next[other]
+                log_p -= 0.5 * angles.wrap(bearing[dart] - bearing[other] - gap) ** 2 / variance
+        return log_p
 
     def sigma_r_m(self, meetpoint: Optional[Meetpoint] = None) -> float:
         """Of a measured equidistance, without the uncertainty of the atlas."""

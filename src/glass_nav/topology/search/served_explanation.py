@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Optional, Tuple
+from typing import Optional
 
 import numpy as np
 
-from glass_nav.hypotheses.scan_explanation import ScanExplanation
+from glass_nav.hypotheses.place_search import PlaceSearch
+from glass_nav.hypotheses.scan_explanation import BeamsExplained, ScanExplanation
 from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import GridMap
 
@@ -26,20 +27,12 @@ class ServedExplanation:
         """Whether one was served."""
         return self._explanation is not None
 
-    def shares(self, scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
-        """(C,) share of the scan that the map explains from each pose (C, 3); NaN without a map."""
-        if self._explanation is None:
-            return np.full(len(map_from_base), np.nan)
-        return self._explanation.shares(scan, map_from_base)
+    def search(self, scan: Scan, odom_from_base: np.ndarray) -> Optional[PlaceSearch]:
+        """As of ScanExplanation; None without a map."""
+        return None if self._explanation is None else self._explanation.search(scan, odom_from_base)
 
-    def fitted(
-        self, scan: Scan, map_from_base: np.ndarray, most_m: float, most_rad: float
-    ) -> Tuple[np.ndarray, np.ndarray]:
-        """(C, 3) poses moved to where the scan fits best, and (C,) shares; as given and NaN without a map."""
+    def beams(self, scan: Scan, map_from_base: np.ndarray, most_m: float, most_rad: float) -> Optional[BeamsExplained]:
+        """As of ScanExplanation; None without a map."""
         if self._explanation is None:
-            return np.array(map_from_base, float), np.full(len(map_from_base), np.nan)
-        return self._explanation.fitted(scan, map_from_base, most_m, most_rad)
-
-    def places(self, scan: Scan, most: int) -> np.ndarray:
-        """(K, 3) poses where the scan may have been taken; none without a map."""
-        return np.zeros((0, 3)) if self._explanation is None else self._explanation.places(scan, most)
+            return None
+        return self._explanation.beams(scan, map_from_base, most_m, most_rad)

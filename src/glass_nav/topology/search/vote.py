@@ -18,6 +18,8 @@ import numpy as np
 from glass_nav.topology.search.matching import Matcher
 
 _POLLED = 100  # candidates whose expectations are compared pairwise: 2 ms of a step
+_BACK = 0.999  # share of the gain of the way back
+_MIN_GAIN = 0.01  # share of the doubt that a turn must remove to be worth taking
 _EQUAL = 1e-9  # survivors by which two turns differ only by rounding
 
 
@@ -26,7 +28,7 @@ class Vote:
     """The candidates' expectations of each turn."""
 
     ranks: np.ndarray  # (R,)
-    survivors: np.ndarray  # (R,) expected number of candidates left
+    survivors: np.ndarray  # (R,) expected number of candidates left; of expected(): probability outside the first
     length_m: np.ndarray  # (R,) mean length of the edges
     rank: int  # of the turn that won
     splits: bool  # some turn leaves fewer candidates than there are
@@ -54,6 +56,30 @@ def best(matcher: Matcher, dart: np.ndarray) -> Vote:
         order[0],
         bool(survivors[order[0]] < len(dart) - _EQUAL * len(dart)),
     )
+
+
+def expected(matcher: Matcher, dart: np.ndarray, share: np.ndarray) -> Vote:
+    """The turn that is expected to leave the least probability outside the leading place per metre driven.
+
+    Args:
+        matcher: of the atlas.
+        dart: (C,) candidates at a meetpoint of one degree, two or more of them, the likeliest first.
+        share: (C,) probability of each, in any unit.
+    """
+    dart, share = dart[:_POLLED], share[:_POLLED] / share[:_POLLED].sum()
+    degree = int(matcher.atlas.degree[matcher.atlas.darts.node[dart[0]]])
+    now = 1.0 - float(share.max())
+    outside, length = np.zeros(degree), np.zeros(degree)
+    for rank in range(degree):
+        departure = matcher.departures(dart, rank)
+        alike = _alike(matcher, departure)  # the first would not rule out the second
+        left = (alike * share).max(axis=1) / np.maximum(alike @ share, 1e-300)
+        outside[rank] = float(share @ (1.0 - left))
+        length[rank] = float(share @ matcher.length_m[departure >> 1])
+    gain = (now - outside) / length
+    gain[0] *= _BACK  # of equal turns another one
+    rank = int(gain.argmax())
+    return Vote(np.arange(degree), outside, length, rank, bool(now - outside[rank] > _MIN_GAIN * now))
 
 
 def seed(matcher: Matcher, dart: np.ndarray) -> int:

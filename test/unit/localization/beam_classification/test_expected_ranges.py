@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import slow_expected_ranges
 from buildings import BASE_FROM_LASER, CELL_M, Building
 
 from glass_nav.geometry import se2
@@ -383,3 +384,58 @@ def test_what_is_not_met_and_what_lies_at_the_border_of_the_map():
         RayCaster(grid_map), wall_thickness(grid_map), np.array([[3.0, 1.0, 0.0]]), scan, 0.2, 0.9
     )
     assert np.isfinite(outside.range_m[0, 0, 0]) and not outside.seen_side[0, 0]
+
+
+# -- against numpy, and what may be left out
+
+SLANTED = Building(
+    [(0, 0), (9, 1), (8, 7), (-1, 6)],
+    panes=[(3, 0.4, 2.6, 6.2), (5, 0.6, 5.2, 6.5)],
+    walls=[(6, 3, 6, 3), (1, 4, 1.6, 4)],
+)
+SAMPLES = np.array([1.5, 2.0, 0.4]) + np.random.default_rng(1).normal(0.0, 1.0, (9, 3)) * [0.02, 0.02, 0.005]
+BEAMS_RAD = np.radians(np.arange(-135.0, 135.0, 1.0))
+
+
+def of_slanted(how, yaw, **options):
+    """Expected ranges in a building that is turned in the map, and the scan of what is measured there."""
+    grid_map = SLANTED.grid_map()
+    grid_map = GridMap(grid_map.occupancy, grid_map.resolution_m, se2.compose([3.0, -1.0, yaw], grid_map.map_from_grid))
+    caster, samples = RayCaster(grid_map), se2.compose(np.array([3.0, -1.0, yaw]), SAMPLES)
+    hits = caster.cast_surfaces(samples[:1], BEAMS_RAD, 20.0)
+    beam = np.arange(len(BEAMS_RAD))
+    ends = np.stack([hits.first_m, hits.second_m, hits.third_m, hits.mirrored_m])[beam % 4, 0, beam]
+    measured_m = np.where(np.isfinite(ends), ends + 0.03, hits.first_m[0] - 0.5)
+    measured_m[::9] = np.inf
+    scan = Scan(0, measured_m, BEAMS_RAD, 0.1, 20.0, np.zeros(3))
+    return how.of(caster, wall_thickness(grid_map), samples, scan, 0.2, 0.9, **options), measured_m
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7])
+@pytest.mark.parametrize("options", [{}, {"behind_m": 0.6}, {"mirrored_by_line": False}], ids=str)
+def test_without_a_gate_all_is_as_in_numpy(yaw, options):
+    fast, _ = of_slanted(expected_ranges, yaw, **options)
+    slow, _ = of_slanted(slow_expected_ranges, yaw, **options)
+    met = slow.cell >= 0
+    assert met[1:].sum() > 300
+    np.testing.assert_array_equal(fast.cell, slow.cell)
+    np.testing.assert_allclose(fast.range_m, slow.range_m, atol=1e-4)
+    np.testing.assert_allclose(fast.cos_incidence, slow.cos_incidence, atol=1e-5)
+    np.testing.assert_array_equal(fast.thickness_m[met], slow.thickness_m[met])
+    np.testing.assert_allclose(fast.line_m, slow.line_m, atol=1e-4)
+    np.testing.assert_allclose(fast.pane_incidence, slow.pane_incidence, atol=1e-3)
+    np.testing.assert_allclose(np.cos(2.0 * fast.axis_rad), np.cos(2.0 * slow.axis_rad), atol=1e-4)
+    np.testing.assert_array_equal(fast.seen_side, slow.seen_side)
+
+
+def test_what_a_gate_leaves_out_did_not_end_the_beam():
+    gate_m = 0.15
+    (gated, measured_m), (whole, _) = (of_slanted(expected_ranges, 0.3, gate_m=gate) for gate in (gate_m, np.inf))
+    np.testing.assert_array_equal(gated.range_m[:, 0], whole.range_m[:, 0])
+    with np.errstate(invalid="ignore"):
+        across_m = (measured_m - whole.range_m) * np.maximum(whole.cos_incidence, expected_ranges.MIN_COS)
+        may_end = (across_m >= -gate_m) & (across_m <= gate_m)
+    np.testing.assert_array_equal(gated.range_m[may_end], whole.range_m[may_end])
+    left_out = np.isfinite(whole.range_m) & ~np.isfinite(gated.range_m)
+    assert np.count_nonzero(left_out[1:, 1:]) > 0.2 * np.count_nonzero(np.isfinite(whole.range_m[1:, 1:]))
+    assert not np.isfinite(gated.range_m[:, 1:, ~np.isfinite(measured_m)]).any()

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import made_atlases
+import made_scans
 import numpy as np
 import pytest
+from made_scans import MadeScans
 
-from glass_nav.sensing.scan import Scan
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
@@ -219,16 +221,7 @@ def test_the_pose_is_where_the_robot_says_it_stands_at_the_meetpoint() -> None:
     np.testing.assert_allclose(bare, [8.0, 0.0, 0.0], atol=1e-5)
 
 
-SCAN = Scan(0, np.ones(3), np.zeros(3), 0.1, 10.0, np.zeros(3))
-
-
-def west(scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
-    """A judge to whom a scan fits at x < 50 only."""
-    return np.where(map_from_base[:, 0] < 50.0, 0.9, 0.1)
-
-
-def nowhere(scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
-    return np.full(len(map_from_base), 0.1)
+# -- scans
 
 
 def twins() -> Atlas:
@@ -238,183 +231,126 @@ def twins() -> Atlas:
     return made_atlases.corridors(xy, [0.5, 1.3, 1.1, 1.7] * 2, ends)
 
 
-def driven_in_the_first_row(localizer: AtlasLocalizer, scan: "Scan | None") -> "list[Any]":
-    """From its west end east, back and into the side corridor."""
-    told = [localizer.start(Meetpoint(1, 0.5, scan=scan))]
-    for rank, length_m, degree, r_m in ((0, 6.0, 3, 1.3), (2, 8.0, 1, 1.1), (0, 8.0, 3, 1.3)):
+ROW = (  # rank, length, r, x at its end, bearings there
+    (0, 6.0, 1.3, 6.0, [np.pi, 0.5 * np.pi, 0.0]),
+    (2, 8.0, 1.1, 14.0, [np.pi]),
+    (0, 8.0, 1.3, 6.0, [np.pi, 0.0, -0.5 * np.pi]),
+)
+
+
+def share_at(begins_at: float, there: float = 0.95, elsewhere: float = 0.5) -> MadeScans:
+    """Scans that the map explains in the row of twins() that begins at x; a search proposes both rows."""
+    starts = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]])
+    return MadeScans(lambda poses: np.where(np.abs(poses[:, 0] - begins_at) < 20.0, there, elsewhere), starts)
+
+
+def driven_in_the_first_row(localizer: AtlasLocalizer, scans: "MadeScans | None") -> "list[Any]":
+    """From its west end east, back and into the side corridor; a scan comes each metre if there are any."""
+    localizer.begin()
+    stamp_ns, x, heading, told = 1, 0.0, 0.0, []
+
+    def look() -> "Any | None":
+        nonlocal stamp_ns
+        for _ in range(3):
+            stamp_ns += 1
+            final = localizer.look(made_scans.scan(stamp_ns), np.array([x, 0.0, heading]))[1]
+            if final is not None:
+                return final
+        return None
+
+    def meetpoint(r_m: float, bearings_rad: "list[float]") -> Meetpoint:
+        odom = None if scans is None else np.array([x, 0.0, heading])
+        return Meetpoint(
+            len(bearings_rad), r_m, bearings_rad=np.array(bearings_rad), stamp_ns=stamp_ns, odom_from_base=odom
+        )
+
+    if scans is not None:
+        look()
+    told.append(localizer.start(meetpoint(0.5, [0.0])))
+    for rank, length_m, r_m, to_x, bearings_rad in ROW:
+        heading = 0.0 if to_x > x else np.pi
+        while abs(to_x - x) > 1e-9 and not told[-1].done:
+            x += float(np.clip(to_x - x, -1.0, 1.0))
+            final = look() if scans is not None else None
+            told += [] if final is None else [final]
         if told[-1].done:
             break
-        told.append(localizer.update(Traversal(rank, length_m, length_m), Meetpoint(degree, r_m, scan=scan)))
+        told.append(localizer.update(Traversal(rank, length_m, length_m), meetpoint(r_m, bearings_rad)))
     return told
 
 
-def test_what_nothing_else_can_tell_apart_scans_do() -> None:
+def test_what_nothing_else_can_tell_apart_scans_do_and_before_the_first_edge() -> None:
     plain = driven_in_the_first_row(AtlasLocalizer(twins(), SearchParams(use_edge_angles=False)), None)
     assert [len(each.dart) for each in plain][:2] == [2, 2] and plain[-1].state != SearchState.CONFIRMED
-    judged = driven_in_the_first_row(AtlasLocalizer(twins(), SearchParams(use_edge_angles=False), west), SCAN)
-    assert {len(each.dart) for each in judged} == {1}
-    assert judged[0].state == SearchState.TENTATIVE and judged[-1].state == SearchState.CONFIRMED
+    scans = share_at(0.0)
+    localizer = AtlasLocalizer(twins(), SearchParams(use_edge_angles=False), scans)
+    judged = driven_in_the_first_row(localizer, scans)
+    assert judged[0].state in (SearchState.TENTATIVE, SearchState.SEARCHING)
+    assert (judged[-1].state, judged[-1].depth, judged[-1].choice) == (SearchState.CONFIRMED, 0, None)
+    assert judged[-1].reason.startswith("the best place has over 99.9 % of the probability; it explains 9")
+    assert localizer.belief is not None
+    np.testing.assert_allclose(localizer.poses(judged[-1]), localizer.belief.poses[:1])
+    assert np.hypot(*localizer.poses(judged[-1])[0, :2]) < 6.0
+    localizer.count_visits(localizer.atlas.visits)  # no edge was driven
 
 
-def test_without_scans_a_judge_changes_nothing() -> None:
+def test_places_that_look_alike_stay_both() -> None:
+    both = MadeScans(lambda poses: np.full(len(poses), 0.95), np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]]))
+    localizer = AtlasLocalizer(twins(), SearchParams(use_edge_angles=False), both)
+    told = driven_in_the_first_row(localizer, both)
+    assert all(each.state == SearchState.SEARCHING and len(each.dart) == 2 for each in told)
+    belief = localizer.belief
+    assert belief is not None and belief.elsewhere < 0.001
+    np.testing.assert_allclose(belief.share[:2], belief.share[0])
+    assert sorted(belief.dart[:2].tolist()) == sorted(told[-1].dart.tolist())
+    assert localizer.update(Traversal(1, 5.0, 5.0), Meetpoint(1, 1.7)).state != SearchState.CONFIRMED  # no odometry
+
+
+def test_a_robot_of_another_building_is_lost() -> None:
+    nowhere = share_at(-1000.0, elsewhere=0.2)
+    localizer = AtlasLocalizer(twins(), SearchParams(use_edge_angles=False), nowhere)
+    told = driven_in_the_first_row(localizer, nowhere)
+    assert told[-1].state == SearchState.LOST and told[-1].choice is None and len(told[-1].dart) == 0
+    assert told[-1].reason.startswith("no place of the map explains what was seen: the best one ")
+
+
+def test_where_the_graph_is_wrong_the_belief_stays() -> None:
+    """Meetpoints that no atlas has, in a row, and a map that explains the scans a little better than by chance."""
+    scans = share_at(0.0, there=0.75, elsewhere=0.3)
+    localizer = AtlasLocalizer(twins(), SearchParams(max_detection_errors=0), scans)
+    localizer.begin()
+    for stamp_ns in (1, 2, 3):
+        localizer.look(made_scans.scan(stamp_ns), np.zeros(3))
+    unknown = Meetpoint(4, 2.7, stamp_ns=3, odom_from_base=np.zeros(3))
+    told = [localizer.start(unknown)]
+    for number in (1, 2):
+        odom = np.array([3.0 * number, 0.0, 0.0])
+        told.append(
+            localizer.update(Traversal(2, 3.0, 3.0), replace(unknown, stamp_ns=3 + number, odom_from_base=odom))
+        )
+    assert {each.state for each in told} == {SearchState.TENTATIVE} and [each.depth for each in told] == [0, 1, 2]
+    assert localizer.forest.depth == 0  # it began anew where nothing matched
+    belief = localizer.belief
+    assert belief is not None and set(belief.dart.tolist()) == {-1}
+    assert -1.9 * 1.5 < belief.graph_nats[0] < -1.9  # what one thing that was moved does counts once
+
+
+def test_without_scans_or_if_they_are_not_to_be_used_nothing_changes() -> None:
     plain = driven_in_the_first_row(AtlasLocalizer(twins(), SearchParams()), None)
-    for judge, scan in ((nowhere, None), (None, SCAN)):
-        other = driven_in_the_first_row(AtlasLocalizer(twins(), SearchParams(), judge), scan)
+    scans = share_at(0.0)
+    for params, looks in ((SearchParams(), None), (SearchParams(use_scans=False), scans)):
+        localizer = AtlasLocalizer(twins(), params, scans)
+        other = driven_in_the_first_row(localizer, looks)
+        assert localizer.belief is None
         assert [(each.state, each.reason, each.depth, each.dart.tolist()) for each in other] == [
             (each.state, each.reason, each.depth, each.dart.tolist()) for each in plain
         ]
 
 
 def test_the_procedure_of_the_document_asks_no_scans() -> None:
-    localizer = AtlasLocalizer(example(), DOCUMENT, nowhere)
-    assert localizer.start(Meetpoint(3, 1.5, scan=SCAN)).state == SearchState.SEARCHING and nodes(localizer) == [0, 1]
-    assert localizer.update(Traversal(0, 30.0, 30.0), Meetpoint(3, 1.5, scan=SCAN)).state == SearchState.LOST
-
-
-def test_where_nothing_fits_any_more_the_search_begins_anew_and_counts_on() -> None:
-    localizer = AtlasLocalizer(twins(), SearchParams(max_detection_errors=0, searches=3), west)
-    told = [localizer.start(Meetpoint(1, 0.5, scan=SCAN))]
-    wrong = Traversal(0, 30.0, 30.0)  # no edge is so long
-    told.append(localizer.update(wrong, Meetpoint(3, 1.3, scan=SCAN)))
-    assert told[-1].state != SearchState.LOST and told[-1].depth == 1
-    assert told[-1].reason.startswith("search 2 of 3, as nothing matched any more: ")
-    assert nodes(localizer) == [1] and localizer.forest.depth == 0
-    told.append(localizer.update(Traversal(0, 6.0, 6.0), Meetpoint(1, 0.5, scan=SCAN)))  # goes on with what it is
-    assert told[-1].depth == 2 and "search" not in told[-1].reason.split(":")[0] and nodes(localizer) == [0]
-    told.append(localizer.update(wrong, Meetpoint(3, 1.3, scan=SCAN)))
-    assert told[-1].reason.startswith("search 3 of 3, ") and told[-1].depth == 3
-    told.append(localizer.update(Traversal(0, 31.0, 31.0), Meetpoint(1, 0.5, scan=SCAN)))
-    assert told[-1].state == SearchState.LOST and told[-1].choice is None and told[-1].depth == 4
-    assert localizer.start(Meetpoint(1, 0.5, scan=SCAN)).depth == 0  # all is new
-    assert localizer.update(wrong, Meetpoint(3, 1.3, scan=SCAN)).reason.startswith("search 2 of 3, ")
-
-
-def test_a_robot_that_fits_nowhere_at_once_is_lost_and_without_scans_there_is_one_search() -> None:
-    params = SearchParams(max_detection_errors=0, searches=3)
-    assert AtlasLocalizer(twins(), params, nowhere).start(Meetpoint(1, 0.5, scan=SCAN)).state == SearchState.LOST
-    localizer = AtlasLocalizer(twins(), params, west)
-    localizer.start(Meetpoint(1, 0.5))
-    assert localizer.update(Traversal(0, 30.0, 30.0), Meetpoint(3, 1.3)).state == SearchState.LOST
-    single = AtlasLocalizer(twins(), SearchParams(max_detection_errors=0, searches=1), west)
-    single.start(Meetpoint(1, 0.5, scan=SCAN))
-    assert single.update(Traversal(0, 30.0, 30.0), Meetpoint(3, 1.3, scan=SCAN)).state == SearchState.LOST
-
-
-# -- poses that are followed by scans
-
-
-class OnePlace:
-    """A map from which scans are explained at one pose only: where odometry, begun at (x, y), has the robot."""
-
-    def __init__(self, x: float, y: float, elsewhere: float = 0.65, here: float = 0.9) -> None:
-        self._start, self._elsewhere, self._here = np.array([x, y]), elsewhere, here
-        self.odom_m = np.zeros(2)  # of the robot
-
-    def places(self, scan: Scan, most: int) -> np.ndarray:
-        return np.array([[*(self._start + self.odom_m), 0.0], [*(self._start + self.odom_m + 30.0), 0.0]])
-
-    def fitted(
-        self, scan: Scan, map_from_base: np.ndarray, most_m: float, most_rad: float
-    ) -> "tuple[np.ndarray, np.ndarray]":
-        off = np.hypot(*(map_from_base[:, :2] - self._start - self.odom_m).T)
-        return map_from_base, np.where(off < 0.1, self._here, self._elsewhere)
-
-
-def wander(localizer: AtlasLocalizer, world: OnePlace, edges: int = 8, places: int = 100) -> "list[Any]":
-    """Between places in a row, along edges that no atlas of ours has, until the search is over."""
-
-    def meetpoint() -> Meetpoint:
-        behind_left_on = np.array([np.pi, np.pi / 2, 0.0])
-        return Meetpoint(3, 2.7, bearings_rad=behind_left_on, scan=SCAN, odom_from_base=np.array([*world.odom_m, 0.0]))
-
-    told = [localizer.start(meetpoint())]
-    for number in range(1, edges + 1):
-        if told[-1].done:
-            break
-        world.odom_m = np.array([3.1 * (number % places), 0.0])
-        told.append(localizer.update(Traversal(2, 3.1, 3.1), meetpoint()))
-    return told
-
-
-def test_where_the_atlas_has_nothing_like_it_the_scans_of_four_places_say_where_the_robot_is() -> None:
-    world = OnePlace(3.0, 4.0)
-    localizer = AtlasLocalizer(twins(), SearchParams(), west, world)
-    told = wander(localizer, world)
-    assert [each.state for each in told[:-1]] == [SearchState.SEARCHING] * 3 and told[-1].state == SearchState.CONFIRMED
-    assert told[-1].reason == "one pose explains 90% of the scans of 4 places, the next best 65%"
-    assert told[-1].choice is None and len(told[-1].dart) == 0
-    np.testing.assert_allclose(localizer.poses(told[-1]), [[3.0 + 3 * 3.1, 4.0, 0.0]])
-    localizer.count_visits(localizer.atlas.visits)  # it has none of these edges
-    assert localizer.atlas.visits.node_count.sum() == 0
-
-
-@pytest.mark.parametrize(
-    "params, world",
-    [
-        (SearchParams(follow_places=0), OnePlace(3.0, 4.0)),
-        (SearchParams(follow_lead=0.3), OnePlace(3.0, 4.0)),
-        (SearchParams(), OnePlace(3.0, 4.0, elsewhere=0.8)),
-        (SearchParams(), OnePlace(3.0, 4.0, elsewhere=0.3, here=0.55)),
-    ],
-    ids=["not asked for", "not enough ahead", "others explain as much", "none explains enough"],
-)
-def test_who_is_nowhere_ahead_is_lost_at_last(params: SearchParams, world: OnePlace) -> None:
-    told = wander(AtlasLocalizer(twins(), params, west, world), world, edges=60, places=6)
-    assert told[-1].state == SearchState.LOST and told[-1].depth < 60
-
-
-def test_searches_count_from_the_last_new_place_while_a_pose_explains_the_scans() -> None:
-    world = OnePlace(3.0, 4.0, elsewhere=0.8)  # the other is as good but for 0.1: too little
-    once = wander(AtlasLocalizer(twins(), SearchParams(searches=2), west, world), world, edges=40)
-    assert once[-1].state == SearchState.SEARCHING  # each meetpoint is a new place
-    nothing = OnePlace(3.0, 4.0, elsewhere=0.3, here=0.5)
-    given_up = wander(AtlasLocalizer(twins(), SearchParams(searches=2), west, nothing), nothing, edges=40)
-    assert given_up[-1].state == SearchState.LOST and given_up[-1].depth < 10
-
-
-def test_the_procedure_of_the_document_follows_no_poses() -> None:
-    world = OnePlace(3.0, 4.0)
-    localizer = AtlasLocalizer(twins(), DOCUMENT, west, world)
-    assert wander(localizer, world)[-1].state == SearchState.LOST and localizer.standing is None
-
-
-def followed_in_the_first_row(x: float) -> "list[Any]":
-    """As driven_in_the_first_row(), with odometry; scans say that it began at x."""
-    world = OnePlace(x, 0.0)
-    localizer = AtlasLocalizer(twins(), SearchParams(use_edge_angles=False, follow_places=2), west, world)
-    told = [localizer.start(Meetpoint(1, 0.5, scan=SCAN, odom_from_base=np.zeros(3)))]
-    for rank, length_m, degree, r_m, east_m in ((0, 6.0, 3, 1.3, 6.0), (2, 8.0, 1, 1.1, 14.0), (0, 8.0, 3, 1.3, 6.0)):
-        if told[-1].done:
-            break
-        world.odom_m = np.array([east_m, 0.0])
-        told.append(
-            localizer.update(
-                Traversal(rank, length_m, length_m),
-                Meetpoint(degree, r_m, scan=SCAN, odom_from_base=np.array([east_m, 0.0, 0.0])),
-            )
-        )
-    return told
-
-
-def test_where_graph_and_scans_agree_the_place_of_the_atlas_is_told_with_the_pose_of_the_scans() -> None:
-    told = followed_in_the_first_row(0.0)
-    assert [each.state for each in told] == [SearchState.TENTATIVE, SearchState.CONFIRMED]
-    assert told[-1].map_from_base is not None
-    np.testing.assert_allclose(told[-1].map_from_base, [6.0, 0.0, 0.0], atol=1e-6)
-    assert len(told[-1].dart) == 1
-
-
-def test_where_graph_and_scans_contradict_each_other_the_robot_is_not_told_a_place() -> None:
-    world = OnePlace(20.0, 0.0)
-    localizer = AtlasLocalizer(twins(), SearchParams(use_edge_angles=False, follow_places=3, searches=1), west, world)
-    told = [localizer.start(Meetpoint(1, 0.5, scan=SCAN, odom_from_base=np.zeros(3)))]
-    for rank, length_m, degree, r_m, east_m in ((0, 6.0, 3, 1.3, 6.0), (2, 8.0, 1, 1.1, 14.0)):
-        world.odom_m = np.array([east_m, 0.0])
-        told.append(
-            localizer.update(
-                Traversal(rank, length_m, length_m),
-                Meetpoint(degree, r_m, scan=SCAN, odom_from_base=np.array([east_m, 0.0, 0.0])),
-            )
-        )
-    assert [each.state for each in told[:2]] == [SearchState.TENTATIVE] * 2
-    assert (told[-1].state, told[-1].reason) == (SearchState.LOST, "graph and scans contradict each other")
+    scans = share_at(0.0)
+    localizer = AtlasLocalizer(example(), DOCUMENT, scans)
+    assert localizer.look(made_scans.scan(1), np.zeros(3)) == (False, None)
+    assert localizer.start(Meetpoint(3, 1.5, scan=made_scans.scan(1))).state == SearchState.SEARCHING
+    assert nodes(localizer) == [0, 1] and scans.judged == 0
+    assert localizer.update(Traversal(0, 30.0, 30.0), Meetpoint(3, 1.5)).state == SearchState.LOST

@@ -8,9 +8,7 @@ import made_atlases
 import numpy as np
 import pytest
 
-from glass_nav.sensing.scan import Scan
 from glass_nav.topology.observations import Meetpoint, Traversal
-from glass_nav.topology.search import matching
 from glass_nav.topology.search.matching import Matcher, Tolerances, poses_at
 
 
@@ -151,69 +149,6 @@ def test_what_is_alike_is_what_a_robot_without_errors_would_not_rule_out() -> No
         end = Meetpoint(len(atlas.rings[node]), float(atlas.nodes.r_m[node]))
         along = np.isin(darts, matcher.edges_along(darts, seen))
         np.testing.assert_array_equal(matcher.alike_along(np.array(first), darts), along & matcher.at(darts ^ 1, end))
-
-
-SCAN = Scan(0, np.ones(3), np.zeros(3), 0.1, 10.0, np.zeros(3))
-ROW = [(0.0, 0.0), (6.0, 0.0), (12.0, 0.0), (18.0, 0.0)]
-
-
-class Judge:
-    """Explains half of a scan at places west of x, nothing elsewhere; keeps what it was asked."""
-
-    def __init__(self, west_of_m: float, share: float = 0.5) -> None:
-        self.west_of_m, self.share = west_of_m, share
-        self.asked: "list[np.ndarray]" = []
-
-    def __call__(self, scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
-        assert scan is SCAN
-        self.asked.append(map_from_base)
-        return np.where(map_from_base[:, 0] < self.west_of_m, self.share, 0.0)
-
-
-def judged(judge: Judge, least: float = 0.5) -> Matcher:
-    atlas = made_atlases.corridors(ROW, [1.0] * 4, [(0, 1), (1, 2), (2, 3)])
-    return Matcher(atlas, Tolerances(), use_angles=True, explained=judge, least_explained=least)
-
-
-def test_places_that_do_not_explain_the_scan_are_ruled_out() -> None:
-    judge = Judge(west_of_m=9.0)
-    matcher = judged(judge)
-    seen = Meetpoint(2, 1.0, scan=SCAN)
-    assert matcher.judges_scans
-    assert matcher.all_at(seen).tolist() == [1, 2]  # at (6, 0); those at (12, 0) explain nothing
-    np.testing.assert_allclose(judge.asked[0], poses_at(matcher.atlas, np.array([1, 2, 3, 4]), seen))
-    assert matcher.at(np.array([1, 2, 3, 4]), seen).tolist() == [True, True, False, False]
-    assert matcher.at(np.array([0, 5]), seen).tolist() == [False, False]  # of another degree: not asked
-    assert sum(len(each) for each in judge.asked) == 4  # each once
-    assert len(judged(Judge(9.0), least=0.51).all_at(seen)) == 0
-
-
-def test_each_meetpoint_is_judged_by_its_own_scan_and_old_ones_are_forgotten() -> None:
-    judge = Judge(west_of_m=9.0)
-    matcher = judged(judge)
-    meetpoints = [Meetpoint(2, 1.0, scan=SCAN, stamp_ns=k) for k in range(80)]
-    for seen in meetpoints:
-        assert matcher.all_at(seen).tolist() == [1, 2]
-    assert len(judge.asked) == 80
-    assert matcher.all_at(meetpoints[-1]).tolist() == [1, 2] and len(judge.asked) == 80
-    assert matcher.all_at(meetpoints[0]).tolist() == [1, 2] and len(judge.asked) == 81
-
-
-def test_a_scan_that_says_nothing_rules_out_nobody() -> None:
-    matcher = judged(Judge(west_of_m=99.0, share=math.nan))
-    assert matcher.all_at(Meetpoint(2, 1.0, scan=SCAN)).tolist() == [1, 2, 3, 4]
-
-
-def test_without_a_scan_or_a_judge_or_of_too_many_nothing_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
-    judge = Judge(west_of_m=9.0)
-    matcher = judged(judge)
-    assert matcher.all_at(Meetpoint(2, 1.0)).tolist() == [1, 2, 3, 4]
-    blind = Matcher(matcher.atlas, Tolerances(), use_angles=True)
-    assert blind.all_at(Meetpoint(2, 1.0, scan=SCAN)).tolist() == [1, 2, 3, 4] and not blind.judges_scans
-    assert matcher.all_at(Meetpoint(4, 1.0, scan=SCAN)).tolist() == []  # no such place
-    monkeypatch.setattr(matching, "_MAX_JUDGED", 3)
-    assert matcher.all_at(Meetpoint(2, 1.0, scan=SCAN)).tolist() == [1, 2, 3, 4]
-    assert judge.asked == []
 
 
 def test_a_candidate_stands_where_its_meetpoint_and_the_edge_behind_it_say() -> None:

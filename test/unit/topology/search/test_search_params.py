@@ -19,10 +19,6 @@ def test_the_procedure_of_the_document_is_asked_for_by_its_vote() -> None:
         ({"max_detection_errors": 3}, "~max_detection_errors must be 0, 1 or 2, got 3"),
         ({"least_explained": 1.0}, "~least_explained must be in [0, 1), got 1.0"),
         ({"least_explained": float("nan")}, "~least_explained must be in [0, 1), got nan"),
-        ({"searches": 0}, "~searches must be >= 1, got 0"),
-        ({"follow_places": -1}, "~follow_places must be >= 0, got -1"),
-        ({"follow_lead": 0.0}, "~follow_lead must be in (0, 0.3], got 0.0"),
-        ({"follow_lead": float("nan")}, "~follow_lead must be in (0, 0.3], got nan"),
     ],
 )
 def test_parameters_that_mean_nothing_are_refused(fields: Dict[str, Any], line: str) -> None:

@@ -19,16 +19,19 @@ def room() -> GridMap:
 
 def test_without_a_map_scans_tell_nothing():
     served = ServedExplanation()
-    assert not served.has_map and np.isnan(served.shares(SCAN, POSES)).all()
-    poses, shares = served.fitted(SCAN, POSES, 0.5, 0.5)
-    np.testing.assert_array_equal(poses, POSES)
-    assert np.isnan(shares).all() and served.places(SCAN, 5).shape == (0, 3)
+    assert not served.has_map
+    assert served.search(SCAN, np.zeros(3)) is None and served.beams(SCAN, POSES, 0.5, 0.5) is None
 
 
 def test_with_a_map_they_tell_what_they_tell_in_that_map():
     served, plain = ServedExplanation(), ScanExplanation(room())
     served.take(room())
     assert served.has_map
-    np.testing.assert_array_equal(served.shares(SCAN, POSES), plain.shares(SCAN, POSES))
-    np.testing.assert_array_equal(served.fitted(SCAN, POSES, 0.5, 0.5)[0], plain.fitted(SCAN, POSES, 0.5, 0.5)[0])
-    np.testing.assert_array_equal(served.places(SCAN, 5), plain.places(SCAN, 5))
+    np.testing.assert_array_equal(
+        served.beams(SCAN, POSES, 0.5, 0.5).explained, plain.beams(SCAN, POSES, 0.5, 0.5).explained
+    )
+    searches = [each.search(SCAN, np.zeros(3)) for each in (served, plain)]
+    for search in searches:
+        while not search.advance():
+            pass
+    np.testing.assert_array_equal(*(search.places(np.zeros(3)) for search in searches))

@@ -1,0 +1,58 @@
+/// What need be cast from poses near another one, whose surfaces are known?
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "wall_lines.hpp"
+
+namespace glass_nav {
+
+constexpr std::size_t kPathCount = 4;
+enum Path : std::size_t {
+  kFirst,
+  kMirrored,
+  kSecond,
+  kThird
+};  // to the first surface, mirrored there, to those behind
+
+/// How far poses are from the first of them.
+struct PoseSpread {
+  double cells = 0.0, yaw_rad = 0.0;
+};
+
+/// What a beam met at the end of a path. Lengths are in cells.
+struct SeenSurface {
+  double range;  // inf where nothing is met
+  double cos;    // of the incidence
+  double thickness;
+  WallLine line;
+};
+
+/// What one pose sees along its beams.
+struct SeenSurfaces {
+  std::size_t beams = 0;
+  const double* angles = nullptr;                       // of the beams
+  std::array<std::vector<SeenSurface>, kPathCount> at;  // by path and beam
+};
+
+/// How a beam ended. Lengths are in cells.
+struct BeamEnd {
+  double range;        // not finite: it did not return
+  double gate;         // across a surface; one that is farther from the end did not end it
+  double depth_share;  // of the thickness of a wall: how deep in it beams end
+  double reach;        // how far the poses nearby look along the beam
+};
+
+enum class Need {
+  nothing,  // the beam did not return
+  first,    // the first surface: nothing behind it could have ended the beam
+  all,
+};
+
+/// What each beam needs, by what the pose sees along it and along the beams beside it, as far as the spread turns and
+/// moves it. Where less than its reach is enough, the reach is shortened.
+std::vector<Need> needs_of(const SeenSurfaces& seen, const PoseSpread& spread, std::vector<BeamEnd>& ends);
+
+}  // namespace glass_nav

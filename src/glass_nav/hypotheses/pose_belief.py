@@ -1,0 +1,372 @@
+"""Scans, odometry, what else is known -> the poses that are possible, each with its evidence.
+
+The first scan is matched against every pose of the map. Each pose from which it may have been taken is carried by
+odometry, slides to where later scans fit best, and gathers evidence from the walls that it sees, each piece of wall once
+(new_walls.py): a piece speaks for the pose if the map explains it, glass included, and against it otherwise. From time to
+time a scan is matched everywhere again, because the true pose may have been missed; a new pose is traced back to the
+scans before, so that all poses are judged by the same evidence.
+
+Evidence is a log likelihood ratio to `elsewhere`: the robot is at none of these poses, in another building or where
+nobody looked. There the map explains as much as it does by chance, which depends on the scan (two parallel walls
+fit everywhere), so that is measured: what the tenth best of the distinct places of the map explains. The tenth and not the
+second, because places that look alike are no proof that the robot is elsewhere. The ratio for one piece is flat: pieces
+of one thing that was moved are wrong together.
+
+The formulation is ours; the document (seed document global_localization_procedure.txt) has no scans. Multi-hypothesis
+tracking: Jensfelt, Kristensen, Active global localization for a mobile robot using multiple hypothesis tracking (2001).
+K poses, B beams, V views (scans that showed new walls).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import List, Optional, Protocol, Tuple
+
+import numpy as np
+
+from glass_nav.geometry import se2
+from glass_nav.hypotheses import new_walls, pose_tracker
+from glass_nav.hypotheses.new_walls import NewWalls
+from glass_nav.hypotheses.scan_explanation import BeamsExplained
+from glass_nav.sensing.scan import Scan
+
+_NATS = 0.5  # of a piece of wall that the map explains, to one that it does not; see above
+_CHANCE, _MAX_CHANCE = 0.7, 0.9  # share that is explained elsewhere: at least, at most
+_UNCHOSEN = 0.05  # less is explained by chance in a scan that did not choose the pose
+_CHANCE_RANK = 10  # of the distinct places, by what the map explains: nobody expects so many copies of a place
+_MIN_NEW = 4.0  # pieces of wall that make a view
+_MOVED_M, _TURNED_RAD = 0.5, 0.5  # then poses slide to where the scan fits, new walls or not
+_SLIDES_M, _SLIDES_RAD = 0.5, np.radians(15.0)  # a pose that is new
+_OFF_M, _OFF_SHARE, _OFF_RAD = 0.2, 0.04, np.radians(10.0)  # a pose carried by odometry: at most, and per metre
+_MAX_BEHIND = 14.0  # log likelihood ratio of the best pose to one that is dropped
+_MAX_POSES = 600
+_AT_ONCE, _JUDGED_FIRST = 400, 2000  # poses found that are judged while one scan comes: 60 ms; of the first search
+_TRACED = 40  # new poses that are traced back: up to 0.1 ms for each of the views
+_AS_GOOD = 0.1  # share that a new pose explains less than the best: not worth tracing
+_SEARCH_AGAIN_M = 3.0
+_APART_M = 0.7  # places
+NEW = -2  # label of a pose that nobody has weighed
+
+
+class Search(Protocol):
+    """Of one scan in the whole map; hypotheses/place_search.py is one."""
+
+    def advance(self) -> bool:
+        """One slice; whether it is complete."""
+
+    def places(self, odom_from_base: np.ndarray) -> np.ndarray:
+        """(N, 3) poses of the robot at that odometry (3,), the best first."""
+
+
+class MapScans(Protocol):
+    """How a map would be seen; hypotheses/scan_explanation.py is one."""
+
+    def search(self, scan: Scan, odom_from_base: np.ndarray) -> Optional[Search]:
+        """For poses from which the scan may have been taken; None: the scan is no evidence."""
+
+    def beams(self, scan: Scan, map_from_base: np.ndarray, most_m: float, most_rad: float) -> Optional[BeamsExplained]:
+        """Poses (K, 3) slid by no more than that, with the beams explained from there; None: no evidence."""
+
+
+@dataclass(frozen=True)
+class _View:
+    """A scan that showed new walls."""
+
+    scan: Scan
+    odom_from_base: np.ndarray  # (3,)
+    driven_m: float
+    pieces: np.ndarray  # (B,) new walls that each beam shows
+    chance: float  # share that is explained elsewhere
+
+    @property
+    def most(self) -> float:
+        """Evidence of a pose from which the map explains all of it."""
+        return _NATS * (1.0 - self.chance) * float(self.pieces.sum())
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Of K poses."""
+
+    nats: np.ndarray  # (K,) log likelihood ratios to elsewhere, by the scans
+    explained: np.ndarray  # (K,) pieces of wall that the map explains
+    seen: np.ndarray  # (K,) pieces of wall that it should
+    other_nats: np.ndarray  # (K,) log likelihood ratios by what is not a scan
+    label: np.ndarray  # (K,) int, of whoever weighs the poses; NEW: not weighed yet
+
+    @classmethod
+    def none(cls, count: int) -> Evidence:
+        nothing = np.zeros(count)
+        return cls(nothing, nothing, nothing, nothing, np.full(count, NEW, np.int64))
+
+    def __getitem__(self, chosen: np.ndarray) -> Evidence:
+        return Evidence(*(values[chosen] for values in vars(self).values()))
+
+    def then(self, more: Evidence) -> Evidence:
+        """Of these poses and more of them."""
+        return Evidence(*map(np.concatenate, zip(vars(self).values(), vars(more).values())))
+
+    def with_view(self, nats: np.ndarray, explained: np.ndarray, seen: np.ndarray) -> Evidence:
+        return replace(self, nats=self.nats + nats, explained=self.explained + explained, seen=self.seen + seen)
+
+    @property
+    def total(self) -> np.ndarray:
+        """(K,) log likelihood ratios by all."""
+        return self.nats + self.other_nats
+
+    @property
+    def share(self) -> np.ndarray:
+        """(K,) of the walls seen that the map explains; NaN: nothing was seen that it knows."""
+        return np.where(self.seen > 0.0, self.explained / np.where(self.seen > 0.0, self.seen, 1.0), np.nan)
+
+
+class PoseBelief:
+    """see() every scan; weigh() by what is not a scan."""
+
+    def __init__(self, scans: MapScans) -> None:
+        self._scans = scans
+        self.forget()
+
+    def forget(self) -> None:
+        """Nothing is known any more."""
+        self._tracker = pose_tracker.PoseTracker(_MAX_BEHIND, _MAX_POSES)
+        self.evidence = Evidence.none(0)
+        self.now = np.zeros(0)  # (K,) share of the last scan judged that the map explains
+        self.driven_m = 0.0
+        self.searches = 0  # of the whole map, complete
+        self._walls = NewWalls()
+        self._views: List[_View] = []
+        self._odom_from_base: Optional[np.ndarray] = None  # at the last scan
+        self._judged_at: Optional[np.ndarray] = None  # odometry
+        self._judged_m = self._searched_m = 0.0  # distance driven
+        self._search: Optional[_SearchedScan] = None
+        self._chance = _CHANCE
+
+    @property
+    def poses(self) -> np.ndarray:
+        """(K, 3) map_from_base at the last scan, the best first."""
+        return self._tracker.poses
+
+    @property
+    def odom_from_base(self) -> Optional[np.ndarray]:
+        """(3,) at the last scan; None: there was none."""
+        return self._odom_from_base
+
+    def carry(self, odom_from_base: np.ndarray) -> None:
+        """The robot moved."""
+        step = self._tracker.carry(odom_from_base)
+        self._odom_from_base = np.array(odom_from_base, float)
+        if step is not None:
+            self.driven_m += float(se2.travelled(step)[0])
+
+    def see(self, scan: Scan, odom_from_base: np.ndarray) -> bool:
+        """One more scan.
+
+        Args:
+            scan: one revolution of a lidar.
+            odom_from_base: (3,) odometry at its stamp.
+
+        Returns:
+            Whether the poses were judged.
+        """
+        self.carry(odom_from_base)
+        if self._search is not None:
+            found = self._search.advance()
+            if found is not None:
+                self._take_in(self._search, found)
+                return True
+        elif not self.searches:
+            self._begin_search(scan)
+        return bool(self.searches) and self._judge_if_due(scan)
+
+    def weigh(self, nats: np.ndarray, label: np.ndarray) -> None:
+        """Add log likelihood ratios (K,) to the evidence of the poses, and label (K,) them."""
+        self.evidence = replace(self.evidence, other_nats=self.evidence.other_nats + nats, label=label)
+        self._keep_distinct()
+
+    def propose(self, poses: np.ndarray) -> np.ndarray:
+        """Follow poses (N, 3) of the robot at the last scan, too, as far as the views so far allow.
+
+        Returns:
+            Indices of those that are followed from now on.
+        """
+        if not self.searches or not len(poses):
+            return np.zeros(0, np.int64)
+        chosen = np.arange(len(poses))[:_TRACED]
+        evidence, kept = self._traced(poses[chosen])
+        self._append(poses[chosen][kept], evidence[kept], np.full(len(kept), np.nan))
+        return chosen[kept]
+
+    # -- a scan that the poses are judged by
+
+    def _judge_if_due(self, scan: Scan) -> bool:
+        assert self._odom_from_base is not None and self._judged_at is not None
+        step = se2.compose(se2.inverse(self._judged_at), self._odom_from_base)
+        moved_m, turned_rad = se2.travelled(step)
+        if moved_m < 0.5 * _MOVED_M and turned_rad < 0.5 * _TURNED_RAD:
+            return False
+        off_m = _OFF_M + _OFF_SHARE * (self.driven_m - self._judged_m)
+        beams = self._scans.beams(scan, self._tracker.poses, off_m, _OFF_RAD)
+        if beams is None:
+            return False
+        view = self._view(scan, beams)
+        if view is None and moved_m < _MOVED_M and turned_rad < _TURNED_RAD:
+            return False
+        self._judged_at, self._judged_m = self._odom_from_base, self.driven_m
+        self._tracker.poses = beams.poses
+        self.now = _share(beams)
+        if view is not None:
+            self._views.append(view)
+            self.evidence = self.evidence.with_view(*_of_view(beams, view))
+        self._keep_distinct()
+        far = self.driven_m - self._searched_m >= _SEARCH_AGAIN_M or not len(self._tracker)
+        if far and self._search is None:
+            self._begin_search(scan)
+        return True
+
+    def _view(self, scan: Scan, beams: BeamsExplained) -> Optional[_View]:
+        """None: too little of it is new."""
+        assert self._odom_from_base is not None
+        if not len(beams.poses):
+            return None
+        new = self._walls.of(beams.ends_m, self._odom_from_base, self.driven_m)
+        pieces = _counted(beams, new, int(self.evidence.total.argmax()))
+        if pieces.sum() < _MIN_NEW:
+            return None
+        self._walls.add(beams.ends_m, self._odom_from_base, self.driven_m)
+        return _View(scan, self._odom_from_base, self.driven_m, pieces, self._chance - _UNCHOSEN)
+
+    # -- a scan that is looked for everywhere
+
+    def _begin_search(self, scan: Scan) -> None:
+        assert self._odom_from_base is not None
+        search = self._scans.search(scan, self._odom_from_base)
+        self._searched_m = self.driven_m
+        if search is not None:
+            most = _AT_ONCE if self.searches else _JUDGED_FIRST
+            self._search = _SearchedScan(self._scans, search, scan, self._odom_from_base, self.driven_m, most)
+
+    def _take_in(self, search: _SearchedScan, found: BeamsExplained) -> None:
+        """The poses that a complete search found, at its scan."""
+        assert self._odom_from_base is not None
+        self._search, self.searches = None, self.searches + 1
+        share = _share(found)
+        order = np.argsort(-share, kind="stable")
+        poses, share = found.poses[order], share[order]
+        self._chance = _chance(poses, share)
+        now = se2.compose(poses, se2.compose(se2.inverse(search.odom_from_base), self._odom_from_base))
+        if self.searches == 1:
+            new = new_walls.pieces(found.ends_m)
+            self._walls.add(found.ends_m, search.odom_from_base, search.driven_m)
+            view = _View(search.scan, search.odom_from_base, search.driven_m, new, self._chance)
+            self._views.append(view)
+            self._judged_at, self._judged_m = search.odom_from_base, search.driven_m
+            evidence = Evidence.none(len(now)).with_view(*(each[order] for each in _of_view(found, view)))
+            self._append(now, evidence, share)
+            self._keep_distinct()
+            return
+        worth = np.flatnonzero(share >= max(_CHANCE - _AS_GOOD, np.nanmax(share, initial=0.0) - _AS_GOOD))
+        self.propose(now[worth])
+        self._keep_distinct()
+
+    def _traced(self, poses: np.ndarray) -> Tuple[Evidence, np.ndarray]:
+        """The evidence of poses (N, 3) at the last scan by all views, and the indices of those not far behind."""
+        assert self._odom_from_base is not None
+        evidence, kept = Evidence.none(len(poses)), self._unknown(poses)
+        back, here, driven_m = poses, self._odom_from_base, self.driven_m
+        least = self.evidence.nats.max(initial=0.0) - _MAX_BEHIND
+        possible = sum(view.most for view in self._views)
+        for view in reversed(self._views):
+            back = se2.compose(back, se2.compose(se2.inverse(here), view.odom_from_base))
+            off_m = _OFF_M + _OFF_SHARE * (driven_m - view.driven_m)
+            here, driven_m = view.odom_from_base, view.driven_m
+            if not len(kept):
+                break
+            beams = self._scans.beams(view.scan, back[kept], off_m, _OFF_RAD)
+            assert beams is not None
+            back[kept] = beams.poses
+            of_view = [np.zeros(len(poses)) for _ in range(3)]
+            for whole, part in zip(of_view, _of_view(beams, view)):
+                whole[kept] = part
+            evidence = evidence.with_view(*of_view)
+            possible -= view.most
+            kept = kept[evidence.nats[kept] > least - possible]
+        return evidence, kept
+
+    def _unknown(self, poses: np.ndarray) -> np.ndarray:
+        """Indices of the poses (N, 3) that are not followed."""
+        return np.array(
+            [k for k, pose in enumerate(poses) if not pose_tracker.same_place(self._tracker.poses, pose).any()],
+            np.int64,
+        )
+
+    def _append(self, poses: np.ndarray, evidence: Evidence, now: np.ndarray) -> None:
+        self._tracker.add(poses)
+        self.evidence = self.evidence.then(evidence)
+        self.now = np.concatenate([self.now, now])
+
+    def _keep_distinct(self) -> None:
+        chosen = self._tracker.keep_distinct(self.evidence.total)
+        self.evidence, self.now = self.evidence[chosen], self.now[chosen]
+
+
+class _SearchedScan:
+    """One scan in the whole map: advance() until it is complete."""
+
+    def __init__(
+        self, scans: MapScans, search: Search, scan: Scan, odom_from_base: np.ndarray, driven_m: float, most: int
+    ) -> None:
+        self.scan, self.odom_from_base, self.driven_m = scan, odom_from_base, driven_m
+        self._scans, self._search, self._most = scans, search, most
+        self._left: Optional[np.ndarray] = None  # (N, 3) poses that are not judged yet; None: they are looked for
+        self._judged: List[BeamsExplained] = []
+
+    def advance(self) -> Optional[BeamsExplained]:
+        """One slice; the poses found, once it is complete."""
+        if self._left is None:
+            if self._search.advance():
+                self._left = self._search.places(self.odom_from_base)[: self._most]
+            return None
+        beams = self._scans.beams(self.scan, self._left[:_AT_ONCE], _SLIDES_M, _SLIDES_RAD)
+        assert beams is not None
+        self._judged.append(beams)
+        self._left = self._left[_AT_ONCE:]
+        if len(self._left):
+            return None
+        poses, explained, known = (
+            np.concatenate([getattr(part, name) for part in self._judged]) for name in ("poses", "explained", "known")
+        )
+        return BeamsExplained(poses, beams.ends_m, explained, known)
+
+
+def _of_view(beams: BeamsExplained, view: _View) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(K,) each: evidence, pieces of wall explained, pieces seen."""
+    seen, explained = beams.known @ view.pieces, beams.explained @ view.pieces
+    return _NATS * (explained - view.chance * seen), explained, seen
+
+
+def _counted(beams: BeamsExplained, new: np.ndarray, best: int) -> np.ndarray:
+    """(B,) pieces of wall that the beams are evidence of, of which they show (B,) for the first time.
+
+    The whole scan is evidence, by the part of the walls explained that is new. What is not explained would be the wrong
+    measure: beams that met a mirror or a person end somewhere else each time.
+    """
+    pieces = new_walls.pieces(beams.ends_m)
+    explained = beams.explained[best]
+    return pieces * ((new @ explained) / max(float(pieces @ explained), 1.0))
+
+
+def _share(beams: BeamsExplained) -> np.ndarray:
+    """(K,) of the walls seen that the map explains; 0 where it knows none of them."""
+    pieces = new_walls.pieces(beams.ends_m)
+    return (beams.explained @ pieces) / np.maximum(beams.known @ pieces, 1e-9)
+
+
+def _chance(poses: np.ndarray, share: np.ndarray) -> float:
+    """Share that the map explains where the robot is not: of the tenth of the distinct places, shares descending."""
+    left = np.arange(len(poses))
+    for _ in range(_CHANCE_RANK - 1):
+        if not len(left):
+            return _CHANCE
+        left = left[np.hypot(*(poses[left, :2] - poses[left[0], :2]).T) > _APART_M]
+    return float(np.clip(share[left[0]], _CHANCE, _MAX_CHANCE)) if len(left) else _CHANCE

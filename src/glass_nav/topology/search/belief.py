@@ -1,0 +1,74 @@
+"""What is known of the robot's place: the poses that are possible, their shares, and what speaks for each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Optional, Tuple
+
+import numpy as np
+
+from glass_nav.hypotheses import pose_tracker
+
+NO_DART = -1
+
+
+@dataclass(frozen=True)
+class RuledOut:
+    """A hypothesis that went."""
+
+    map_from_base: np.ndarray  # (3,) where the robot would stand
+    dart: int  # along which it would have come; NO_DART: the atlas has no meetpoint there
+    test: str  # that it failed: "degree", "r", "length", "chord", "angles", "turn", "segments" or "scan"
+    expected: float  # of this pose by map or atlas
+    seen: float  # by the robot
+    unit: str  # of both: "m", "rad" or ""
+
+
+@dataclass(frozen=True)
+class Belief:
+    """Poses, each place once, the likeliest first."""
+
+    odom_from_base: Optional[np.ndarray]  # (3,) dead reckoning at which the poses hold; None: it is not known
+    poses: np.ndarray  # (K, 3) map_from_base
+    share: np.ndarray  # (K,) probability; with elsewhere the sum is 1
+    elsewhere: float  # probability that the robot is at none of them
+    scan_nats: np.ndarray  # (K,) log likelihood ratio to elsewhere by all scans
+    graph_nats: np.ndarray  # (K,) ... by meetpoints and edges
+    explained: np.ndarray  # (K,) share of the walls seen that the map explains; NaN: none was seen
+    dart: np.ndarray  # (K,) along which the robot came to the last meetpoint; NO_DART: the atlas has none there
+    driven_m: float = 0.0  # since the first scan
+    searches: int = 0  # of the whole map, complete
+    ruled_out: Tuple[RuledOut, ...] = ()  # by the last scan or meetpoint, the likeliest first
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    def left(self, risk: float) -> np.ndarray:
+        """Ascending indices of the places that are not ruled out: no less likely than the first by that factor."""
+        return np.flatnonzero(self.share > risk * self.share[0]) if len(self) else np.zeros(0, np.int64)
+
+
+def places(poses: np.ndarray, nats: np.ndarray) -> Tuple[np.ndarray, np.ndarray, float]:
+    """Shares of distinct places.
+
+    Args:
+        poses: (N, 3) hypotheses; those that are no rivals of each other are one place.
+        nats: (N,) log likelihood ratios to elsewhere, as likely as one place before there was evidence.
+
+    Returns:
+        (K,) indices of the best pose of each place, the likeliest first; (K,) shares; share of elsewhere.
+    """
+    if not len(poses):
+        return np.zeros(0, np.int64), np.zeros(0), 1.0
+    highest = max(float(nats.max()), 0.0)
+    weights, elsewhere = np.exp(nats - highest), float(np.exp(-highest))
+    left = np.argsort(-nats, kind="stable")
+    first, mass = [], []
+    while len(left):
+        same = pose_tracker.same_place(poses[left], poses[left[0]])
+        first.append(int(left[0]))
+        mass.append(float(weights[left[same]].sum()))
+        left = left[~same]
+    total = sum(mass) + elsewhere
+    order = np.argsort(-np.array(mass), kind="stable")
+    return np.array(first, np.int64)[order], np.array(mass)[order] / total, elsewhere / total

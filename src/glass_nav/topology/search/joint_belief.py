@@ -1,0 +1,138 @@
+"""Scans and meetpoints -> one belief.
+
+Hypotheses are poses. The poses come from the scans (hypotheses/pose_belief.py: everywhere in the map where they may have
+been taken) and from the forest (darts), and both kinds of evidence add up for each: the walls that its scans showed,
+and the meetpoints where it was (node_evidence.py).
+"""
+
+from __future__ import annotations
+
+from typing import Dict, List, Optional, Tuple
+
+import numpy as np
+
+from glass_nav.geometry import se2
+from glass_nav.hypotheses.pose_belief import NEW, MapScans, PoseBelief
+from glass_nav.sensing.scan import Scan
+from glass_nav.topology.observations import Meetpoint
+from glass_nav.topology.search import belief
+from glass_nav.topology.search.belief import NO_DART, Belief, RuledOut
+from glass_nav.topology.search.matching import Matcher, poses_at
+from glass_nav.topology.search.node_evidence import NodeEvidence
+from glass_nav.topology.search.search_forest import SearchForest
+
+_REMEMBERED = 20  # meetpoints that a new pose is weighed by
+_DRIFT_SHARE = 0.04  # of odometry per metre, when a pose is traced back to a meetpoint
+_MAX_DARTS = 200  # of the forest that are followed as poses; the search over scans finds those of larger rows
+_KEPT_ODOMETRY = 200  # scans
+_AGAIN = 0.2  # of the evidence of a meetpoint that the atlas lacks as it lacked the one before: one thing was moved
+_LISTED = 100  # hypotheses that were ruled out
+
+
+class JointBelief:
+    """see() every scan, arrive() at every meetpoint."""
+
+    def __init__(self, scans: MapScans, matcher: Matcher) -> None:
+        self._matcher = matcher
+        self._poses = PoseBelief(scans)
+        self.forget()
+
+    def forget(self) -> None:
+        """Nothing is known any more."""
+        self._poses.forget()
+        self._nodes: List[Tuple[NodeEvidence, float]] = []  # with the distance driven until then
+        self._odometry: Dict[int, np.ndarray] = {}  # at the last scans, by stamp [ns]
+        self._ruled_out: Tuple[RuledOut, ...] = ()
+        self._belief: Optional[Belief] = None
+
+    @property
+    def belief(self) -> Optional[Belief]:
+        """None: no scan has been evidence yet."""
+        if not self._poses.searches:
+            return None
+        if self._belief is None:
+            self._belief = self._made()
+        return self._belief
+
+    def see(self, scan: Scan, odom_from_base: np.ndarray) -> bool:
+        """A scan with odometry (3,) at its stamp; whether the belief is another one now."""
+        if self._odometry and scan.stamp_ns <= max(self._odometry):
+            return False
+        self._odometry[scan.stamp_ns] = np.array(odom_from_base, float)
+        if len(self._odometry) > _KEPT_ODOMETRY:
+            del self._odometry[min(self._odometry)]
+        before = self.belief
+        judged = self._poses.see(scan, odom_from_base)
+        self._belief = None
+        if judged:
+            self._weigh_new()
+            self._ruled_out = self._gone(before, "scan", 1.0)
+        return judged
+
+    def arrive(self, meetpoint: Meetpoint, forest: SearchForest) -> None:
+        """A meetpoint, the last one of the forest."""
+        odom_from_base = self._odometry.get(meetpoint.stamp_ns, meetpoint.odom_from_base)  # the driver's has no drift,
+        # that of the scans has: they differ
+        if odom_from_base is None:
+            self.forget()
+            return
+        if meetpoint.scan is not None:
+            self.see(meetpoint.scan, odom_from_base)
+        before = self.belief
+        self._poses.carry(odom_from_base)
+        path, errors = forest.candidates()
+        node = NodeEvidence.of(self._matcher, meetpoint, odom_from_base, path, errors)
+        if len(path) <= _MAX_DARTS:
+            self._poses.propose(poses_at(self._matcher.atlas, path, meetpoint))
+        self._weigh_new()
+        self._nodes = [*self._nodes, (node, self._poses.driven_m)][-_REMEMBERED:]
+        nats, dart = node.at(self._poses.poses)
+        missed = (dart == NO_DART) & (self._poses.evidence.label == NO_DART) & (len(self._nodes) > 1)
+        self._poses.weigh(np.where(missed, _AGAIN * nats, nats), dart)
+        self._belief = None
+        self._ruled_out = self._gone(before, "degree", float(meetpoint.degree))
+
+    def _weigh_new(self) -> None:
+        """Poses that were not followed at earlier meetpoints are traced back to them."""
+        label = self._poses.evidence.label
+        new = np.flatnonzero(label == NEW)
+        if not len(new):
+            return
+        nats, label = np.zeros(len(label)), label.copy()
+        label[new] = NO_DART
+        here = self._poses.odom_from_base
+        assert here is not None
+        for node, driven_m in self._nodes:
+            back = se2.compose(self._poses.poses[new], se2.compose(se2.inverse(here), node.odom_from_base))
+            of_node, label[new] = node.at(back, _DRIFT_SHARE * (self._poses.driven_m - driven_m))
+            nats[new] += of_node
+        self._poses.weigh(nats, label)
+
+    def _made(self) -> Belief:
+        evidence, poses = self._poses.evidence, self._poses.poses
+        first, share, elsewhere = belief.places(poses, evidence.total)
+        return Belief(
+            self._poses.odom_from_base,
+            poses[first],
+            share,
+            elsewhere,
+            evidence.nats[first],
+            evidence.other_nats[first],
+            evidence.share[first],
+            evidence.label[first],
+            self._poses.driven_m,
+            self._poses.searches,
+            self._ruled_out,
+        )
+
+    def _gone(self, before: Optional[Belief], test: str, expected: float) -> Tuple[RuledOut, ...]:
+        """The hypotheses of a belief before that are not followed any more."""
+        here, after = self._poses.odom_from_base, self._poses.poses
+        if before is None or here is None or before.odom_from_base is None:
+            return ()
+        now = se2.compose(before.poses, se2.compose(se2.inverse(before.odom_from_base), here))
+        gone: List[RuledOut] = []
+        for k, pose in enumerate(now):
+            if len(gone) < _LISTED and not (np.hypot(*(after[:, :2] - pose[:2]).T) < 1.0).any():
+                gone.append(RuledOut(pose, int(before.dart[k]), test, expected, float(before.explained[k]), ""))
+        return tuple(gone)

@@ -1,0 +1,117 @@
+"""BELIEF -> VOTE -> TURN: what scans and forest say together.
+
+One rule: the robot is where the probability of all other places, and of elsewhere, is less than the risk that is
+accepted. It is LOST if that of elsewhere is the one that is left, and AMBIGUOUS if nothing can tell the places apart
+that are.
+"""
+
+from __future__ import annotations
+
+from typing import Optional
+
+import numpy as np
+
+from glass_nav.topology.observations import Meetpoint
+from glass_nav.topology.search import ambiguity, vote
+from glass_nav.topology.search.belief import NO_DART, Belief
+from glass_nav.topology.search.matching import Matcher
+from glass_nav.topology.search.passed_edges import PassedEdges
+from glass_nav.topology.search.search_estimate import SearchEstimate, TurnChoice
+from glass_nav.topology.search.search_forest import SearchForest
+from glass_nav.topology.search.search_params import SearchParams
+from glass_nav.vocabulary import SearchState
+
+_MIN_DRIVEN_M = 1.0  # before a place is confirmed: odometry must agree with it
+_LOST_SEARCHES, _LOST_M = 3, 4.0  # of the whole map, and driven, before it is given up
+_AMBIGUOUS_EDGES = 6  # driven before places that no turn tells apart are given up: scans may
+_MAX_SHOWN = 0.9995  # of a probability in words
+
+
+class JointVerdict:
+    """Of one search at a time."""
+
+    def __init__(self, matcher: Matcher, forest: SearchForest, passed: PassedEdges, params: SearchParams) -> None:
+        self._matcher, self._forest, self._passed, self._params = matcher, forest, passed, params
+
+    def final(self, belief: Belief, depth: int) -> Optional[SearchEstimate]:
+        """CONFIRMED or LOST, wherever the robot is; None: not yet."""
+        risk = self._params.tolerances.risk
+        if not len(belief):
+            return None
+        share = belief.share[0]
+        explained = belief.explained[0]
+        if (
+            1.0 - share < risk
+            and belief.driven_m >= _MIN_DRIVEN_M
+            and (np.isnan(explained) or explained >= self._params.least_explained)
+        ):
+            dart = self._on_path(belief.dart[:1])
+            reason = f"{self._place(belief)}; it explains {explained:.0%} of the walls seen"
+            return self._estimate(SearchState.CONFIRMED, reason, depth, dart, None, belief.poses[0].copy())
+        if 1.0 - belief.elsewhere < risk and belief.searches >= _LOST_SEARCHES and belief.driven_m >= _LOST_M:
+            reason = f"no place of the map explains what was seen: the best one {explained:.0%} of the walls"
+            return self._estimate(SearchState.LOST, reason, depth, np.zeros(0, np.int64), None)
+        return None
+
+    def at_meetpoint(self, belief: Belief, depth: int) -> SearchEstimate:
+        """What follows from the last meetpoint of the forest."""
+        final = self.final(belief, depth)
+        if final is not None:
+            return final
+        here = self._forest.meetpoints[-1]
+        left = belief.left(self._params.tolerances.risk)
+        known = left[belief.dart[left] != NO_DART]
+        dart, first = np.unique(belief.dart[known], return_index=True)
+        order = np.argsort(first)
+        dart, share = dart[order], belief.share[known[first[order]]]
+        places = f"{self._place(belief)}, {len(left)} place{'s' * (len(left) != 1)} left"
+        if len(dart) < 2:
+            state = SearchState.TENTATIVE if len(left) == 1 else SearchState.SEARCHING
+            choice = TurnChoice(self._least_passed(here), here.degree)
+            reason = f"{places}; next a new edge, as more walls are to confirm it"
+            return self._estimate(state, reason, depth, dart, choice)
+        voted = vote.expected(self._matcher, dart, share)
+        if voted.splits:
+            reason = f"{places}; next the turn that leaves the least doubt per metre"
+            return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(voted.rank, here.degree))
+        proof = ambiguity.prove(self._matcher, dart)
+        if proof.ranks is not None:
+            reason = f"{places}; next towards the nearest difference, {len(proof.ranks)} edges away"
+            choice = TurnChoice(proof.ranks[0], here.degree)
+            return self._estimate(SearchState.SEARCHING, reason, depth, dart, choice)
+        rank = self._least_passed(here)
+        listed = float(belief.share[known].sum())
+        if proof.indistinguishable and 1.0 - listed < self._params.tolerances.risk and depth >= _AMBIGUOUS_EDGES:
+            reason = f"{len(dart)} places match, and no turn can tell them apart"
+            return self._estimate(SearchState.AMBIGUOUS, reason, depth, dart, None)
+        reason = f"{places}; no turn is known to tell them apart, next a new edge"
+        return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(rank, here.degree))
+
+    def _estimate(
+        self,
+        state: SearchState,
+        reason: str,
+        depth: int,
+        dart: np.ndarray,
+        choice: Optional[TurnChoice],
+        pose: Optional[np.ndarray] = None,
+    ) -> SearchEstimate:
+        return SearchEstimate(state, reason, depth, dart, np.zeros(len(dart), np.int64), choice, pose)
+
+    def _place(self, belief: Belief) -> str:
+        share = belief.share[0]
+        return (
+            f"the best place has {'over 99.9' if share > _MAX_SHOWN else f'{100.0 * share:.1f}'} % of the probability"
+        )
+
+    def _on_path(self, dart: np.ndarray) -> np.ndarray:
+        """Those of the darts that the forest has a path to."""
+        return dart[np.isin(dart, self._forest.candidates()[0])] if self._forest.depth >= 0 else dart[:0]
+
+    def _least_passed(self, here: Meetpoint) -> int:
+        """Rank of an edge that was passed least often; back only if there is no other."""
+        times = self._passed.times(here)
+        if times is None:
+            return here.degree // 2
+        least = np.flatnonzero(times == times.min())
+        return int(least[len(least) // 2]) if least[0] > 0 or len(least) == 1 else int(least[-1])

@@ -1,0 +1,73 @@
+"""A meetpoint, poses -> the log likelihood ratio of the meetpoint at each pose to a robot elsewhere.
+
+A pose expects a meetpoint where the atlas has one, as the atlas describes it: degree, equidistance, angles between
+the edges, each with the tolerances of the matcher. Elsewhere a meetpoint is like any of the atlas: what many have in
+common speaks for none. The edge by which the robot came is evidence through the pose, which odometry carried along
+it, and through the forest, whose tests it passed (length, chord, directions, walls). D darts, K poses.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Tuple
+
+import numpy as np
+
+from glass_nav.geometry import angles
+from glass_nav.topology.observations import Meetpoint
+from glass_nav.topology.search.belief import NO_DART
+from glass_nav.topology.search.matching import Matcher, poses_at
+
+_NEAR_M, _NEAR_RAD = 0.7, np.radians(20.0)  # of a pose: the dart belongs to it
+_NO_NODE = -1.9  # log of the probability that the robot finds a meetpoint where the atlas has none
+_MAX_NATS = 4.0  # of one meetpoint
+_NO_PATH = -1.5  # the forest has no path to the dart, or for each detection error on it
+
+
+@dataclass(frozen=True)
+class NodeEvidence:
+    """Of one meetpoint."""
+
+    odom_from_base: np.ndarray  # (3,) there
+    dart: np.ndarray  # (D,) that match, by x of their poses
+    poses: np.ndarray  # (D, 3) of the robot, if it came along them
+    nats: np.ndarray  # (D,)
+
+    @classmethod
+    def of(
+        cls, matcher: Matcher, meetpoint: Meetpoint, odom_from_base: np.ndarray, path: np.ndarray, errors: np.ndarray
+    ) -> NodeEvidence:
+        """Of a meetpoint where the robot stood at that odometry (3,).
+
+        Args:
+            matcher: of the atlas.
+            meetpoint: that the robot reports.
+            odom_from_base: there.
+            path: (C,) darts to which the forest has a path.
+            errors: (C,) detection errors on it.
+        """
+        dart = matcher.all_at(meetpoint)
+        log_p = matcher.log_likelihood_at(dart, meetpoint)
+        mean = np.logaddexp.reduce(log_p) - np.log(len(matcher.atlas.darts)) if len(dart) else 0.0
+        off_path = np.full(len(matcher.atlas.darts), 2)
+        off_path[path[::-1]] = np.minimum(errors[::-1], 2)
+        nats = np.minimum(log_p - mean, _MAX_NATS) + _NO_PATH * off_path[dart]
+        poses = poses_at(matcher.atlas, dart, meetpoint)
+        order = np.argsort(poses[:, 0], kind="stable")
+        return cls(odom_from_base, dart[order], poses[order], nats[order])
+
+    def at(self, poses: np.ndarray, more_m: float = 0.0) -> Tuple[np.ndarray, np.ndarray]:
+        """(K,) nats and (K,) dart of poses (K, 3) that the robot may have had there; more_m: how much they are off."""
+        nats, dart = np.full(len(poses), _NO_NODE), np.full(len(poses), NO_DART, np.int64)
+        near_m = _NEAR_M + more_m
+        first = np.searchsorted(self.poses[:, 0], poses[:, 0] - near_m)
+        last = np.searchsorted(self.poses[:, 0], poses[:, 0] + near_m)
+        for k in np.flatnonzero(first < last).tolist():
+            off = self.poses[first[k] : last[k]] - poses[k]
+            near = np.flatnonzero(
+                (np.hypot(off[:, 0], off[:, 1]) < near_m) & (np.abs(angles.wrap(off[:, 2])) < _NEAR_RAD)
+            )
+            if len(near):
+                best = first[k] + int(near[np.argmax(self.nats[first[k] + near])])
+                nats[k], dart[k] = max(float(self.nats[best]), _NO_NODE), self.dart[best]
+        return nats, dart

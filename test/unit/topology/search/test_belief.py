@@ -1,0 +1,32 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from glass_nav.topology.search import belief
+from glass_nav.topology.search.belief import Belief
+
+
+def test_shares_are_of_places_and_elsewhere_is_one_of_them() -> None:
+    poses = np.array([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0], [0.3, 0.0, 0.1]])
+    first, share, elsewhere = belief.places(poses, np.log([4.0, 2.0, 3.0]))
+    assert first.tolist() == [0, 1]  # the third is the place of the first
+    np.testing.assert_allclose(share, [0.7, 0.2])
+    assert elsewhere == pytest.approx(0.1)
+
+
+def test_where_nothing_speaks_for_any_place_the_robot_is_elsewhere() -> None:
+    first, share, elsewhere = belief.places(np.zeros((0, 3)), np.zeros(0))
+    assert (len(first), len(share), elsewhere) == (0, 0, 1.0)
+    _, share, elsewhere = belief.places(np.zeros((1, 3)), np.array([-800.0]))
+    assert (share[0], elsewhere) == (0.0, 1.0)
+    _, share, elsewhere = belief.places(np.zeros((1, 3)), np.array([800.0]))
+    assert (share[0], elsewhere) == (1.0, 0.0)
+
+
+def test_a_place_is_ruled_out_by_being_less_likely_than_the_first_by_the_risk() -> None:
+    nothing = np.zeros(3)
+    some = Belief(None, np.zeros((3, 3)), np.array([0.9, 0.05, 0.0005]), 0.05, nothing, nothing, nothing, nothing)
+    assert some.left(0.001).tolist() == [0, 1] and len(some) == 3
+    none = Belief(None, np.zeros((0, 3)), np.zeros(0), 1.0, *[np.zeros(0)] * 4)
+    assert none.left(0.001).tolist() == []
