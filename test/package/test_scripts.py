@@ -96,7 +96,16 @@ def test_each_script_explains_itself(script: str, words: str, option: str) -> No
     assert code == 0 and words in out and "set -euo" not in out
 
 
-NODES = ("amcl", "driver_node", "landmarks_node", "localization_node", "map_node", "simulator_node", "topology_node")
+NODES = (
+    "amcl",
+    "driver_node",
+    "landmarks_node",
+    "localization_node",
+    "map_node",
+    "scanner_node",
+    "simulator_node",
+    "topology_node",
+)
 
 
 @pytest.mark.parametrize("node", [*NODES, "bag_player", "wakeup_demo"])

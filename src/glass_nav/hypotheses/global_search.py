@@ -38,6 +38,7 @@ MIN_BEAMS = 10  # with fewer a scan is no evidence
 _MAX_CANDIDATES = 1500  # that are followed
 _EVIDENCE_SCALE_M = 0.2  # a beam that ends this far from a wall fits by one half
 _UNKNOWN_FIT = 0.4  # of a beam that ends where the map knows nothing: likelier than in free space, less than at a wall
+_MIN_KNOWN = 0.3  # of the beams of one scan must end where the map knows something: else it proposes no place
 _FULL_FIT = 20.0  # log likelihood ratio of a place where all beams end on walls to one where none does, in one view
 _VIEW_M = 2.0  # after this distance the surroundings are seen anew
 _MAX_BEHIND = 40.0  # log likelihood ratio of the best candidate to one that is dropped
@@ -136,7 +137,7 @@ class GlobalSearch:
         self._move(odom_from_base)
         points = evidence_points(scan)
         if points is not None:
-            if self._searched:
+            if self._searched and len(self._tracker):
                 self._judge(points, self._view(scan))
             if self._places is None and (not self._searched or self._is_due(points)):
                 self._places = PlaceSearch(self._matcher, self._field, points, odom_from_base)
@@ -151,6 +152,12 @@ class GlobalSearch:
     def add(self, map_from_base: np.ndarray, head_start: float) -> None:
         """Before the first scan: a candidate at the tracked pose, with a head start of log likelihood."""
         self._append(np.asarray(map_from_base, float)[None], np.array([head_start]))
+
+    def correct(self, map_from_base: np.ndarray) -> None:
+        """The best candidate in the place of a pose (3,) is there: a filter that follows this place knows it better."""
+        here = pose_tracker.same_place(self._tracker.poses, map_from_base)
+        if here.any():
+            self._tracker.poses[int(np.argmax(np.where(here, self._evidence, -np.inf)))] = map_from_base
 
     def _move(self, odom_from_base: np.ndarray) -> None:
         """Move the candidates by odometry."""
@@ -187,10 +194,14 @@ class GlobalSearch:
     def _take_in(self, places: np.ndarray, points: np.ndarray) -> None:
         """Follow the places (N, 3), carried to this scan, of a search that is complete."""
         self._places = None
+        if self._area is not None and len(places):
+            known = np.mean(self._area.ends(points, places), axis=1)
+            places = places[known >= _MIN_KNOWN]
         if not len(self._tracker) or not self._searched:
             self._searched = True
             self._append(places, np.zeros(len(places)))
-            self._judge(points, 1.0)
+            if len(self._tracker):
+                self._judge(points, 1.0)
             return
         # Only one scan proposed them: they start behind the candidates so far, by how well each fits.
         places = _aligned(self._field, points, places, _noise_of(self._since_places))

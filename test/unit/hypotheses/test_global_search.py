@@ -14,7 +14,9 @@ from glass_nav.hypotheses.pose_tracker import same_place
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.sensing import bearings
 from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.known_area import KnownArea
 from glass_nav.world import landmark_map
+from glass_nav.world.grid_map import UNKNOWN
 
 # A corridor with a niche at one end only: in the middle its two directions look alike.
 CORRIDOR = Building([(0, 0), (12, 0), (12, 2), (10, 2), (10, 4), (8, 4), (8, 2), (0, 2)])
@@ -132,6 +134,24 @@ def test_a_candidate_that_is_told_has_its_head_start():
     told = search.update(room.scan(np.array([2.0, 2.5, 0.3])), np.zeros(3))
     assert same_place(told.poses[:1], believed)[0]
     assert told.lead == pytest.approx(4.0, abs=0.5) and not told.found
+
+
+def test_a_candidate_goes_along_with_the_filter_that_follows_its_place():
+    search = search_in(SQUARE)
+    search.add(np.array([2.0, 1.5, 0.3]), 5.0)
+    search.correct(np.array([2.3, 1.6, 0.4]))
+    search.correct(np.array([5.0, 5.0, 0.4]))  # another place
+    blind = replace(SQUARE.scan(IN_SQUARE), ranges_m=np.full(len(SQUARE.scan(IN_SQUARE).ranges_m), np.inf))
+    assert search.update(blind, np.zeros(3)).poses == pytest.approx(np.array([[2.3, 1.6, 0.4]]))
+
+
+def test_a_place_from_which_the_lidar_would_see_what_the_map_does_not_know_is_none():
+    grid_map = SQUARE.grid_map()
+    field = DistanceField(grid_map)
+    nothing = KnownArea(replace(grid_map, occupancy=np.full_like(grid_map.occupancy, np.int8(UNKNOWN))))
+    for area, places in ((KnownArea(grid_map), True), (nothing, False)):
+        search = GlobalSearch(ScanMatcher(grid_map, field), field, SearchParams(), area)
+        assert bool(len(drive(search, SQUARE, [IN_SQUARE] * 2, [IN_SQUARE] * 2)[-1].poses)) == places
 
 
 def test_the_covariance_is_of_all_places():

@@ -41,6 +41,10 @@ _MIN_STEP_M = 0.05  # distance that a scan counts for when the robot stands
 _DOUBT = (0.06, 3.0)  # below the usual fit, as such and in deviations: search everywhere
 _POOR = 0.7  # of the usual fit: not to be relied on, whatever there is elsewhere
 _HEAD_START = 3.0  # log likelihood ratio of the tracked pose, or of where odometry leads, to all others: for doubts
+_KEPT_START = (
+    5.0  # the same where odometry has led to the tracked pose since it was sure, without a break in what is seen
+)
+_KEPT = 3.0  # deviations of dead reckoning within which it leads to the tracked pose
 _CARRIED_AWAY = -10.0  # log likelihood ratio of any other place to where odometry leads: for a new pose
 _SETTLED_M = 6.0  # after this distance as the best candidate, the fit at the tracked pose is the usual one
 _CALM_M = 2.0  # after this distance of usual fits nothing was wrong
@@ -60,6 +64,9 @@ class Verdict:
     candidates: Optional[Candidates]  # during a search
     elsewhere: Optional[np.ndarray] = None  # (3,) the best place that is not the tracked one, during a search
     moved: bool = False  # the robot was moved without driving, and is not known to be at the tracked pose again
+    kept: bool = (
+        False  # odometry leads from the last sure pose to this one, and the robot was not moved without driving
+    )
 
     @property
     def fit_there(self) -> float:
@@ -68,8 +75,8 @@ class Verdict:
 
     @property
     def poor(self) -> bool:
-        """The scans fit much worse than they used to."""
-        return self.fit < _POOR * self.usual
+        """The scans fit much worse than they used to, and odometry does not vouch for the pose."""
+        return self.fit < _POOR * self.usual and not self.kept
 
     @property
     def contested(self) -> bool:
@@ -147,23 +154,26 @@ class KidnapDetector:
         self._fit = fit if np.isnan(self._fit) else self._fit + (fit - self._fit) * -np.expm1(-step_m / _FORGET_M)
         doubted = self._usual - self._fit > max(_DOUBT[0], _DOUBT[1] * self._spread)
         matcher = self._matcher if self._params.recover_when_lost else None
-        if matcher is not None and self._continuity.observe(scan, odom_from_base):
+        if matcher is not None and self._continuity.observe(scan, odom_from_base, map_from_base):
             self._moved, self._search = True, None  # what a search gathered before is about another place
         if self._moved:
             dead_reckoning = None
+        kept = dead_reckoning is not None and bool(dead_reckoning.mahalanobis(map_from_base[None])[0] < _KEPT)
         if matcher is not None and self._search is None and (doubted or self._moved):
             self._begin_search(matcher, map_from_base, dead_reckoning)
         if self._search is None:
             if not doubted:
                 self._learn(fit, step_m)
-            self._verdict = Verdict(self._fit, self._usual, -np.inf, doubted, None, None)
+            self._verdict = Verdict(self._fit, self._usual, -np.inf, doubted, None, None, kept=kept)
         else:
             self._search_m += step_m
             self._search_fit_m += step_m * fit
             self._calm_m = 0.0 if doubted else self._calm_m + step_m
             prior = None if dead_reckoning is None else partial(dead_reckoning.log_likelihood, least=_CARRIED_AWAY)
             candidates = self._search.update(scan, odom_from_base, log_prior=prior)
-            self._verdict = self._compare(candidates, map_from_base, doubted, dead_reckoning)
+            self._verdict = self._compare(candidates, map_from_base, doubted, dead_reckoning, kept)
+            if self._search is not None:
+                self._search.correct(map_from_base)
         return self._verdict
 
     def _begin_search(
@@ -185,16 +195,18 @@ class KidnapDetector:
         map_from_base: np.ndarray,
         doubted: bool,
         dead_reckoning: Optional[DeadReckoning],
+        kept: bool,
     ) -> Verdict:
         """The tracked pose with the best place elsewhere."""
         if np.isnan(candidates.fit):  # the first scan has not been matched everywhere yet
-            return Verdict(self._fit, self._usual, -np.inf, doubted, None, None, None, self._moved)
+            return Verdict(self._fit, self._usual, -np.inf, doubted, None, None, None, self._moved, kept)
         here = pose_tracker.same_place(candidates.poses, map_from_base)
         with np.errstate(divide="ignore"):
             log_w = np.log(candidates.weights)
         if dead_reckoning is not None:  # doubts need less than a new pose
             likelihood = dead_reckoning.log_likelihood(candidates.poses)
-            log_w = log_w - np.maximum(likelihood, _CARRIED_AWAY) + np.maximum(likelihood, -_HEAD_START)
+            least = -_KEPT_START if kept else -_HEAD_START
+            log_w = log_w - np.maximum(likelihood, _CARRIED_AWAY) + np.maximum(likelihood, least)
         elsewhere = None if here.all() else int(np.flatnonzero(~here)[np.argmax(log_w[~here])])
         log_there = -np.inf if elsewhere is None else log_w[elsewhere]
         log_ratio = float(log_there - log_w[here].max()) if here.any() else np.inf
@@ -207,12 +219,14 @@ class KidnapDetector:
         calm = not self._moved and self._calm_m > _CALM_M and log_ratio < self._params.search_margin
         if best_here and doubted:  # scans fit like this here, until they fit better again
             self._usual, self._learnt_m = fit_during_search, _PRIOR_M
+        elif self._learnt_m <= _PRIOR_M and here[0] and not self._moved:  # nowhere else do they fit better
+            self._usual = min(self._usual, max(self._fit, candidates.fit))
         contested = self._moved and log_ratio > -_CLEAR
         if best_here or calm or (log_ratio <= 0.0 and not doubted and not self._moved):
             self._search, self._moved = None, False
         found = candidates.poses[0] if candidates.found and not here[0] else None
         there = None if elsewhere is None else candidates.poses[elsewhere]
-        return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates, there, contested)
+        return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates, there, contested, kept)
 
     def _learn(self, fit: float, step_m: float) -> None:
         """How well scans fit where the pose is right, and how much that varies."""

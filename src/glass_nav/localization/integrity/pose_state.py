@@ -21,6 +21,10 @@ from glass_nav.vocabulary import LocalizationState
 _POSSIBLE = 8.0  # log likelihood ratio of the best place to one that is still counted as possible
 _MIN_RELIABILITY = 0.05  # of a pose that nothing else speaks against
 _LOST = 3.0  # log likelihood ratio of another place to the tracked pose
+_KEPT = (
+    3.0,
+    1.0 / 3.0,
+)  # log odds of a pose to which odometry leads from the last sure one; how much a worse fit counts there
 
 
 @dataclass(frozen=True)
@@ -185,7 +189,8 @@ def _confidence(inlier_ratio: float, verdict: Optional[Verdict], best: PoseEstim
     sigma_m = float(np.clip(np.sqrt(np.trace(best.covariance[:2, :2])), 0.005, 2.0))
     logit = -2.1 - 6.8 * (1.0 - inlier_ratio) - 1.9 * np.log(sigma_m)
     if verdict is not None and np.isfinite(verdict.fit):
-        logit -= 22.8 * max(0.0, verdict.usual - verdict.fit)
+        vouched, counts = _KEPT if verdict.kept else (0.0, 1.0)
+        logit += vouched - counts * 22.8 * max(0.0, verdict.usual - verdict.fit)
         if verdict.candidates is not None:
             logit += 2.4 - 0.95 * (float(np.clip(verdict.log_ratio, -8.0, 8.0)) + 3.0)
     return float(min(best.share, 1.0) / (1.0 + np.exp(-logit)))

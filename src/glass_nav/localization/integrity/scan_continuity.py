@@ -3,13 +3,14 @@
 A robot that is carried to a place that looks like the one it left cannot tell from the map: among doors that look alike
 scans fit as well as they did. But what it sees changes at once. Where the lidar looked through a moment ago there is a
 surface now, and the other way round. A few beams contradict each other always, where people walk and at the edges of
-things, more in glass; how many is learnt. A break counts if the next scan contradicts the one before it as well: a person
-who steps before the lidar makes a single scan look like another place. The formulation is ours. B beams.
+things, more in glass; how many is learnt. Odometry may have missed a part of the motion, so the scans are also compared
+with the motion of the tracked pose. A break counts if the next scan contradicts the one before it as well: a person who
+steps before the lidar makes a single scan look like another place. The formulation is ours. B beams.
 """
 
 from __future__ import annotations
 
-from typing import Optional, Tuple
+from typing import NamedTuple, Optional
 
 import numpy as np
 
@@ -21,36 +22,43 @@ _TOLERANCE_RAD = 0.035  # of a bearing, odometry's error included
 _MIN_BEAMS = 20  # with fewer a scan is no evidence
 _MEMORY_SCANS = 20.0  # that what is usual is averaged over
 _MIN_SCANS = 5  # before anything is unusual
-_USUAL = (0.15, 4.0)  # above the usual share of contradictions, as such and in mean deviations: a break
-_TURNS_RAD = (0.0, -0.05, 0.05, -0.1, 0.1, -0.2, 0.2)  # that odometry may have missed
+_BREAK = (0.06, 7.0)  # above the usual share of contradictions, as such and in mean deviations
+_TURNS_RAD = (-0.05, 0.05, -0.1, 0.1, -0.2, 0.2)  # that odometry may have missed
 _MAX_STEP_M = 1.0  # farther apart two scans need not have anything in common
+
+
+class _View(NamedTuple):
+    scan: Scan
+    odom_from_base: np.ndarray  # (3,) odometry at the scan
+    map_from_base: np.ndarray  # (3,) tracked pose after it
 
 
 class ScanContinuity:
     """Compares each scan with the one before it."""
 
     def __init__(self) -> None:
-        self._last: Optional[Tuple[Scan, np.ndarray]] = None  # and the odometry at it
-        self._before: Optional[Tuple[Scan, np.ndarray]] = None  # the one before a break that the next scan may confirm
+        self._last: Optional[_View] = None
+        self._before: Optional[_View] = None  # the one before a break that the next scan may confirm
         self._usual, self._deviation, self._scans = 0.0, 0.0, 0
 
-    def observe(self, scan: Scan, odom_from_base: np.ndarray) -> bool:
+    def observe(self, scan: Scan, odom_from_base: np.ndarray, map_from_base: np.ndarray) -> bool:
         """Whether this scan and the last one both contradict the one before them far more than scans usually do.
 
         Args:
             scan: one revolution of a lidar.
             odom_from_base: (3,) odometry at its stamp.
+            map_from_base: (3,) the tracked pose after it.
         """
         if np.count_nonzero(scan.answered) < _MIN_BEAMS:
             return False
-        now = scan, np.array(odom_from_base, float)
+        now = _View(scan, np.array(odom_from_base, float), np.array(map_from_base, float))
         before, last = self._before, self._last
         self._before, self._last = None, now
         excess = -np.inf if last is None else self._excess(last, now)
         confirmed = before is not None and self._excess(before, now) > self._limit
         if (
             before is None and excess > self._limit
-        ):  # else the last scan was the odd one, and contradicts both its sides
+        ):  # else the last scan was the odd one, which contradicts both its sides
             self._before = last
         if np.isfinite(excess):
             self._learn(excess)
@@ -59,16 +67,17 @@ class ScanContinuity:
     @property
     def _limit(self) -> float:
         """Of the excess; none until it is known what is usual."""
-        return max(_USUAL[0], _USUAL[1] * self._deviation) if self._scans >= _MIN_SCANS else np.inf
+        return max(_BREAK[0], _BREAK[1] * self._deviation) if self._scans >= _MIN_SCANS else np.inf
 
-    def _excess(self, before: Tuple[Scan, np.ndarray], after: Tuple[Scan, np.ndarray]) -> float:
+    def _excess(self, before: _View, after: _View) -> float:
         """Share of contradictions above the usual one; -inf: the two cannot be compared."""
-        step = se2.compose(se2.inverse(before[1]), after[1])
-        if before[0].lidar != after[0].lidar or se2.travelled(step)[0] > _MAX_STEP_M:
+        step = se2.compose(se2.inverse(before.odom_from_base), after.odom_from_base)
+        if before.scan.lidar != after.scan.lidar or se2.travelled(step)[0] > _MAX_STEP_M:
             return -np.inf
         least = np.inf
-        for turn_rad in _TURNS_RAD:
-            least = min(least, contradictions(before[0], after[0], step + [0.0, 0.0, turn_rad]) - self._usual)
+        tracked = se2.compose(se2.inverse(before.map_from_base), after.map_from_base)
+        for each in (step, tracked, *(step + [0.0, 0.0, turn_rad] for turn_rad in _TURNS_RAD)):
+            least = min(least, contradictions(before.scan, after.scan, each) - self._usual)
             if least <= self._limit:  # explained
                 break
         return least

@@ -75,6 +75,32 @@ def test_a_wrong_pose_is_doubted_within_a_metre_and_the_right_one_is_found():
     assert watched.searches == 1
 
 
+def test_a_pose_that_odometry_leads_to_is_no_poor_one_amid_visitors():
+    """They hide three quarters of the room; nothing broke the way there."""
+    true = loop_drive(30)
+
+    def amid_visitors(reckoned):
+        watched = Watched()
+        watched.drive(true[:30], odom=true[:30], reckoned=reckoned and true[:30])
+        near_m, verdicts = np.random.default_rng(0).uniform(0.3, 0.8, len(L_ROOM.scan(true[0]))), []
+        stop, seen = true[29:30], L_ROOM.scan(true[29]).ranges_m
+        for count in range(40):
+            hidden = np.arange(len(seen)) % 100 < 5 * min(count, 15)  # they come nearer one by one
+            blind = np.where(hidden, np.minimum(seen, near_m), seen)
+            verdicts += watched.drive(stop, odom=stop, blind=lambda _, blind=blind: blind, reckoned=reckoned and stop)
+        return verdicts
+
+    assert any(verdict.poor for verdict in amid_visitors(None))
+    kept = amid_visitors(true)
+    assert all(verdict.kept for verdict in kept) and not any(verdict.poor or verdict.contested for verdict in kept)
+
+
+def test_dead_reckoning_vouches_for_no_pose_away_from_it():
+    watched = Watched()
+    far = [pose + np.array([1.0, 0.0, 0.0]) for pose in loop_drive(3)]
+    assert not any(verdict.kept for verdict in watched.drive(loop_drive(3), reckoned=far))
+
+
 def test_told_not_to_it_does_not_look_elsewhere():
     watched = Watched(recover_when_lost=False)
     watched.drive(loop_drive(30))
@@ -172,7 +198,8 @@ def test_where_scans_always_fit_badly_that_becomes_usual():
         verdicts += watched.drive(
             [pose], odom=[moved], blind=lambda beams, exact=exact: exact + watched.rng.normal(0.0, 0.2, beams)
         )
-    assert verdicts[0].usual == 0.9 and 1 <= watched.searches <= 2
+    assert verdicts[0].usual == pytest.approx(verdicts[0].fit, abs=0.01)  # at once: nowhere else do they fit better
+    assert 1 <= watched.searches <= 2
     assert verdicts[-1].usual < 0.85 and verdicts[-1].candidates is None
     assert not any(verdict.found is not None or verdict.contested for verdict in verdicts)
 

@@ -143,7 +143,13 @@ def test_scans_that_fit_here_as_they_used_to_are_not_called_elsewhere():
 def test_scans_that_fit_far_worse_than_they_used_to_make_a_pose_uncertain():
     state, reason = judged([0.9], fit=0.5, usual=0.9, doubted=True)
     assert state == "UNCERTAIN" and reason.startswith("scan fit 50%, usually 90%; ")
+    assert judged([0.9], fit=0.5, usual=0.9)[0] == "UNCERTAIN"
     assert judged([0.9], fit=0.87, usual=0.9, doubted=True)[0] == "LOCALIZED"
+
+
+def test_odometry_vouches_for_a_pose_where_visitors_hide_the_map():
+    assert judged([0.6], fit=0.6, usual=0.9)[0] == "UNCERTAIN"
+    assert judged([0.6], fit=0.6, usual=0.9, kept=True)[0] == "LOCALIZED"
 
 
 def test_a_search_says_how_many_places_are_possible():

@@ -13,14 +13,21 @@ from glass_nav.localization.integrity import scan_continuity
 from glass_nav.localization.integrity.scan_continuity import ScanContinuity
 
 
-def observed(building, poses, odom=None, changed=None):
-    """What is said after each scan of a drive; changed: index -> the scan that is given instead."""
+def observed(building, poses, odom=None, changed=None, tracked=None):
+    """What is said after each scan of a drive; changed: index -> the scan that is given instead; tracked: as odom."""
+    odom = poses if odom is None else odom
     rng = np.random.default_rng(0)
     continuity = ScanContinuity()
     breaks = []
-    for index, (pose, moved) in enumerate(zip(poses, poses if odom is None else odom)):
+    for index, (pose, moved) in enumerate(zip(poses, odom)):
         scan = building.scan(pose, index, rng)
-        breaks.append(continuity.observe(scan if changed is None else changed(index, scan), np.asarray(moved)))
+        breaks.append(
+            continuity.observe(
+                scan if changed is None else changed(index, scan),
+                np.asarray(moved),
+                (odom if tracked is None else tracked)[index],
+            )
+        )
     return breaks
 
 
@@ -35,6 +42,13 @@ def test_a_robot_that_was_carried_away_is_noticed_with_the_second_scan():
     ]
     breaks = observed(L_ROOM, [*drive[:20], *there[20:]], odom=drive)
     assert breaks.index(True) == 21 and sum(breaks) == 1
+
+
+def test_what_odometry_missed_and_the_tracked_pose_followed_is_no_break():
+    drive = loop_drive(40)
+    slipped = [se2.compose(pose, [0.5, 0.3, 0.8]) if index >= 20 else pose for index, pose in enumerate(drive)]
+    assert any(observed(L_ROOM, drive, odom=slipped))
+    assert not any(observed(L_ROOM, drive, odom=slipped, tracked=drive))
 
 
 def test_one_scan_of_a_crowd_is_no_break():
