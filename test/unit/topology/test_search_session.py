@@ -546,6 +546,15 @@ def test_scans_find_the_place_once_there_is_a_map_and_before_the_first_meetpoint
     assert session.status.belief is None and session.is_looking
 
 
+def test_a_robot_of_another_building_may_be_lost_before_the_first_meetpoint(monkeypatch: pytest.MonkeyPatch) -> None:
+    session = looking(monkeypatch)
+    session._explanation.share = lambda poses: np.full(len(poses), 0.2)  # type: ignore[attr-defined]
+    told = [each for k in range(40) for each in seen(session, 0.5 * k, T_0 + k)]
+    assert states(told)[-1] == SearchState.LOST and session.choice is None and len(session.status.poses) == 0
+    session.restart()
+    assert session.is_looking
+
+
 def test_a_goal_may_succeed_on_the_way_to_a_meetpoint(monkeypatch: pytest.MonkeyPatch) -> None:
     session = looking(monkeypatch)
     session.goal(Goal())

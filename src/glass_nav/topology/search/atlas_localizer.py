@@ -92,6 +92,7 @@ class AtlasLocalizer:
     def begin(self) -> None:
         """What was known is forgotten; scans may come before the first meetpoint."""
         self._estimate, self._edges_before = None, 0
+        self._forest.clear()
         if self._joint is not None:
             self._joint.forget()
         if self._views is not None:
@@ -143,6 +144,8 @@ class AtlasLocalizer:
         """
         if estimate.map_from_base is not None:
             return estimate.map_from_base[None]
+        if not len(estimate.dart):  # LOST, perhaps before the first meetpoint
+            return np.zeros((0, 3))
         return self.map_from_base(estimate.dart[:most])
 
     def node(self, estimate: SearchEstimate) -> Optional[int]:
