@@ -3,7 +3,7 @@
 A beam is explained if it ended at one of the ranges that the five cases expect: the first surface along it, the next
 ones behind if the walls before are thin enough for glass, or the mirrored one (seed document glass_localization.txt).
 So beams that passed panes do not rule a candidate out, and a wall at any distance does not support it. A beam that
-ended in unmapped space without crossing a mapped surface is no evidence: the mapper was not there. Each pose may first
+ended in unmapped space is no evidence, unless it crossed a wall too thick for glass: the mapper was not there. Each pose may first
 slide to where the scan fits best, since it is known to about a decimetre.
 """
 
@@ -139,7 +139,8 @@ class ScanExplanation:
         measured = scan.ranges_m[beams]
         offered = np.stack([hits.first_m, hits.second_m, hits.third_m, hits.mirrored_m])  # (4, P, B)
         explained = (np.abs(offered - measured) <= self._near_m).any(axis=0)
-        return explained, explained | (hits.first_m < measured) | self._known_area.ends(points_m, poses)
+        stopped = (hits.first_m < measured) & (hits.first_thickness_m > _MAX_THICK_M)  # it went through no glass
+        return explained, explained | stopped | self._known_area.ends(points_m, poses)
 
 
 def _used_beams(scan: Scan) -> Optional[np.ndarray]:
