@@ -13,11 +13,14 @@ from pathlib import Path
 from typing import Any, List
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "support"))
 
 import numpy as np
 import rospy
 import rostest
+import tf2_ros
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from impatient_client import ImpatientClient
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap, GetMapResponse
 from room_robot import BEAMS, Robot, changed, pose_message
@@ -279,7 +282,18 @@ class LocalizationOutputs(unittest.TestCase):
         before = [("tf", stamp + TOLERANCE_NS) in came[: came.index(("status", stamp))] for stamp in scans]
         self.assertGreater(np.mean(before), 0.7, came)
         sent = [stamp for kind, stamp in came if kind == "tf" and stamp]
-        self.assertEqual(len(sent), len(set(sent)), "a stamp was sent twice")
+        seconds = {stamp * 1e-9 for stamp in sent}
+        self.assertEqual(len(sent), len(seconds), "a stamp was sent twice, as listeners in Python read it")
+
+    def test_who_asks_for_the_present_and_does_not_wait_is_answered(self) -> None:
+        """As move_base asks, at 5 Hz; with tf only after each correction about every second ask would be in vain."""
+        buffer = tf2_ros.Buffer()
+        listener = tf2_ros.TransformListener(buffer)
+        client = ImpatientClient(buffer)
+        self.assertTrue(wait_until(lambda: client.asked >= 12, 30.0), "tf has no map -> odom")
+        client.end()
+        listener.unregister()
+        self.assertLess(client.unanswered, client.asked / 3, f"of {client.asked}")
 
     # -- ~locate and ~segment_quality
 
