@@ -266,7 +266,7 @@ class LocalizationOutputs(unittest.TestCase):
     # -- tf
 
     def test_tf_goes_out_when_a_scan_comes_and_the_correction_follows(self) -> None:
-        """The last correction with the stamp of the scan and ~transform_tolerance, before the status of the scan."""
+        """The last correction, stamped ~transform_tolerance or more ahead of the scan, before the status of the scan."""
         came: List[Any] = []  # (kind, stamp [ns]) in the order in which the node sent them, 20 ms and more apart
         tf = rospy.Subscriber("/tf", TFMessage, lambda msg: came.append(("tf", stamp_of(msg))))
         status = rospy.Subscriber(
@@ -279,7 +279,10 @@ class LocalizationOutputs(unittest.TestCase):
         came = came[began:]  # both subscribers hear
         scans = [stamp for kind, stamp in came if kind == "status"][1:]
         self.assertGreater(len(scans), 5)
-        before = [("tf", stamp + TOLERANCE_NS) in came[: came.index(("status", stamp))] for stamp in scans]
+        before = [
+            any(kind == "tf" and sent >= stamp + TOLERANCE_NS for kind, sent in came[: came.index(("status", stamp))])
+            for stamp in scans
+        ]
         self.assertGreater(np.mean(before), 0.7, came)
         sent = [stamp for kind, stamp in came if kind == "tf" and stamp]
         seconds = {stamp * 1e-9 for stamp in sent}
