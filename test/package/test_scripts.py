@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Tuple
 
@@ -34,6 +35,46 @@ def test_setup_refuses_a_path_that_catkin_cannot_build_in(tmp_path: Path) -> Non
         f"setup: catkin cannot work below a path with spaces or ;$\", got '{checkout}': move the checkout",
     )
     assert not (checkout / ".build").exists()
+
+
+def test_setup_of_another_user_says_that_it_cannot_write() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        checkout = Path(folder) / "checkout"
+        (checkout / "scripts").mkdir(parents=True)
+        shutil.copy(SCRIPTS / "setup", checkout / "scripts")
+        os.chmod(folder, 0o755)
+        checkout.chmod(0o555)
+        nobody = (lambda: os.setuid(65534)) if os.getuid() == 0 else None
+        done = subprocess.run(
+            [str(checkout / "scripts" / "setup")], preexec_fn=nobody, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        )
+        checkout.chmod(0o755)
+        assert not (checkout / ".build").exists()
+    assert done.returncode == 1
+    assert (
+        done.stderr.decode()
+        .strip()
+        .endswith(
+            f"cannot write to {checkout}/.build: use a checkout of your own, or source .build/env.bash where setup has finished"
+        )
+    )
+
+
+@pytest.mark.parametrize(
+    "folders, chosen",
+    [
+        pytest.param(["humble/share/rclpy"], "", id="ROS 2 only"),
+        pytest.param(["humble/share/rclpy", "one/share/catkin"], "one", id="one beside ROS 2"),
+        pytest.param(["one/share/catkin", "noetic"], "noetic", id="noetic first, even without catkin yet"),
+        pytest.param([], "", id="nothing"),
+    ],
+)
+def test_setup_finds_the_ros_1_of_a_machine(tmp_path: Path, folders: "list[str]", chosen: str) -> None:
+    for folder in folders:
+        (tmp_path / folder).mkdir(parents=True)
+    command = f"source <(sed -n '/^ros_in()/,/^}}/p' {SCRIPTS}/setup); ros_in {tmp_path}"
+    done = subprocess.run(["bash", "-c", command], stdout=subprocess.PIPE, text=True, check=True)
+    assert done.stdout.strip() == chosen
 
 
 @pytest.mark.parametrize(

@@ -32,6 +32,7 @@ MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or les
     "driving": "geometry world sensing hypotheses localization topology",
     "recording": "geometry world sensing",
     "simulation": "geometry world sensing",
+    "interop": "geometry world sensing",
     "checkup": "geometry world sensing panes hypotheses localization recording",
     "evaluation": "geometry world",
     "evaluation/metrics": "geometry",

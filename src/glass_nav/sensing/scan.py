@@ -36,6 +36,7 @@ class Scan:
     lidar: str = ""  # which one of several: by its frame
     time_increment_s: float = 0.0  # from each beam to the next; 0: all at the stamp
     origins_m: Optional[np.ndarray] = None  # (B, 2) where in the laser's frame each beam began; None: at (0, 0)
+    intensities: Optional[np.ndarray] = None  # (B,) of the echoes, in the driver's unit; None: it gives none
 
     def __len__(self) -> int:
         return len(self.ranges_m)
@@ -100,6 +101,7 @@ def scan_from_fields(
     upside_down: bool = False,
     lidar: str = "",
     time_increment_s: float = 0.0,
+    intensities: Optional[np.ndarray] = None,
 ) -> Scan:
     """The fields of a LaserScan as a Scan, by REP 117.
 
@@ -116,6 +118,7 @@ def scan_from_fields(
         upside_down: the laser's z points down; its angles run clockwise seen from above.
         lidar: name of the lidar where there are several.
         time_increment_s: from each beam to the next.
+        intensities: (B,) as the driver wrote them; of any other length: there are none.
 
     Raises:
         ScanError: no beams, or fields that describe no lidar.
@@ -150,6 +153,9 @@ def scan_from_fields(
         np.asarray(base_from_laser, float),
         lidar,
         time_increment_s,
+        intensities=None
+        if intensities is None or len(intensities) != len(ranges_m)
+        else np.asarray(intensities, float),
     )
 
 
