@@ -28,3 +28,6 @@ def information(
 def fit(
     field: DistanceField, points_m: np.ndarray, poses: np.ndarray, scale_m: float
 ) -> np.ndarray: ...  # (K,) float64
+def log_weights(
+    field: DistanceField, points_m: np.ndarray, poses: np.ndarray, sigma_m: float, z_hit: float, z_rand: float
+) -> np.ndarray: ...  # (K,) float64

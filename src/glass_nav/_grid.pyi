@@ -88,7 +88,6 @@ class Grid:
     def free_ranges(
         self, rays: FreeRanges, poses: np.ndarray, angles: np.ndarray, max_range_m: float
     ) -> np.ndarray: ...  # (P, B) float64
-    def normals(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...  # (H * W,) float32 each
     def walls_at(self, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...  # float32, like (...) int32
     def redraw(
         self, occupancy: np.ndarray, first_row: int, first_column: int, rows: int, columns: int

@@ -280,7 +280,7 @@ def run_pf(drive: Drive, folder: Path) -> Figures:
         tracks.Moment(step.scan, step.odom_from_base, drive.truth.at(np.int64(step.scan.stamp_ns)))
         for step in drive.steps
     ]
-    folder.mkdir(exist_ok=True)
+    folder.mkdir()
     steps = [pf_localization.Step(0.0, moment) for moment in moments]
     config = pf_localization.write(folder, drive.grid_map, steps, pf_localization.settings_with(PF_CHANGES))
     grid_from_base = se2.compose(se2.inverse(drive.grid_map.map_from_grid), drive.start())
@@ -353,11 +353,11 @@ def main() -> int:
             for name in arguments.drives:
                 drive = drive_of(name, arguments.seed, arguments.seconds, folder)
                 runs: Dict[str, List[Figures]] = {}
-                for _ in range(arguments.rounds):
+                for number in range(arguments.rounds):
                     for each, node in found.items():
                         runs.setdefault(each, []).append(run_node(node, drive, arguments.rate, log))
                     if has_pf:
-                        runs.setdefault("pf-localization", []).append(run_pf(drive, folder / "pf"))
+                        runs.setdefault("pf-localization", []).append(run_pf(drive, folder / f"pf_{name}_{number}"))
                 median = {each: Figures(*np.median(np.array(all_of), axis=0)) for each, all_of in runs.items()}
                 for each, figures in median.items():
                     print(row(name, each, figures._replace(poses=int(figures.poses)), median.get("pf-localization")))

@@ -25,7 +25,7 @@ import numpy as np
 
 REPO = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("GLASS_NAV_DATA") or REPO.parent / "shared" / "data")
-LOGS = ("intel", "mit_csail", "aces", "acapulco", "wean2", "uob_trace0", "olin_mac")
+LOGS = ("intel", "mit_csail", "aces", "acapulco", "wean2", "uob_trace0", "olin_mac", "mit_racecar2")
 LEAST = 20.0
 
 

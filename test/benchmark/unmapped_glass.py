@@ -8,9 +8,11 @@
 Sections:
     glass  all panes are erased from the map (or, with --mapper erasing, by a mapper that lets beams pass); the robot
            drives its path there and back. Found: share of the visible pane length within 0.1 m and 3 degrees of a pane
-           of probability 0.9 after the way there; a point of a pane is visible if the robot had it head-on within
-           6 m. Glass: share of what was found that is. Cases, pose and cut beams of the way there with the true map, the
-           lacking one, and the lacking one with what was found drawn in; live: cut beams of the way back.
+           of probability 0.9 after the way there, at the smoothed poses that `map panes` uses (--truth: with the ground
+           truth where no pose is sure); a point of a pane is visible if the robot had it head-on within 6 m. Glass: share
+           of what was found that is. Cases, pose and cut beams of the way there with the true map, the lacking one, and
+           the lacking one with what was found drawn in; live: the same share found while driving, and cut beams of the
+           way back.
     false  pane length that is found where the map lacks none: with film on all glass, and with a third of the furniture
            moved and ten people.
     logs   the same on real logs, whose maps have their walls.
@@ -47,8 +49,11 @@ from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.localization.beam_classification.unmapped_panes import PaneUse
 from glass_nav.localization.localizer import Localizer
 from glass_nav.localization.localizer_params import LocalizerParams
+from glass_nav.panes.pane_finder import PaneFinder
 from glass_nav.recording import log_file
-from glass_nav.recording.recording import LogOptions
+from glass_nav.recording.recording import LogOptions, Step
+from glass_nav.replay.smoother import Smoother
+from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.simulation import (
     building_file,
     building_map,
@@ -147,8 +152,8 @@ def started(grid_map: GridMap, pose: np.ndarray, seed: int, find_panes: bool = T
     return localizer
 
 
-def follow(localizer: Localizer, frames: Sequence[Frame]) -> Followed:
-    """The localizer goes on with frames."""
+def follow(localizer: Localizer, frames: Sequence[Frame], smoother: Optional[Smoother] = None) -> Followed:
+    """The localizer goes on with frames; a smoother listens."""
     cases, surfaces, cpu_s = case_scores.none_yet(), SurfaceScores(), 0.0
     poses: List[np.ndarray] = []
     for frame in frames:
@@ -156,12 +161,13 @@ def follow(localizer: Localizer, frames: Sequence[Frame]) -> Followed:
         estimate = localizer.update(frame.scan, frame.odom_from_base)
         cpu_s += time.process_time() - began_s
         poses.append(estimate.map_from_base)
+        if smoother is not None:
+            smoother.listen(Step(frame.scan, frame.odom_from_base), estimate)
         cases += case_scores.of_cases(frame.truth.case, estimate.cases.case, frame.scan.answered)
         surface = estimate.surface_scan
         surfaces += case_scores.of_surfaces(frame.truth.crossing_m, surface.ranges_m, surface.cut, surface.trusted)
-    stamps = np.array([frame.scan.stamp_ns for frame in frames])
-    true = Trajectory(stamps, np.array([frame.map_from_base for frame in frames]))
-    errors = pose_errors.summary(pose_errors.of(stamps, np.array(poses), true))
+    true = truth_of(frames)
+    errors = pose_errors.summary(pose_errors.of(true.stamps_ns, np.array(poses), true))
     return Followed(
         _number(cases.metrics()["accuracy"]),
         _number(errors["position_rmse_m"]),
@@ -169,6 +175,19 @@ def follow(localizer: Localizer, frames: Sequence[Frame]) -> Followed:
         _number(surfaces.metrics()["cut_at_pane_share"]),
         1e3 * cpu_s / len(frames),
     )
+
+
+def truth_of(frames: Sequence[Frame]) -> Trajectory:
+    stamps = np.array([frame.scan.stamp_ns for frame in frames])
+    return Trajectory(stamps, np.array([frame.map_from_base for frame in frames]))
+
+
+def by_command(grid_map: GridMap, frames: Sequence[Frame], smoother: Smoother, with_truth: bool) -> List[Pane]:
+    """The panes that `map panes` draws after a drive that the smoother listened to."""
+    poses, finder = smoother.smooth_sure(truth_of(frames) if with_truth else None), PaneFinder(grid_map)
+    for frame in frames if poses is not None else ():
+        finder.observe(frame.scan, *poses.at(frame.scan.stamp_ns))
+    return [pane for pane in finder.panes(anew=True) if pane.probability >= PaneUse().pane_min_probability]
 
 
 def _number(value: Optional[float]) -> float:
@@ -236,8 +255,8 @@ def length_of(panes: Sequence[Pane]) -> float:
 def glass(arguments: argparse.Namespace) -> Iterator[Bar]:
     print(
         f"\nGlass erased from the map, mapper {arguments.mapper}\n\n| building | lidar | seed | visible m | found | "
-        "found m | glass | accuracy true / lacking / written | position m | yaw deg | cut | live cut |\n"
-        + "|---" * 12
+        "live | found m | glass | accuracy true / lacking / written | position m | yaw deg | cut | live cut |\n"
+        + "|---" * 13
         + "|"
     )
     rows: Dict[str, List[Tuple[float, float]]] = {}
@@ -254,29 +273,34 @@ def glass(arguments: argparse.Namespace) -> Iterator[Bar]:
         else:
             lacking = building_map.draw(building, erased=erased_glass.choose(building, 1.0, seed))
         localizer = started(lacking, there[0].map_from_base, seed)
-        without = follow(localizer, there)
-        drawn = [pane for pane in localizer.found_panes if pane.probability >= PaneUse().pane_min_probability]
+        smoother = Smoother(DistanceField(lacking))
+        without = follow(localizer, there, smoother)
+        drawn = by_command(lacking, there, smoother, arguments.truth)
+        live_lines = lines_of(localizer.unmapped_panes)
         live = follow(localizer, back)
         with_true, with_drawn = (
             follow(started(each, there[0].map_from_base, seed, find_panes=False), there)
             for each in (true_map, drawn_panes.drawn(lacking, drawn))
         )
         true_lines, found_lines = np.array([building.panes[number].line_m for number in panes]), lines_of(drawn)
-        seen_m = hit_m = 0.0
+        seen_m = hit_m = live_m = 0.0
         for number in panes:
             line_m, seen = (
                 building.panes[number].line_m,
                 visible(building, number, there, model.field_of_view_rad / 2.0),
             )
-            hit = covered(points_along(line_m), _direction(line_m), found_lines)
+            hit, live_hit = (
+                covered(points_along(line_m), _direction(line_m), lines) for lines in (found_lines, live_lines)
+            )
             seen_m, hit_m = seen_m + STEP_M * seen.sum(), hit_m + STEP_M * (seen & hit).sum()
+            live_m += STEP_M * (seen & live_hit).sum()
         real = [covered(points_along(line), _direction(line), true_lines) for line in found_lines]
         own_m, own_glass_m = STEP_M * sum(map(len, real)), STEP_M * float(sum(each.sum() for each in real))
         rows.setdefault(preset, []).append((seen_m, hit_m))
         found_m, glass_m = found_m + own_m, glass_m + own_glass_m
         written.append((with_true, with_drawn, live))
         print(
-            f"| {name} | {preset} | {seed} | {seen_m:.1f} | {_share(hit_m, seen_m)} | {own_m:.1f} | "
+            f"| {name} | {preset} | {seed} | {seen_m:.1f} | {_share(hit_m, seen_m)} | {_share(live_m, seen_m)} | {own_m:.1f} | "
             f"{_share(own_glass_m, own_m)} | {with_true.accuracy:.3f} / {without.accuracy:.3f} / "
             f"{with_drawn.accuracy:.3f} | {with_true.position_m:.3f} / {without.position_m:.3f} / "
             f"{with_drawn.position_m:.3f} | {with_true.yaw_deg:.2f} / {without.yaw_deg:.2f} / {with_drawn.yaw_deg:.2f} | "
@@ -460,6 +484,7 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=1, help="drives of each building and lidar")
     parser.add_argument("--floors", type=int, default=10, help="random floors, if there are any")
     parser.add_argument("--mapper", choices=("complete", "erasing"), default="complete")
+    parser.add_argument("--truth", action="store_true", help="as if the drives had a ground truth")
     parser.add_argument("--max-scans", type=int, metavar="N", help="of each log")
     parser.add_argument("--data", type=Path, default=DATA, metavar="FOLDER", help="default: GLASS_NAV_DATA")
     arguments = parser.parse_args()

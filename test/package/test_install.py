@@ -38,8 +38,8 @@ def install() -> Path:
 
 def in_install_space(install: Path, command: str, cwd: Path) -> "subprocess.CompletedProcess[str]":
     """A command of a shell that knows the install space only."""
-    noetic = "/opt/ros/noetic/setup.bash"
-    before = f"source {noetic}; " if os.path.exists(noetic) else ""
+    ros = next(Path("/opt/ros").glob("*/share/catkin"), None)  # ROS 1
+    before = "" if ros is None else f"source {ros.parents[1]}/setup.bash; "
     return subprocess.run(
         ["/bin/bash", "-c", f"{before}source '{install}/setup.bash'; {command}"],
         cwd=cwd,
@@ -95,6 +95,7 @@ def test_nothing_of_the_tests_or_the_build_is_installed(install: Path) -> None:
         "glass_nav._grid",
         "glass_nav._mrpt_io",
         "glass_nav._mrpt_rays",
+        "glass_nav._particles",
         "glass_nav.msg",
         "glass_nav.srv",
     ],

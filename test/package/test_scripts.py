@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Tuple
 
@@ -36,6 +37,46 @@ def test_setup_refuses_a_path_that_catkin_cannot_build_in(tmp_path: Path) -> Non
     assert not (checkout / ".build").exists()
 
 
+def test_setup_of_another_user_says_that_it_cannot_write() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        checkout = Path(folder) / "checkout"
+        (checkout / "scripts").mkdir(parents=True)
+        shutil.copy(SCRIPTS / "setup", checkout / "scripts")
+        os.chmod(folder, 0o755)
+        checkout.chmod(0o555)
+        nobody = (lambda: os.setuid(65534)) if os.getuid() == 0 else None
+        done = subprocess.run(
+            [str(checkout / "scripts" / "setup")], preexec_fn=nobody, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        )
+        checkout.chmod(0o755)
+        assert not (checkout / ".build").exists()
+    assert done.returncode == 1
+    assert (
+        done.stderr.decode()
+        .strip()
+        .endswith(
+            f"cannot write to {checkout}/.build: use a checkout of your own, or source .build/env.bash where setup has finished"
+        )
+    )
+
+
+@pytest.mark.parametrize(
+    "folders, chosen",
+    [
+        pytest.param(["humble/share/rclpy"], "", id="ROS 2 only"),
+        pytest.param(["humble/share/rclpy", "one/share/catkin"], "one", id="one beside ROS 2"),
+        pytest.param(["one/share/catkin", "noetic"], "noetic", id="noetic first, even without catkin yet"),
+        pytest.param([], "", id="nothing"),
+    ],
+)
+def test_setup_finds_the_ros_1_of_a_machine(tmp_path: Path, folders: "list[str]", chosen: str) -> None:
+    for folder in folders:
+        (tmp_path / folder).mkdir(parents=True)
+    command = f"source <(sed -n '/^ros_in()/,/^}}/p' {SCRIPTS}/setup); ros_in {tmp_path}"
+    done = subprocess.run(["bash", "-c", command], stdout=subprocess.PIPE, text=True, check=True)
+    assert done.stdout.strip() == chosen
+
+
 @pytest.mark.parametrize(
     "arguments, message",
     [
@@ -55,7 +96,16 @@ def test_each_script_explains_itself(script: str, words: str, option: str) -> No
     assert code == 0 and words in out and "set -euo" not in out
 
 
-NODES = ("amcl", "driver_node", "landmarks_node", "localization_node", "map_node", "simulator_node", "topology_node")
+NODES = (
+    "amcl",
+    "driver_node",
+    "landmarks_node",
+    "localization_node",
+    "map_node",
+    "scanner_node",
+    "simulator_node",
+    "topology_node",
+)
 
 
 @pytest.mark.parametrize("node", [*NODES, "bag_player", "wakeup_demo"])

@@ -16,6 +16,7 @@ from typing import Any, Dict, Iterator, List, NamedTuple, Tuple
 from glass_nav import params
 from glass_nav.ros.driver.driver_params import DriverParams
 from glass_nav.ros.landmarks.landmarks_node import LandmarksNodeParams
+from glass_nav.ros.landmarks.scanner_node import ScannerNodeParams
 from glass_nav.ros.localization.params import LocalizationParams
 from glass_nav.ros.simulator.simulator_node import SimulatorNodeParams
 from glass_nav.ros.topology.topology_params import TopologyParams
@@ -27,6 +28,7 @@ NODES: Dict[str, Tuple[type, str]] = {
     "topology_node": (TopologyParams, "config/topology.yaml"),
     "driver_node": (DriverParams, "config/driver.yaml"),
     "landmarks_node": (LandmarksNodeParams, "config/landmarks.yaml"),
+    "scanner_node": (ScannerNodeParams, "config/scanner.yaml"),
     "simulator_node": (SimulatorNodeParams, "config/simulator.yaml"),
 }
 HEADER = """# Parameters

@@ -32,6 +32,7 @@ MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or les
     "driving": "geometry world sensing hypotheses localization topology",
     "recording": "geometry world sensing",
     "simulation": "geometry world sensing",
+    "interop": "geometry world sensing",
     "checkup": "geometry world sensing panes hypotheses localization recording",
     "evaluation": "geometry world",
     "evaluation/metrics": "geometry",
@@ -59,6 +60,7 @@ FOR_ALL = {
 }
 ONLY_BY = {  # compiled modules, each behind its face; and what is heavy, where it is needed
     "glass_nav._beam_vote": "localization",
+    "glass_nav._particles": "localization",
     "glass_nav._distance_field": "hypotheses sensing",
     "glass_nav._grid": "hypotheses sensing",
     "glass_nav._mrpt_io": "recording world",

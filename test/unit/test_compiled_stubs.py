@@ -25,7 +25,7 @@ def in_stub(body: List[ast.stmt]) -> Names:
             found[node.name] = [argument.arg for argument in node.args.args]
         elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
             found[node.target.id] = ["self"]  # an attribute
-        elif isinstance(node, ast.ClassDef) and not node.bases:
+        elif isinstance(node, ast.ClassDef) and "TypedDict" not in [getattr(base, "id", "") for base in node.bases]:
             found[node.name] = in_stub(node.body)
     return found
 
@@ -43,7 +43,9 @@ def in_module(owner: Any) -> Names:
             found[name] = ["self"]
         else:
             signature = value.__doc__.strip().splitlines()[0]
-            found[name] = re.findall(r"(\w+): ", signature)
+            arguments = re.findall(r"(\w+): ", signature)
+            if arguments or name != "__init__":  # without: the class has no constructor
+                found[name] = arguments
     return found
 
 

@@ -6,6 +6,8 @@ from typing import List
 
 import numpy as np
 
+from glass_nav.geometry import polyline
+from glass_nav.geometry.polyline import Polyline
 from glass_nav.topology.atlas.atlas import Atlas
 
 MIN_ROOM_M = 0.5  # around nodes of the tour
@@ -24,7 +26,7 @@ def nodes(atlas: Atlas, here_m: np.ndarray, count: int, rng: np.random.Generator
     """
     _, part = atlas.components()
     position = atlas.nodes.position_m
-    at = int(np.argmin(np.hypot(*(position - here_m).T)))
+    at = _nearest(atlas, here_m)
     tour: List[int] = []
     for _ in range(count):
         away_m = np.hypot(*(position - position[at]).T)
@@ -36,3 +38,17 @@ def nodes(atlas: Atlas, here_m: np.ndarray, count: int, rng: np.random.Generator
         at = int(rng.choice(choices))
         tour.append(at)
     return tour
+
+
+def _nearest(atlas: Atlas, here_m: np.ndarray) -> int:
+    """The node at the end of the edge that passes nearest: the nearest node may be behind a wall."""
+    off_m = np.full(len(atlas.edges), np.inf)
+    for edge in range(len(atlas.edges)):
+        line = atlas.edges.polyline_m[edge]
+        if len(line) < 2:
+            line = atlas.nodes.position_m[atlas.darts.node[2 * edge : 2 * edge + 2]]
+        points = polyline.distinct(line)
+        path = Polyline(points) if len(points) > 1 else None
+        off_m[edge] = np.hypot(*((points[0] if path is None else path.at(path.nearest(here_m))) - here_m))
+    ends = atlas.darts.node[2 * int(off_m.argmin()) + np.arange(2)]
+    return int(ends[np.argmin(np.hypot(*(atlas.nodes.position_m[ends] - here_m).T))])

@@ -171,6 +171,9 @@ class WakeUpDemo:
         off_m = float(np.hypot(*(pose - true)[:2]))
         off_rad = abs(float(angles.wrap(pose[2] - true[2])))
         right = off_m < RIGHT_M and off_rad < RIGHT_RAD
+        taken_s = 1e-9 * (stamp_ns - min(self._heard.truth))
+        driven_m = polyline.length(self._heard.true_path_m(to_ns=stamp_ns))
+        self._robot.say(f"after {taken_s:.0f} s and {driven_m:.1f} m: {found.reason}")
         self._robot.say(
             f"CONFIRMED after {found.depth} edges, {'right' if right else 'WRONG'}: hands over x {pose[0]:.2f} m, "
             f"y {pose[1]:.2f} m, {off_m:.3f} m and {math.degrees(off_rad):.1f} degrees off the truth"

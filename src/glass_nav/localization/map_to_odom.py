@@ -13,6 +13,7 @@ from typing import Optional
 
 import numpy as np
 
+_STEP_NS = 1_000  # between two stamps: Python's tf2 reads them as doubles, whose steps are 240 ns wide today
 _JUMP_NS = 1_000_000_000  # stamps that go back by more are of a clock that was set back
 _AHEAD_NS = 500_000_000  # a scan stamped further in the future has a wrong clock, and tf would keep its stamp
 
@@ -55,5 +56,5 @@ class MapToOdom:
         if self._last_scan_ns == 0 and scan_ns + tolerance_ns < self._last_sent_ns - _JUMP_NS:
             self._last_sent_ns = 0
         self._last_scan_ns = max(scan_ns, self._last_scan_ns)
-        self._last_sent_ns = max(scan_ns + tolerance_ns, self._last_sent_ns + 1)
+        self._last_sent_ns = max(scan_ns + tolerance_ns, self._last_sent_ns + _STEP_NS)
         return StampedTransform(self._last_sent_ns, map_from_odom)

@@ -16,7 +16,9 @@ from glass_nav.sensing.raycast import RayCaster
 from glass_nav.world.grid_map import GridMap
 
 _ALL_AROUND = np.ones((3, 3), bool)
-_SURFACE, _NEAR, _SPECK = np.uint8(1), np.uint8(2), np.uint8(4)  # flags of a cell: see is_surface() and the others
+# Flags of a cell: see is_surface() and the others. That of a surface is a percentage of occupancy too, above that of a wall
+# whatever else is set, so that the flags are the map on which rays are cast.
+_SURFACE, _NEAR, _SPECK = np.int8(96), np.int8(1), np.int8(2)
 
 
 class MappedSurfaces:
@@ -31,11 +33,11 @@ class MappedSurfaces:
         """
         self._grid_map = grid_map
         solid = _without_specks(grid_map, speck_m)
-        self._caster = RayCaster(replace(grid_map, occupancy=np.where(solid, 100, 0).astype(np.int8)))
         reach = max(1, int(np.ceil(near_m / grid_map.resolution_m)))
         self._flags = _SURFACE * solid
         self._flags += _NEAR * ndimage.maximum_filter(solid, size=2 * reach + 1)
         self._flags += _SPECK * ndimage.binary_dilation(grid_map.occupied, _ALL_AROUND)
+        self._caster = RayCaster(replace(grid_map, occupancy=self._flags))
 
     @property
     def resolution_m(self) -> float:
@@ -57,7 +59,7 @@ class MappedSurfaces:
         """(...) bool: points (..., 2) lie in a cell of a surface."""
         return self._has(_SURFACE, points_m)
 
-    def _has(self, flag: np.uint8, points_m: np.ndarray) -> np.ndarray:
+    def _has(self, flag: np.int8, points_m: np.ndarray) -> np.ndarray:
         rows, columns = self._grid_map.cells(points_m)
         inside = self._grid_map.contains(rows, columns)
         flags = self._flags[np.where(inside, rows, 0), np.where(inside, columns, 0)]

@@ -2,8 +2,8 @@
 
 A beam that ended in front of the first mapped surface met something that the map lacks, and time shows what: a pane
 answers within some degrees of its normal only, wherever the robot looks at it head-on, and lets beams pass at other
-angles; a thing that was put there answers from everywhere and lets none pass; a person moves on. The formulation is
-ours. Lines are traced through the returns (pane_lines.py), and every piece of a line is looked up in the kept scans
+angles; a thing that was put there answers from everywhere and lets none pass; a person moves on. Where the lidar gives
+intensities, those that differ from this lidar's own walls count too (wall_intensity.py). The formulation is ours. Lines are traced through the returns (pane_lines.py), and every piece of a line is looked up in the kept scans
 (pane_evidence.py).
 """
 
@@ -15,11 +15,12 @@ from typing import Dict, List, Optional, Sequence, Set, Tuple
 import numpy as np
 
 from glass_nav.geometry import se2
-from glass_nav.panes import kept_scans, pane_evidence, pane_lines
+from glass_nav.panes import kept_scans, pane_evidence, pane_lines, wall_intensity
 from glass_nav.panes.kept_scans import KeptScans
 from glass_nav.panes.mapped_surfaces import MappedSurfaces
 from glass_nav.panes.pane_evidence import PIECE_M, Counts, Likelihoods
 from glass_nav.panes.pane_lines import Line, Returns
+from glass_nav.panes.wall_intensity import WallIntensity
 from glass_nav.params import number
 from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import GridMap
@@ -41,6 +42,10 @@ _THIN_M = 0.05  # of a surface for each return that is kept
 _CHORD = 3  # beams to either side, whose ends show how a surface runs
 _DEPTH_M, _RANGE_ERROR_M = 0.3, 0.04
 _MAX_SLOPE = float(np.sin(np.radians(20.0)))
+
+
+# Of one scan: points (N, 2) and directions (N,) in map, the width (N,) of each and how it differs from walls (N,).
+_Unmapped = Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -95,7 +100,8 @@ class PaneFinder:
         self._p = params
         self._mapped = MappedSurfaces(grid_map, params.pane_speck_m, params.pane_near_wall_m)
         self._scans = KeptScans(params.pane_spacing_m, params.pane_max_scans)
-        self._unmapped: Dict[int, Tuple[np.ndarray, np.ndarray, np.ndarray]] = {}  # by row of the kept scan
+        self._unmapped: Dict[int, _Unmapped] = {}  # by row of the kept scan
+        self._walls: Dict[str, WallIntensity] = {}  # by lidar
         self._last: Dict[str, np.ndarray] = {}  # map_from_base of the last kept scan, by lidar
         self._given = tuple(known)
         self._remembered = tuple(known)
@@ -158,10 +164,8 @@ class PaneFinder:
         self._remembered = tuple(found)
         return found
 
-    def _unmapped_returns(
-        self, scan: Scan, laser: np.ndarray, mapped_m: np.ndarray
-    ) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points (N, 2) and directions (N,) in map of returns that may be of a pane, and the width (N,) of each."""
+    def _unmapped_returns(self, scan: Scan, laser: np.ndarray, mapped_m: np.ndarray) -> _Unmapped:
+        """The returns that may be of a pane."""
         with np.errstate(invalid="ignore"):
             early = np.flatnonzero(
                 scan.answered
@@ -176,7 +180,20 @@ class PaneFinder:
         width_m = step_rad * range_m[chosen]
         one_each = np.flatnonzero(np.diff(np.floor(np.cumsum(np.minimum(1.0, width_m / _THIN_M))), prepend=0.0))
         chosen = chosen[one_each]
-        return points_m[chosen], beam_rad[chosen], np.maximum(width_m[one_each], _THIN_M)
+        excess = self._excess(scan, mapped_m)[early[chosen]]
+        return points_m[chosen], beam_rad[chosen], np.maximum(width_m[one_each], _THIN_M), excess
+
+    def _excess(self, scan: Scan, mapped_m: np.ndarray) -> np.ndarray:
+        """(B,) how intensities differ from those of walls, see WallIntensity, which learns from the scan; NaN: not known."""
+        if scan.intensities is None:
+            return np.full(len(scan), np.nan)
+        walls = self._walls.setdefault(scan.lidar, WallIntensity())
+        ranges_m = np.where(scan.answered, scan.ranges_m, np.nan)
+        points_m = ranges_m[:, None] * np.stack([np.cos(scan.angles_rad), np.sin(scan.angles_rad)], axis=-1)
+        incidence_rad = wall_intensity.incidence(points_m, scan.angles_rad)
+        mapped = np.flatnonzero(np.abs(ranges_m - mapped_m) <= self._p.pane_near_wall_m)
+        walls.learn(ranges_m[mapped], incidence_rad[mapped], scan.intensities[mapped])
+        return walls.excess(ranges_m, incidence_rad, scan.intensities)
 
     def _returns(self, boxes: "Sequence[_Box]") -> Returns:
         """All returns in some boxes."""
@@ -185,11 +202,11 @@ class PaneFinder:
             for row, laser in enumerate(self._scans.map_from_laser)
             if any(box.contains(laser[:2], self._p.pane_reach_m) for box in boxes)
         ]
-        parts = [self._unmapped[row] for row in rows] or [(np.zeros((0, 2)), np.zeros(0), np.zeros(0))]
-        points_m, beam_rad, width_m = (np.concatenate(values) for values in zip(*parts))
+        parts = [self._unmapped[row] for row in rows] or [(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0))]
+        points_m, beam_rad, width_m, excess = (np.concatenate(values) for values in zip(*parts))
         scan = np.repeat(rows or [0], [len(part[1]) for part in parts])
         inside = np.any([box.contains(points_m, 0.0) for box in boxes], axis=0)
-        return Returns(points_m[inside], beam_rad[inside], width_m[inside], scan[inside])
+        return Returns(points_m[inside], beam_rad[inside], width_m[inside], scan[inside], excess[inside])
 
     def _along(self, line: Line, returns: Returns) -> List[Pane]:
         """The panes on a line: stretches of it that were seen head-on, and what joins them."""
@@ -211,7 +228,9 @@ class PaneFinder:
         for first, last in self._stretches(supported, log_odds):
             inside = np.arange(first, last + 1)
             ends_m = at_m[first] - 0.5 * PIECE_M, at_m[last] + 0.5 * PIECE_M
-            pane = self._pane(line, ends_m, inside[~mapped[first : last + 1]], counts, likelihoods)
+            on_it = line.members[(member >= first) & (member <= last)]
+            intensity = wall_intensity.log_odds(returns.excess[on_it])
+            pane = self._pane(line, ends_m, inside[~mapped[first : last + 1]], counts, likelihoods, intensity)
             panes += [] if pane is None else [pane]
         return panes
 
@@ -230,9 +249,17 @@ class PaneFinder:
         return stretches
 
     def _pane(
-        self, line: Line, ends_m: Tuple[float, float], own: np.ndarray, counts: Counts, likelihoods: Likelihoods
+        self,
+        line: Line,
+        ends_m: Tuple[float, float],
+        own: np.ndarray,
+        counts: Counts,
+        likelihoods: Likelihoods,
+        intensity: float,
     ) -> Optional[Pane]:
-        """The pane between two places along a line, by its own pieces; None if too little of it was seen."""
+        """The pane between two places along a line, by its own pieces and the log odds of its intensities; None if too
+        little of it was seen.
+        """
         seen_from_m = max(float(counts.seen_from_m[own].max()), ends_m[1] - ends_m[0])
         if ends_m[1] - ends_m[0] < self._p.pane_min_length_m or seen_from_m < _LEAST_SPREAD_M:
             return None
@@ -250,7 +277,7 @@ class PaneFinder:
         held = sum(self._is_held(line, end_m, sign) for end_m, sign in zip(ends_m, (-1.0, 1.0)))
         share = 1.0 if held else min(1.0, pane.length_m / _LOOSE_M) ** 2
         log_odds = self._prior(before) + _HELD_LOG_ODDS[held] + share * likelihoods.whole(own)
-        return replace(pane, probability=_probability(log_odds))
+        return replace(pane, probability=_probability(log_odds + intensity))
 
     def _is_held(self, line: Line, end_m: float, sign: float) -> bool:
         """Whether the line goes on from this end to something mapped: a wall, a post, more of the pane."""

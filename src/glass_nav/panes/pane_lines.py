@@ -31,6 +31,7 @@ class Returns:
     beam_rad: np.ndarray  # (N,) direction of the beam in map
     width_m: np.ndarray  # (N,) distance from one beam to the next there
     scan: np.ndarray  # (N,) number of the kept scan
+    excess: np.ndarray  # (N,) of the intensity over that of walls, see WallIntensity; NaN: not known
 
     def __len__(self) -> int:
         return len(self.scan)

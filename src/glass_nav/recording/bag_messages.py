@@ -178,6 +178,7 @@ def raw_scan(message: Any) -> RawScan:
         float(message.range_max),
         float(message.time_increment),
         float(message.scan_time),
+        message.intensities,
     )
 
 

@@ -92,7 +92,7 @@ class BagWriter(MessageWriter):
             range_min=scan.range_min_m,
             range_max=scan.range_max_m,
             ranges=scan.ranges_m.astype(np.float32),
-            intensities=np.zeros(0, np.float32),
+            intensities=np.array([] if scan.intensities is None else scan.intensities, np.float32),
         )
 
     def truth(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
+from contextlib import closing
 from typing import Callable, Dict, List, Optional, Tuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from glass_nav.evaluation.metrics.replay_result import NO_BEAM, BeamExample, Kep
 from glass_nav.geometry import se2
 from glass_nav.localization.localizer import Estimate
 from glass_nav.localization.method import PoseFilter
+from glass_nav.recording.read_ahead import read_ahead
 from glass_nav.recording.recording import BeamTruth, Recording, RecordingError, Refusal, Step
 from glass_nav.replay.window import Window
 from glass_nav.sensing.scan import Scan, ScanError
@@ -53,22 +55,23 @@ def run(
     refusals: "Counter[str]" = Counter()
     scores = _Scores(recording, window.expected(len(recording), recording.duration_s))
     worst = _WorstScans(recording, window.expected(len(recording), recording.duration_s))
-    for entry in window.of(recording):
-        if isinstance(entry, Refusal):
-            refusals[entry.reason] += 1
-        else:
-            try:
-                if not rows:
-                    start(entry.scan.stamp_ns)
-                before = time.process_time()
-                estimate = localizer.update(entry.scan, entry.odom_from_base)
-                cpu_ms = 1e3 * (time.process_time() - before)
-                worst.take(len(rows), entry.scan, estimate)
-                rows.append(_Row(entry.odom_from_base, estimate, cpu_ms, scores.take(entry.scan, estimate)))
-                listen(entry, estimate)
-            except ScanError as err:
-                refusals[err.reason] += 1
-        step_done()
+    with closing(read_ahead(window.of(recording))) as entries:
+        for entry in entries:
+            if isinstance(entry, Refusal):
+                refusals[entry.reason] += 1
+            else:
+                try:
+                    if not rows:
+                        start(entry.scan.stamp_ns)
+                    before = time.process_time()
+                    estimate = localizer.update(entry.scan, entry.odom_from_base)
+                    cpu_ms = 1e3 * (time.process_time() - before)
+                    worst.take(len(rows), entry.scan, estimate)
+                    rows.append(_Row(entry.odom_from_base, estimate, cpu_ms, scores.take(entry.scan, estimate)))
+                    listen(entry, estimate)
+                except ScanError as err:
+                    refusals[err.reason] += 1
+            step_done()
     if not rows:
         raise RecordingError(f"{recording.name}: {_nothing_usable(refusals)}")
     return _result(rows, refusals, recording, scores, worst.kept(), time.perf_counter() - began, seed)

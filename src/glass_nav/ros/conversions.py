@@ -189,6 +189,7 @@ def raw_scan_from_msg(msg: LaserScan) -> RawScan:
         msg.range_max,
         msg.time_increment,
         msg.scan_time,
+        np.array(msg.intensities, float),
     )
 
 

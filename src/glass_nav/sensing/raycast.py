@@ -13,7 +13,7 @@ cell meets it at 0; one that starts outside the map meets what it enters.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Optional, Tuple
+from typing import Tuple
 
 import numpy as np
 
@@ -102,7 +102,6 @@ class RayCaster:
         self._grid = _grid.Grid(
             grid_map.occupancy, grid_map.resolution_m, OCCUPIED_PERCENT, unknown == "stop", self._guide
         )
-        self._normals: Optional[Tuple[np.ndarray, np.ndarray, np.ndarray]] = None
 
     @property
     def grid_map(self) -> GridMap:
@@ -123,7 +122,6 @@ class RayCaster:
         self._grid.redraw(
             grid_map.occupancy, rows.start, columns.start, rows.stop - rows.start, columns.stop - columns.start
         )
-        self._normals = None
 
     def cast(self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float) -> np.ndarray:
         """Ranges to the first surface.
@@ -269,20 +267,20 @@ class RayCaster:
         return self._grid.free_ranges(self._guide or _mrpt_rays(self._grid_map), poses, angles_rad, max_range_m)
 
     def normals(self) -> Tuple[np.ndarray, np.ndarray]:
-        """Normals of all cells that a ray may meet first; computed once, when first needed.
+        """Normals of all cells that a ray may meet first.
 
         Returns:
             normal_rad: (H * W,) float32 axis of the normal in map, up to half a turn; NaN: none.
             linearity: (H * W,) float32, 1 straight wall ... 0 no direction, or no normal.
         """
-        return self._walls()[:2]
+        return self.walls_at(self._cells())[:2]
 
     def wall_offsets_m(self) -> np.ndarray:
         """(H * W,) float32 from the centre of each cell to the line of its wall, along the normal; NaN: none.
 
         A slanted wall is a staircase of cells; the line through them is the wall.
         """
-        return self._walls()[2]
+        return self.walls_at(self._cells())[2]
 
     def walls_at(self, cell: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """normals() and wall_offsets_m() at flat cells (...) alone: normal_rad, linearity, offset_m, each (...) float32.
@@ -295,11 +293,8 @@ class RayCaster:
         normal_rad, linearity, offset_m = self._grid.walls_at(cell)
         return self._in_map(normal_rad), linearity, offset_m
 
-    def _walls(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        if self._normals is None:  # two threads may both compute it: the same arrays
-            normal_rad, linearity, offset_m = self._grid.normals()
-            self._normals = self._in_map(normal_rad), linearity, offset_m
-        return self._normals
+    def _cells(self) -> np.ndarray:
+        return np.arange(self._grid_map.occupancy.size, dtype=np.int32)
 
     def _in_map(self, grid_angle_rad: np.ndarray) -> np.ndarray:
         yaw = self._grid_map.map_from_grid[2]

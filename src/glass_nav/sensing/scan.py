@@ -6,6 +6,7 @@ B beams. Ranges follow REP 117: -inf too near, +inf nothing met, NaN no measurem
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Optional
 
 import numpy as np
@@ -36,6 +37,7 @@ class Scan:
     lidar: str = ""  # which one of several: by its frame
     time_increment_s: float = 0.0  # from each beam to the next; 0: all at the stamp
     origins_m: Optional[np.ndarray] = None  # (B, 2) where in the laser's frame each beam began; None: at (0, 0)
+    intensities: Optional[np.ndarray] = None  # (B,) of the echoes, in the driver's unit; None: it gives none
 
     def __len__(self) -> int:
         return len(self.ranges_m)
@@ -46,11 +48,17 @@ class Scan:
         return np.isfinite(self.ranges_m)
 
     def points_in_base(self) -> np.ndarray:
-        """(B, 2) end points [m] in the robot's frame; NaN where the beam did not answer."""
+        """(B, 2) end points [m] in the robot's frame, not to be changed; NaN where the beam did not answer."""
+        return self._points_in_base
+
+    @cached_property
+    def _points_in_base(self) -> np.ndarray:
         x, y, yaw = self.base_from_laser
         bearing = self.angles_rad + yaw
         ranges_m = np.where(self.answered, self.ranges_m, np.nan)
-        return np.stack([x + ranges_m * np.cos(bearing), y + ranges_m * np.sin(bearing)], axis=-1)
+        points_m = np.stack([x + ranges_m * np.cos(bearing), y + ranges_m * np.sin(bearing)], axis=-1)
+        points_m.flags.writeable = False
+        return points_m
 
     def as_measured(self, ranges_m: np.ndarray) -> np.ndarray:
         """(B,) ranges from where each beam began, of points on the beams with these ranges from the laser at the stamp.
@@ -100,6 +108,7 @@ def scan_from_fields(
     upside_down: bool = False,
     lidar: str = "",
     time_increment_s: float = 0.0,
+    intensities: Optional[np.ndarray] = None,
 ) -> Scan:
     """The fields of a LaserScan as a Scan, by REP 117.
 
@@ -116,6 +125,7 @@ def scan_from_fields(
         upside_down: the laser's z points down; its angles run clockwise seen from above.
         lidar: name of the lidar where there are several.
         time_increment_s: from each beam to the next.
+        intensities: (B,) as the driver wrote them; of any other length: there are none.
 
     Raises:
         ScanError: no beams, or fields that describe no lidar.
@@ -150,6 +160,9 @@ def scan_from_fields(
         np.asarray(base_from_laser, float),
         lidar,
         time_increment_s,
+        intensities=None
+        if intensities is None or len(intensities) != len(ranges_m)
+        else np.asarray(intensities, float),
     )
 
 

@@ -45,6 +45,7 @@ class RawScan:
     range_max_m: float
     time_increment_s: float = 0.0  # from each beam to the next; 0: not known
     scan_time_s: float = 0.0  # from each sweep to the next; 0: not known
+    intensities: Optional[np.ndarray] = None  # (B,) or empty, in the driver's unit
 
     @property
     def timing_fault(self) -> Optional[str]:
@@ -83,6 +84,7 @@ def mounted(raw: RawScan, mounting: Mounting, limits: Optional[RangeLimits] = No
         mounting.upside_down,
         raw.lidar,
         raw.time_increment_s,
+        raw.intensities,
     )
 
 

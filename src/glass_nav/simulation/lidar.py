@@ -24,6 +24,7 @@ from glass_nav.vocabulary import BeamCase
 ECHOES = ("first", "strongest", "last")
 VISIBILITIES = ("logistic", "lobe")
 FLOOR_REFLECTANCE = 0.1  # least that the lidar detects at maximum range, face on
+WHITE_INTENSITY = 1000.0  # of a white wall, face on at 1 m
 USUAL_DIRT = 0.004  # of a pane; dirty_share is given for this dirt
 LARGEST_PANES = 8  # considered on one path, two for each double glazing
 RESOLVED_M = 0.05  # closer echoes merge into one, labelled as the stronger
@@ -115,6 +116,7 @@ class TrueScan:
     case: np.ndarray  # (B,) uint8
     exact_m: np.ndarray  # (B,) path length without noise, NaN: no answer
     crossing_m: np.ndarray  # (B,) where it passed or was mirrored at the first mapped pane, NaN: neither
+    intensity: np.ndarray  # (B,) of the echo: 1000 for a white wall face on at 1 m; 0: no answer
 
 
 @dataclass(frozen=True)
@@ -213,6 +215,7 @@ def _reported(model: LidarModel, echoes: List[_Echoes], first_m: np.ndarray, rng
         np.where(answered, case[beams, best], BeamCase.UNCERTAIN).astype(np.uint8),
         np.where(answered, exact_m, np.nan),
         np.where(answered, crossing_m[beams, best], passed_m),
+        np.where(answered, np.rint(WHITE_INTENSITY * power[beams, best]), 0.0),
     )
 
 

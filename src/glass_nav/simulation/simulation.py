@@ -212,6 +212,7 @@ class Simulation:
             model.range_max_m,
             self.base_from_laser,
             time_increment_s=turn_ns * 1e-9 / (model.beams - 1),
+            intensities=truth.intensity.astype(np.float32),
         )
         odom_from_base = Trajectory(track.stamps_ns, np.array([moment.odom_from_base for moment in self._track])).at(
             np.int64(stamp_ns)

@@ -20,7 +20,7 @@ import numpy as np
 from glass_nav.log_line import LogLine
 from glass_nav.params import number
 from glass_nav.sensing.scan import Scan
-from glass_nav.topology import frame_relation
+from glass_nav.topology import frame_relation, search_story
 from glass_nav.topology.atlas import atlas_file
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.topology.frame_relation import FrameRelation
@@ -32,6 +32,8 @@ from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.topology.search.served_explanation import ServedExplanation
 from glass_nav.vocabulary import SearchState
 from glass_nav.world.grid_map import GridMap
+
+ON_THE_WAY_S = 5.0  # from one line between meetpoints to the next
 
 ReadAtlas = Callable[[], Tuple[str, Atlas]]  # where it was found, and the atlas
 
@@ -154,6 +156,7 @@ class SearchSession:
         self._last_meetpoint: Optional[Meetpoint] = None
         self._unpaired_meetpoint: Optional[Meetpoint] = None
         self._unpaired_traversal: Optional[Tuple[Traversal, int]] = None  # with its stamp [ns]
+        self._told = -1, 0  # places left, and the stamp [ns], when the log said so
 
     @property
     def status(self) -> SearchStatus:
@@ -201,7 +204,8 @@ class SearchSession:
         """
         loaded = self._load()
         if self._p.search_at_start:
-            return [loaded, self._await_meetpoint("the node has started")]
+            waiting = self._await_meetpoint("the node has started")
+            return [loaded, waiting, LogLine(f"{waiting.state}: {waiting.reason}")]
         return [loaded, self._show(SearchState.IDLE, "no search was asked for")]
 
     def meetpoint(self, meetpoint: Meetpoint) -> List[Decision]:
@@ -235,7 +239,18 @@ class SearchSession:
         if not is_new:
             return []
         self._status = replace(self._status, belief=localizer.belief)
-        return [self._status]
+        return [self._status, *self._told_on_the_way(localizer.belief, scan.stamp_ns)]
+
+    def _told_on_the_way(self, belief: Optional[Belief], stamp_ns: int) -> List[Decision]:
+        """A line where the number of places that are left has changed, and the last line is some time ago."""
+        if belief is None:
+            return []
+        risk = self._search_params.tolerances.risk
+        left, (told_left, told_ns) = len(belief.left(risk)), self._told
+        if left == told_left or 0 <= stamp_ns - told_ns < ON_THE_WAY_S * 1e9:
+            return []
+        self._told = left, stamp_ns
+        return [LogLine(search_story.on_the_way(belief, risk))]
 
     def edge_traversal(self, traversal: Traversal, stamp_ns: int) -> List[Decision]:
         """The robot reports an edge that it drove, before or after the meetpoint at its end.
@@ -407,7 +422,7 @@ class SearchSession:
         self._status = status
         decisions: List[Decision] = [
             status,
-            LogLine(f"{estimate.depth} edges: {estimate.state}, {estimate.reason}"),
+            LogLine(search_story.after(estimate, localizer.forest, stamp_ns)),
         ]
         if goal is not None and not estimate.done:
             decisions.append(Progress(status))

@@ -32,3 +32,10 @@ def test_it_ends_where_no_node_is_left() -> None:
     nodes = drawn(50)
     assert len(set(nodes)) == len(nodes) <= 7
     assert drawn(0) == []
+
+
+def test_a_tour_begins_in_the_part_that_the_robot_is_in_where_a_node_behind_a_wall_is_nearer() -> None:
+    """In the middle of a long corridor, beside a room."""
+    atlas = made_atlases.corridors([(0, 0), (20, 0), (10, 2), (10, 6)], [1.0] * 4, [(0, 1), (2, 3)])
+    nodes = tour.nodes(atlas, np.array([10.0, 0.1]), 1, np.random.default_rng(0))
+    assert set(nodes) <= {0, 1} and nodes

@@ -27,7 +27,7 @@ def test_the_correction_holds_from_the_time_up_to_which_tf_was_sent():
     sender.corrected(100 * MS, ONE, 50 * MS)
     sent = sender.arrived(200 * MS, 201 * MS, 50 * MS)
     corrected = sender.corrected(200 * MS, OTHER, 50 * MS)
-    assert corrected is not None and corrected.stamp_ns == sent.stamp_ns + 1
+    assert corrected is not None and corrected.stamp_ns == sent.stamp_ns + 1_000
     assert sender.arrived(300 * MS, 301 * MS, 50 * MS).map_from_odom.tolist() == OTHER.tolist()
 
 
@@ -58,12 +58,23 @@ def test_stamps_only_ascend_when_a_later_correction_is_of_an_older_scan_or_the_t
     assert np.all(np.diff([each.stamp_ns for each in stamps]) > 0)
 
 
+def test_stamps_differ_also_as_seconds_in_a_double():
+    """As Python's tf2 takes them: it drops a transform whose stamp it has already."""
+    sender, now_ns = MapToOdom(), 1_795_000_000_123_456_789
+    sent = [
+        sender.corrected(now_ns, ONE, 100 * MS),
+        sender.arrived(now_ns + 100 * MS, now_ns + 100 * MS, 100 * MS),
+        sender.corrected(now_ns + 100 * MS, OTHER, 100 * MS),
+    ]
+    assert len({each.stamp_ns * 1e-9 for each in sent}) == len(sent)
+
+
 def test_starting_over_forgets_the_pose_and_sends_no_stamp_twice():
     sender = MapToOdom()
     sender.corrected(100 * MS, ONE, 50 * MS)
     sender.start_over()
     assert sender.arrived(200 * MS, 200 * MS, 50 * MS) is None
-    assert sender.corrected(100 * MS, OTHER, 50 * MS).stamp_ns == 150 * MS + 1
+    assert sender.corrected(100 * MS, OTHER, 50 * MS).stamp_ns == 150 * MS + 1_000
 
 
 def test_after_the_clock_was_set_back_stamps_are_those_of_the_scans_again():

@@ -56,5 +56,5 @@ print(json.dumps(figures))
 def test_a_cell_takes_less_than_24_bytes_and_a_particle_less_than_2_kB():
     done = subprocess.run([sys.executable, "-c", PROGRAM], stdout=subprocess.PIPE, text=True, timeout=120.0, check=True)
     before, with_map, highest_before, highest = json.loads(done.stdout)
-    assert (with_map - before) / 1000**2 < 37.0
+    assert (with_map - before) / 1000**2 < 24.0
     assert (highest - highest_before) / 20_000 < 2000.0

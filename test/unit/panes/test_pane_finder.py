@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import List
 
 import made_pane_drive
@@ -32,6 +33,27 @@ def test_a_pane_is_found_where_it_is() -> None:
     assert pane.returns > 20
     assert pane.passes > 100
     assert pane.seen_from_m > 3.0
+
+
+def probability(intensity: "float | None") -> float:
+    """Of a pane seen for a short way whose returns are so bright; those of walls are 100 to 120."""
+    glass = made_pane_drive.pane((4.0, 2.5), (4.8, 2.5), 0.3)
+    finder, rng = PaneFinder(hall()), np.random.default_rng(0)
+    for _ in range(3):
+        for scan, pose in made_pane_drive.scans(glass):
+            if intensity is not None:
+                at_glass = scan.ranges_m < made_pane_drive.wall_ranges(pose) - 0.1
+                brightness = np.where(at_glass, intensity, rng.uniform(100.0, 120.0, len(scan)))
+                scan = replace(scan, intensities=np.full(len(scan), 47.0) if intensity == 47.0 else brightness)
+            finder.observe(scan, pose, SURE)
+    (pane,) = finder.panes()
+    return pane.probability
+
+
+def test_bright_returns_make_a_pane_more_probable_and_constant_ones_change_nothing() -> None:
+    without = probability(None)
+    assert probability(300.0) > without > probability(110.0)
+    assert probability(47.0) == without
 
 
 def test_a_slanted_pane_has_its_direction() -> None:

@@ -54,7 +54,9 @@ def bag(tmp_path):
                 writer.odometry(
                     stamp_ns - 20_000_000 * (READINGS - 1 - reading), odometry(step), np.array([0.5, 0.25, 0.125])
                 )
-            scan = scan_from_fields(stamp_ns, ranges(index), -1.5, 0.1, 0.1, 25.0, LASER)
+            scan = scan_from_fields(
+                stamp_ns, ranges(index), -1.5, 0.1, 0.1, 25.0, LASER, intensities=np.arange(BEAMS) + index
+            )
             writer.scan(scan, 0.1)
             writer.truth(stamp_ns, *truth(index))
     return path
@@ -84,6 +86,7 @@ def test_our_reader_takes_it_as_a_robots(bag):
         assert isinstance(step, Step)
         assert step.scan.stamp_ns == START_NS + 100_000_000 * index
         np.testing.assert_array_equal(step.scan.ranges_m.astype(np.float32), ranges(index))
+        np.testing.assert_array_equal(step.scan.intensities, np.arange(BEAMS) + index)
         np.testing.assert_allclose(step.scan.angles_rad, -1.5 + 0.1 * np.arange(BEAMS), atol=1e-6)
         np.testing.assert_allclose(step.scan.base_from_laser, LASER, atol=1e-9)
         np.testing.assert_allclose(step.odom_from_base, odometry(READINGS * index + READINGS - 1), atol=1e-9)

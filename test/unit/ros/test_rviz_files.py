@@ -69,14 +69,11 @@ def test_the_driver_is_switched_off_and_has_a_checkbox_for_each_thing():
     assert "/glass_driver/markers" in topics() and "~markers" in driver_node.__doc__
 
 
-def test_the_displays_of_the_wake_up_are_the_same_with_the_driver_switched_on():
-    text = (REPO / "rviz" / "wakeup.rviz").read_text(encoding="utf-8")
-    wakeup = yaml.safe_load(text)
-    shown = wakeup["Visualization Manager"]["Displays"]
-    for display in shown:
-        if display["Name"] == "Driver":
-            assert display["Enabled"] is True
-            display["Enabled"] = False
+def test_the_displays_of_the_wake_up_are_the_same_and_the_view_is_on_the_map():
+    wakeup = yaml.safe_load((REPO / "rviz" / "wakeup.rviz").read_text(encoding="utf-8"))
+    view = wakeup["Visualization Manager"]["Views"]["Current"]
+    assert view["Target Frame"] == "map"
+    view["Target Frame"] = CONFIG["Visualization Manager"]["Views"]["Current"]["Target Frame"]
     assert wakeup == CONFIG
 
 

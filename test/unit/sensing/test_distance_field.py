@@ -124,3 +124,19 @@ def test_made_in_strips_it_is_the_same(monkeypatch, rows):
     whole = DistanceField(there, max_distance_m=0.5).distance(*points)
     monkeypatch.setattr(distance_field, "_STRIP_ROWS", rows)
     np.testing.assert_array_equal(DistanceField(there, max_distance_m=0.5).distance(*points), whole)
+
+
+def test_log_weights_are_those_of_the_distances():
+    """Against numpy, one distance after the other."""
+    rng = np.random.default_rng(5)
+    occupancy = np.where(rng.uniform(size=(60, 80)) < 0.02, 100, 0).astype(np.int8)
+    field = DistanceField(GridMap(occupancy, 0.05, np.array([-1.0, 0.5, 0.3])))
+    points_m = rng.uniform(-2.0, 2.0, (70, 2))
+    poses = np.column_stack([rng.uniform(-2.0, 3.0, (25, 2)), rng.uniform(-np.pi, np.pi, 25)])
+    sigma_m, z_hit, z_rand = 0.04, 0.95, 0.05
+    ends_m = se2.transform_points(poses[:, None], points_m)
+    square = np.minimum((field.distance(ends_m[..., 0], ends_m[..., 1]) / sigma_m) ** 2, 100.0)
+    expected = np.log(z_hit * np.exp(-0.5 * square) + z_rand).sum(axis=1)
+    log_w = field.log_weights(points_m, poses, sigma_m, z_hit, z_rand)
+    np.testing.assert_allclose(log_w, expected, atol=1e-5 * len(points_m))
+    assert np.ptp(log_w) > 1.0

@@ -60,6 +60,12 @@ def test_the_drivers_array_is_not_touched():
     np.testing.assert_array_equal(ranges_m, [0.0, 20.0, 3.0])
 
 
+@pytest.mark.parametrize("given", [None, [], [1.0]])
+def test_intensities_that_do_not_match_the_beams_are_none(given):
+    assert scan([1.0, 2.0], intensities=given).intensities is None
+    np.testing.assert_array_equal(scan([1.0, 2.0], intensities=[7.0, 9.0]).intensities, [7.0, 9.0])
+
+
 def test_only_finite_ranges_are_answers():
     np.testing.assert_array_equal(scan([1.0, np.inf, np.nan, 0.01, 9.9]).answered, [True, False, False, False, True])
 

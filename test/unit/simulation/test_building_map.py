@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -145,15 +146,45 @@ def test_seven_buildings_ship():
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_shipped_map_is_what_its_building_draws(name):
-    """After a change: python3 -c "from glass_nav.simulation.building_map import redraw; redraw('maps/NAME')".
-
-    A cell that a line just touches may fall either way with another numpy.
+    """To the cell, on every machine. After a change:
+    python3 -c "from glass_nav.simulation.building_map import redraw; redraw('maps/NAME')".
     """
     drawn, shipped = building_map.draw(building_file.load(MAPS / name)), map_file.load(MAPS / name / "map.yaml")
-    assert shipped.occupancy.shape == drawn.occupancy.shape
-    assert np.mean(shipped.occupancy != drawn.occupancy) < 5e-4
-    np.testing.assert_allclose(shipped.map_from_grid, drawn.map_from_grid)
-    assert shipped.resolution_m == drawn.resolution_m
+    assert shipped.fingerprint == drawn.fingerprint
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_coordinates_that_are_rounded_otherwise_draw_the_same_cells(name):
+    """Another numpy or processor rounds the last digits of a sine differently."""
+    building, rng = building_file.load(MAPS / name), np.random.default_rng(0)
+
+    def nudged(points_m):
+        return points_m * (1.0 + rng.choice([-4e-16, 0.0, 4e-16], points_m.shape))
+
+    other = replace(
+        building,
+        walls=tuple(replace(wall, line_m=nudged(wall.line_m)) for wall in building.walls),
+        panes=tuple(replace(pane, line_m=nudged(pane.line_m)) for pane in building.panes),
+        things=tuple(replace(thing, outline_m=nudged(thing.outline_m)) for thing in building.things),
+    )
+    assert building_map.draw(other).fingerprint == building_map.draw(building).fingerprint
+
+
+@pytest.mark.parametrize("per_cell", [1, 10])
+def test_points_along_a_line_are_no_farther_apart_than_asked_and_begin_and_end_with_it(per_cell):
+    """Against fractions; lengths that are whole steps, or nearly, included."""
+    rng = np.random.default_rng(0)
+    ends = np.concatenate([[[0, 0], [3_000_000, 4_000_000]], rng.integers(-(10**8), 10**8, (8, 2))])
+    from_um, to_um = np.array([ends[0], *ends[2:6]]), np.array([ends[1], *ends[6:]])
+    for start, end in zip(from_um, to_um):
+        cells = building_map._cells(start[None], end[None], 50_000, per_cell)
+        count = len(cells) - 1
+        exact = [
+            [Fraction(int(a) * count + k * int(b - a), count) // 50_000 for a, b in zip(start, end)]
+            for k in range(count + 1)
+        ]
+        np.testing.assert_array_equal(cells, np.array(exact, int))
+        assert count * 50_000 >= per_cell * np.hypot(*(end - start).astype(float))
 
 
 @pytest.mark.parametrize("name", SHIPPED)

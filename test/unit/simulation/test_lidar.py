@@ -68,6 +68,16 @@ def test_a_wall_ends_a_beam():
     assert ahead(hall()) == (AHEAD_M, 1, AHEAD_M, None)
 
 
+def test_the_intensity_is_the_power_of_the_echo():
+    """Of a white wall face on 1000 / r^2; of a beam without an answer 0."""
+
+    def intensity(building, model):
+        return float(lidar.scan(model, building, LASER, 0.0, np.random.default_rng(0)).intensity[1])
+
+    assert intensity(hall(), TRANSPARENT) == round(1000.0 / AHEAD_M**2)
+    assert intensity(hall(), replace(TRANSPARENT, range_max_m=5.0)) == 0.0
+
+
 def test_a_pane_answers_itself_or_lets_the_wall_behind_answer():
     assert ahead(hall(panes=[across(6.0)]), WHITE) == (4.0, 1, 4.0, None)
     assert ahead(hall(panes=[across(6.0)])) == (AHEAD_M, 3, AHEAD_M, 4.0)

@@ -107,7 +107,8 @@ def texts(decisions: List[Decision]) -> List[str]:
 def test_the_first_meetpoint_begins_a_search() -> None:
     session = made()
     assert session.status.state == SearchState.NO_ATLAS
-    line, status = session.start()
+    line, status, said = session.start()
+    assert said.text == "WAITING: the next meetpoint begins a search: the node has started"
     assert isinstance(line, LogLine) and line.text.endswith("atlas.json: 4 nodes, 4 edges")
     assert (status, session.status.state) == (session.status, SearchState.WAITING)
     assert session.status.reason == "the next meetpoint begins a search: the node has started"
@@ -121,7 +122,9 @@ def test_the_first_meetpoint_begins_a_search() -> None:
         None,
     )
     assert only(decisions, Turn) == Turn(session.choice, T_0)
-    assert texts(decisions) == [f"0 edges: SEARCHING, {status.reason}"]
+    assert texts(decisions) == [
+        f"meetpoint with 3 edges, 1.50 m from the walls: SEARCHING, {status.reason}; next turn RIGHT"
+    ]
 
 
 def test_a_session_can_wait_until_it_is_asked() -> None:

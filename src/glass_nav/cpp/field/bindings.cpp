@@ -10,6 +10,7 @@
 #include <pybind11/pybind11.h>
 
 #include "distance_field.hpp"
+#include "field_weights.hpp"
 #include "scan_alignment.hpp"
 
 namespace py = pybind11;
@@ -120,6 +121,18 @@ py::array_t<double> fit(const DistanceField& field, const Array<double>& points_
   return result;
 }
 
+py::array_t<double> log_weights(const DistanceField& field, const Array<double>& points_m, const Array<double>& poses,
+                                double sigma_m, double z_hit, double z_rand) {
+  const Points points = points_of(points_m);
+  const std::vector<Pose> at = poses_of(poses);
+  py::array_t<double> result(static_cast<py::ssize_t>(at.size()));
+  double* to = result.mutable_data();
+  py::gil_scoped_release unlocked;
+  const LogDensity density(sigma_m, z_hit, z_rand);
+  for (const Pose& pose : at) *to++ = log_weight_at(field, points, pose, density);
+  return result;
+}
+
 }  // namespace
 }  // namespace glass_nav
 
@@ -134,4 +147,6 @@ PYBIND11_MODULE(_distance_field, module) {
              py::arg("damping"), py::arg("iterations"), py::arg("first_scale_m"), py::arg("last_scale_m"));
   module.def("information", &information, py::arg("field"), py::arg("points_m"), py::arg("poses"), py::arg("scale_m"));
   module.def("fit", &fit, py::arg("field"), py::arg("points_m"), py::arg("poses"), py::arg("scale_m"));
+  module.def("log_weights", &log_weights, py::arg("field"), py::arg("points_m"), py::arg("poses"), py::arg("sigma_m"),
+             py::arg("z_hit"), py::arg("z_rand"));
 }

@@ -191,28 +191,6 @@ py::array_t<double> free_ranges(const GridRaycaster& grid, const FreeRanges& ray
   return range_m;
 }
 
-py::tuple normals(const GridRaycaster& grid) {
-  const WallNormals* walls = nullptr;
-  {
-    py::gil_scoped_release unlocked;
-    walls = &grid.normals();
-  }
-  const auto count = static_cast<py::ssize_t>(grid.width()) * grid.height();
-  const std::vector<py::ssize_t> shape{count};  // not the bare number: pybind11 2.10 makes that an array of stride 0
-  py::array_t<float> normal_rad(shape), linearity(shape), offset_m(shape);
-  float *angle_to = normal_rad.mutable_data(), *linearity_to = linearity.mutable_data();
-  float* offset_to = offset_m.mutable_data();
-  std::fill(angle_to, angle_to + count, std::numeric_limits<float>::quiet_NaN());
-  std::fill(linearity_to, linearity_to + count, 0.0F);
-  std::fill(offset_to, offset_to + count, std::numeric_limits<float>::quiet_NaN());
-  walls->for_each([&](std::int32_t cell, const WallNormals::Normal& normal) {
-    angle_to[cell] = std::atan2(normal.y, normal.x);
-    linearity_to[cell] = normal.linearity;
-    offset_to[cell] = static_cast<float>(normal.offset * grid.resolution_m());
-  });
-  return py::make_tuple(normal_rad, linearity, offset_m);
-}
-
 py::tuple walls_at(const GridRaycaster& grid, const Array<std::int32_t>& cell) {
   const std::int32_t* from = cell.data();
   const py::ssize_t count = cell.size();
@@ -226,9 +204,11 @@ py::tuple walls_at(const GridRaycaster& grid, const Array<std::int32_t>& cell) {
   float* offset_to = offset_m.mutable_data();
   {
     py::gil_scoped_release unlocked;
+    constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+    constexpr WallNormals::Normal kNone{kNaN, kNaN, 0.0F, kNaN};
     const WallNormals& walls = grid.normals();
     for (py::ssize_t i = 0; i < count; ++i) {
-      const WallNormals::Normal normal = walls.at(from[i]);
+      const WallNormals::Normal normal = from[i] < 0 ? kNone : walls.at(from[i]);
       angle_to[i] = std::atan2(normal.y, normal.x);
       linearity_to[i] = normal.linearity;
       offset_to[i] = static_cast<float>(normal.offset * grid.resolution_m());
@@ -290,7 +270,6 @@ PYBIND11_MODULE(_grid, module) {
            py::arg("max_range_m"), py::arg("max_thickness_m"), py::arg("min_linearity"), py::arg("min_gap_m"),
            py::arg("mirrored_by_line"), py::arg("grid_yaw"), py::arg("threads"))
       .def("free_ranges", &free_ranges, py::arg("rays"), py::arg("poses"), py::arg("angles"), py::arg("max_range_m"))
-      .def("normals", &normals)
       .def("walls_at", &walls_at, py::arg("cell"))
       .def("redraw", &redraw, py::arg("occupancy"), py::arg("first_row"), py::arg("first_column"), py::arg("rows"),
            py::arg("columns"));

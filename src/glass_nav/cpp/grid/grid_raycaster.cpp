@@ -87,7 +87,9 @@ const WallNormals& GridRaycaster::normals() const {
   return *normals_;
 }
 
-GridCells GridRaycaster::cells() const { return {width_, height_, chessboard_distance_.get(), unknown_stops_ ? unknown_.data() : nullptr}; }
+GridCells GridRaycaster::cells() const {
+  return {width_, height_, chessboard_distance_.get(), unknown_stops_ ? unknown_.data() : nullptr};
+}
 
 template <class Use>
 void GridRaycaster::with_ray_marcher(const Use& use) const {

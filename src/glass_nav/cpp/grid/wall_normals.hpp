@@ -34,17 +34,6 @@ class WallNormals {
   /// Normal of one cell; {NaN, NaN, 0, NaN} for a cell inside a wall or without neighbours.
   Normal at(std::int32_t cell) const;
 
-  /// Calls use(flat index, normal) for each boundary cell, ascending.
-  template <class Use>
-  void for_each(const Use& use) const {
-    std::size_t found = 0;
-    for (std::size_t word = 0; word < boundary_.size(); ++word) {
-      for (std::uint64_t bits = boundary_[word]; bits != 0; bits &= bits - 1) {
-        use(static_cast<std::int32_t>(kBits * word) + __builtin_ctzll(bits), normals_[found++]);
-      }
-    }
-  }
-
  private:
   static constexpr std::size_t kBits = 64;
 

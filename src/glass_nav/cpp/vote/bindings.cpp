@@ -1,11 +1,16 @@
 /// The Python module _beam_vote. Private: docstrings, checks and defaults are in
-/// localization/beam_classification/case_votes.py.
+/// localization/beam_classification/case_votes.py and behind_panes.py.
+#include <algorithm>
 #include <stdexcept>
+#include <vector>
 
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include "case_decision.hpp"
 #include "case_votes.hpp"
+#include "pane_echoes.hpp"
+#include "soft_vote.hpp"
 
 namespace py = pybind11;
 
@@ -15,11 +20,10 @@ namespace {
 template <class T>
 using Array = py::array_t<T, py::array::c_style | py::array::forcecast>;
 
-py::array_t<double> case_votes(const Array<double>& measured_m, const Array<double>& range_m, const Array<double>& cos,
-                               const Array<float>& thickness_m, const Array<double>& prior, double nothing,
-                               double depth_share, double sigma_m, double gate_m, double min_cos, double temper) {
+Offers offers_of(const Array<double>& measured_m, const Array<double>& range_m, const Array<double>& cos,
+                 const Array<float>& thickness_m) {
   if (measured_m.ndim() != 1) throw std::invalid_argument("measured must be (B,)");
-  const py::ssize_t beams = measured_m.shape(0), paths = kPaths, others = kOthers;
+  const py::ssize_t beams = measured_m.shape(0), paths = kPaths;
   const auto fits = [&](const py::array& array) {
     return array.ndim() == 3 && array.shape(0) == paths && array.shape(1) == range_m.shape(1) &&
            array.shape(2) == beams;
@@ -27,21 +31,142 @@ py::array_t<double> case_votes(const Array<double>& measured_m, const Array<doub
   if (range_m.ndim() != 3 || range_m.shape(1) < 1 || !fits(range_m) || !fits(cos) || !fits(thickness_m)) {
     throw std::invalid_argument("ranges, cosines and thicknesses must be (4, N, B)");
   }
-  if (prior.ndim() != 2 || prior.shape(0) != paths + others || prior.shape(1) != beams) {
+  return {static_cast<std::size_t>(range_m.shape(1)),
+          static_cast<std::size_t>(beams),
+          measured_m.data(),
+          range_m.data(),
+          cos.data(),
+          thickness_m.data()};
+}
+
+void check_rows(const py::array& array, py::ssize_t rows, const Offers& offers, const char* text) {
+  if (array.size() != rows * static_cast<py::ssize_t>(offers.beams)) throw std::invalid_argument(text);
+}
+
+py::array_t<double> shares_for(const Offers& offers) {
+  return py::array_t<double>(std::vector<std::size_t>{kPaths + 1, offers.beams});
+}
+
+py::array_t<double> case_votes(const Array<double>& measured_m, const Array<double>& range_m, const Array<double>& cos,
+                               const Array<float>& thickness_m, const Array<double>& prior, double nothing,
+                               double depth_share, double sigma_m, double gate_m, double min_cos, double temper) {
+  const Offers offers = offers_of(measured_m, range_m, cos, thickness_m);
+  if (prior.ndim() != 2 || prior.shape(0) != static_cast<py::ssize_t>(kPaths + kOthers) ||
+      prior.shape(1) != measured_m.shape(0)) {
     throw std::invalid_argument("priors must be (6, B)");
   }
-  py::array_t<double> share({paths + 1, beams});
-  const Offers offers{static_cast<std::size_t>(range_m.shape(1)),
-                      static_cast<std::size_t>(beams),
-                      measured_m.data(),
-                      range_m.data(),
-                      cos.data(),
-                      thickness_m.data()};
+  py::array_t<double> share = shares_for(offers);
   const Chances chances{prior.data(), nothing, depth_share, sigma_m, gate_m, min_cos, temper};
   double* to = share.mutable_data();
   py::gil_scoped_release unlocked;
   count_case_votes(offers, chances, to);
   return share;
+}
+
+PaneModel panes_of(const Array<double>& gains, const Array<double>& frequencies, double sigma_m, double max_range_m,
+                   double min_cos) {
+  if (gains.ndim() != 1 || gains.size() != frequencies.size()) throw std::invalid_argument("coatings must be (C,)");
+  return {sigma_m, max_range_m, min_cos, gains.data(), frequencies.data(), static_cast<std::size_t>(gains.size())};
+}
+
+py::array_t<double> soft_votes(const Array<double>& measured_m, const Array<double>& range_m, const Array<double>& cos,
+                               const Array<float>& thickness_m, const Array<double>& axis_rad,
+                               const Array<bool>& seen_side, const Array<double>& reflectance,
+                               const Array<double>& returns, const Array<bool>& unmapped_end,
+                               const Array<double>& glass, const Array<double>& gains, const Array<double>& frequencies,
+                               double porous_returns, double uncertain, double uncertain_behind, double max_range_m,
+                               double depth_share, double sigma_m, double gate_m, double min_cos, double temper,
+                               double pull) {
+  const Offers offers = offers_of(measured_m, range_m, cos, thickness_m);
+  check_rows(axis_rad, kPaths, offers, "axes must be (4, B)");
+  check_rows(seen_side, kPaths, offers, "seen sides must be (4, B)");
+  check_rows(reflectance, 1, offers, "reflectances must be (B,)");
+  check_rows(returns, 1, offers, "returns must be (B,)");
+  check_rows(unmapped_end, 1, offers, "unmapped ends must be (B,)");
+  check_rows(glass, 4, offers, "chances of glass must be (2, 2, B)");
+  const PoseView view{axis_rad.data(),
+                      seen_side.data(),
+                      reflectance.data(),
+                      returns.data(),
+                      unmapped_end.data(),
+                      glass.data(),
+                      glass.data() + 2 * offers.beams};
+  const PaneModel panes = panes_of(gains, frequencies, sigma_m, max_range_m, min_cos);
+  const SoftVote vote{{porous_returns, uncertain, uncertain_behind}, depth_share, gate_m, temper, pull};
+  py::array_t<double> share = shares_for(offers);
+  double* to = share.mutable_data();
+  py::gil_scoped_release unlocked;
+  vote_softly(offers, view, panes, vote, to);
+  return share;
+}
+
+/// New arrays of the cases, copies of those given.
+struct CaseArrays {
+  py::array_t<std::uint8_t> beam_case;
+  py::array_t<double> expected_m, residual_m, weight;
+
+  explicit CaseArrays(const Offers& offers)
+      : beam_case(shape(offers)), expected_m(shape(offers)), residual_m(shape(offers)), weight(shape(offers)) {}
+
+  static std::vector<std::size_t> shape(const Offers& offers) { return {offers.beams}; }
+
+  DecidedCases data() {
+    return {beam_case.mutable_data(), expected_m.mutable_data(), residual_m.mutable_data(), weight.mutable_data()};
+  }
+  py::tuple tuple() const { return py::make_tuple(beam_case, expected_m, residual_m, weight); }
+};
+
+py::tuple decided(const Array<double>& share, const Array<double>& measured_m, const Array<double>& range_m,
+                  const Array<double>& cos, const Array<float>& thickness_m, double min_share, double gate_m,
+                  double depth_share, double min_cos) {
+  const Offers offers = offers_of(measured_m, range_m, cos, thickness_m);
+  check_rows(share, kPaths + 1, offers, "shares must be (5, B)");
+  CaseArrays cases(offers);
+  decide_cases(share.data(), offers, {min_share, gate_m, depth_share, min_cos}, cases.data());
+  return cases.tuple();
+}
+
+py::tuple seen_from(const Array<std::uint8_t>& beam_case, const Array<double>& expected_m, const Array<double>& weight,
+                    const Array<double>& measured_m, const Array<double>& range_m, const Array<double>& cos,
+                    const Array<float>& thickness_m, double gate_m, double depth_share, double min_cos) {
+  const Offers offers = offers_of(measured_m, range_m, cos, thickness_m);
+  check_rows(beam_case, 1, offers, "cases must be (B,)");
+  check_rows(expected_m, 1, offers, "expected ranges must be (B,)");
+  check_rows(weight, 1, offers, "weights must be (B,)");
+  CaseArrays cases(offers);
+  std::copy_n(beam_case.data(), offers.beams, cases.beam_case.mutable_data());
+  std::copy_n(expected_m.data(), offers.beams, cases.expected_m.mutable_data());
+  std::copy_n(weight.data(), offers.beams, cases.weight.mutable_data());
+  see_from(offers, {0.0, gate_m, depth_share, min_cos}, cases.data());
+  return cases.tuple();
+}
+
+py::tuple pane_echoes(const Array<double>& measured_m, const Array<double>& range_m, const Array<double>& mirrored_cos,
+                      const Array<double>& turned_rad, const Array<double>& reflectance, const Array<bool>& seen_side,
+                      const Array<bool>& unmapped_end, const Array<double>& gains, const Array<double>& frequencies,
+                      double sigma_m, double max_range_m, double min_cos) {
+  const std::vector<py::ssize_t> shape{measured_m.size()};
+  const std::size_t beams = static_cast<std::size_t>(measured_m.size());
+  const Offers beams_only{0, beams, nullptr, nullptr, nullptr, nullptr};
+  check_rows(range_m, kPaths, beams_only, "ranges must be (4, B)");
+  check_rows(seen_side, kPaths, beams_only, "seen sides must be (4, B)");
+  for (const py::array& array :
+       {py::array(mirrored_cos), py::array(turned_rad), py::array(reflectance), py::array(unmapped_end)}) {
+    check_rows(array, 1, beams_only, "cosines, turns, reflectances and unmapped ends must be (B,)");
+  }
+  const PaneModel model = panes_of(gains, frequencies, sigma_m, max_range_m, min_cos);
+  py::array_t<double> mirrored(shape), unmapped(shape);
+  for (std::size_t b = 0; b < beams; ++b) {
+    std::array<double, kPaths> ends;
+    for (std::size_t path = 0; path < kPaths; ++path) ends[path] = range_m.data()[path * beams + b];
+    const PaneEcho echo =
+        pane_echo({measured_m.data()[b], ends, mirrored_cos.data()[b], turned_rad.data()[b], reflectance.data()[b],
+                   seen_side.data()[2 * beams + b], seen_side.data()[3 * beams + b], unmapped_end.data()[b]},
+                  model);
+    mirrored.mutable_data()[b] = echo.mirrored;
+    unmapped.mutable_data()[b] = echo.unmapped;
+  }
+  return py::make_tuple(mirrored, unmapped);
 }
 
 }  // namespace
@@ -52,4 +177,19 @@ PYBIND11_MODULE(_beam_vote, module) {
   module.def("case_votes", &case_votes, py::arg("measured_m"), py::arg("range_m"), py::arg("cos"),
              py::arg("thickness_m"), py::arg("prior"), py::arg("nothing"), py::arg("depth_share"), py::arg("sigma_m"),
              py::arg("gate_m"), py::arg("min_cos"), py::arg("temper"));
+  module.def("soft_votes", &soft_votes, py::arg("measured_m"), py::arg("range_m"), py::arg("cos"),
+             py::arg("thickness_m"), py::arg("axis_rad"), py::arg("seen_side"), py::arg("reflectance"),
+             py::arg("returns"), py::arg("unmapped_end"), py::arg("glass"), py::arg("gains"), py::arg("frequencies"),
+             py::arg("porous_returns"), py::arg("uncertain"), py::arg("uncertain_behind"), py::arg("max_range_m"),
+             py::arg("depth_share"), py::arg("sigma_m"), py::arg("gate_m"), py::arg("min_cos"), py::arg("temper"),
+             py::arg("pull"));
+  module.def("decided", &decided, py::arg("share"), py::arg("measured_m"), py::arg("range_m"), py::arg("cos"),
+             py::arg("thickness_m"), py::arg("min_share"), py::arg("gate_m"), py::arg("depth_share"),
+             py::arg("min_cos"));
+  module.def("seen_from", &seen_from, py::arg("case"), py::arg("expected_m"), py::arg("weight"), py::arg("measured_m"),
+             py::arg("range_m"), py::arg("cos"), py::arg("thickness_m"), py::arg("gate_m"), py::arg("depth_share"),
+             py::arg("min_cos"));
+  module.def("pane_echoes", &pane_echoes, py::arg("measured_m"), py::arg("range_m"), py::arg("mirrored_cos"),
+             py::arg("turned_rad"), py::arg("reflectance"), py::arg("seen_side"), py::arg("unmapped_end"),
+             py::arg("gains"), py::arg("frequencies"), py::arg("sigma_m"), py::arg("max_range_m"), py::arg("min_cos"));
 }

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import List, Optional, Tuple
+from typing import Iterator, List, Optional, Tuple
 
 import numpy as np
 from scipy import ndimage
@@ -119,19 +119,28 @@ class LocalMap:
 
     def _worked_out(self) -> np.ndarray:
         likely = np.flatnonzero((self._ended >= self._p.least_ends).any(axis=0))  # few cells: the rest is quick
-        ended, passed = (
-            counts.reshape(self._p.directions, -1)[:, likely].astype(np.int64) for counts in (self._ended, self._passed)
-        )
+        ended, passed = self._counts_at(likely)
         passed += np.roll(passed, 1, axis=0) + np.roll(passed, -1, axis=0)
         stands = (ended >= self._p.least_ends) & (ended >= self._p.least_share * (ended + passed))
         occupied = np.zeros(self._size**2, bool)
         occupied[likely] = stands.any(axis=0)
         return occupied.reshape(self._size, self._size) & ~self._stood
 
+    def _counts_at(self, cells: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """How often beams ended at flat cells (K,), and passed them: (directions, K) each."""
+        ended, passed = (
+            counts.reshape(self._p.directions, -1)[:, cells].astype(np.int64) for counts in (self._ended, self._passed)
+        )
+        return ended, passed
+
     def glass(self) -> np.ndarray:
         """(n, n) bool: of what stands there, what beams passed from elsewhere."""
-        ended, passed = self._ended > 0, self._passed > self._ended
-        return self.occupied() & (passed & ~ended).any(axis=0)
+        occupied = self.occupied()
+        cells = np.flatnonzero(occupied)  # few
+        ended, passed = self._counts_at(cells)
+        glass = np.zeros(occupied.size, bool)
+        glass[cells] = ((passed > ended) & (ended == 0)).any(axis=0)
+        return glass.reshape(occupied.shape)
 
     def walls(self) -> GridMap:
         """The window as a map with what stands there; all else is free."""
@@ -211,11 +220,14 @@ class LocalMap:
         ranges_m = np.where(np.isfinite(ranges_m), ranges_m, 0.0) - _BEFORE_M
         around = ndimage.minimum_filter1d(ranges_m, 3, mode="nearest")  # a beam beside it counts as well
         away = np.hypot(x, y)
-        relative = np.arctan2(y, x) - laser[2] - scan.angles_rad[0]
+        passed = (away < around.max()).ravel()  # may be: the angle takes longest
+        cells = np.flatnonzero(passed)
+        relative = np.arctan2(y[cells // self._size, 0], x[0, cells % self._size]) - laser[2] - scan.angles_rad[0]
         middle = 0.5 * step * (count - 1)
         beam = np.rint((angles.wrap(relative - middle) + middle) / step).astype(np.int64)
         looked = (beam >= 0) & (beam < count)
-        return (looked & (away < around[np.where(looked, beam, 0)])).ravel()
+        passed[cells] = looked & (away.ravel()[cells] < around[np.where(looked, beam, 0)])
+        return passed
 
     def _count(self, counts: np.ndarray, direction: np.ndarray, cell: np.ndarray) -> None:
         """One more for each pair of direction and cell, once; both counts are halved where there are many."""
@@ -232,22 +244,13 @@ class LocalMap:
     def _extended(self, occupied: np.ndarray) -> np.ndarray:
         """(n, n) bool: cells on the lines of pieces of glass, next to them."""
         more = np.zeros_like(occupied)
-        glass = self.glass()
-        if not glass.any():
-            return more
-        beside = np.ones((3, 3), bool)
-        ended = self._ended >= self._p.least_ends
-        for direction in np.flatnonzero((ended & glass).any(axis=(1, 2))).tolist():
-            near = [(direction + off) % self._p.directions for off in (-1, 0, 1)]
-            passed_there = self._passed[near].sum(axis=0, dtype=np.int64) > 1
-            label, count = ndimage.label(ended[direction] & glass, beside)
-            for piece, window in enumerate(ndimage.find_objects(label), start=1):
-                rows, columns = np.nonzero(label[window] == piece)
-                if len(rows) < _MIN_PIECE:
-                    continue
-                points = np.column_stack([columns + window[1].start, rows + window[0].start]).astype(float)
-                for cells in self._beyond(points, direction):
-                    self._stand(cells, more, occupied, passed_there)
+        cells = np.flatnonzero(self.glass())
+        ended = self._counts_at(cells)[0] >= self._p.least_ends
+        for direction in np.flatnonzero(ended.any(axis=1)).tolist():
+            rows, columns = np.divmod(cells[ended[direction]], self._size)
+            for points in _pieces(np.column_stack([columns, rows])):
+                for beyond in self._beyond(points.astype(float), direction):
+                    self._stand(beyond, more, occupied, direction)
         return more
 
     def _beyond(self, points: np.ndarray, direction: int) -> List[np.ndarray]:
@@ -269,13 +272,28 @@ class LocalMap:
             for end, sign in ((at.max(), 1.0), (at.min(), -1.0))
         ]
 
-    def _stand(self, cells: np.ndarray, more: np.ndarray, occupied: np.ndarray, passed: np.ndarray) -> None:
-        """Mark cells in their order, until something stands there or beams passed."""
-        for column, row in cells.tolist():
-            if not (0 <= column < self._size and 0 <= row < self._size) or passed[row, column]:
-                return
-            if not occupied[row, column]:
-                more[row, column] = True
+    def _stand(self, cells: np.ndarray, more: np.ndarray, occupied: np.ndarray, direction: int) -> None:
+        """Mark cells in their order, until something stands there or beams of that direction passed."""
+        near = np.array([[(direction + off) % self._p.directions] for off in (-1, 0, 1)])
+        inside = ((cells >= 0) & (cells < self._size)).all(axis=1)
+        columns, rows = np.where(inside[:, None], cells, 0).T
+        passed = self._passed[near, rows, columns].sum(axis=0, dtype=np.int64) > 1
+        ends = np.flatnonzero(passed | ~inside)
+        until = ends[0] if len(ends) else len(cells)
+        rows, columns = rows[:until], columns[:until]
+        more[rows, columns] |= ~occupied[rows, columns]
+
+
+def _pieces(cells: np.ndarray) -> Iterator[np.ndarray]:
+    """The connected pieces, large enough for a line, of cells (K, 2): column and row of each in order of rows."""
+    low = cells.min(axis=0)
+    box = np.zeros(cells.max(axis=0) - low + 1, bool).T
+    box[tuple((cells - low).T[::-1])] = True
+    label, _ = ndimage.label(box, np.ones((3, 3), bool))
+    for piece, window in enumerate(ndimage.find_objects(label), start=1):
+        rows, columns = np.nonzero(label[window] == piece)
+        if len(rows) >= _MIN_PIECE:
+            yield np.column_stack([columns + window[1].start, rows + window[0].start]) + low
 
 
 def _overlap(shift: int, size: int) -> Tuple[slice, slice]:

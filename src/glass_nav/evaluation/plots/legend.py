@@ -74,7 +74,7 @@ SECTIONS: Dict[str, List[Row]] = {
     "Pose": [
         Row("arrow", POSE_RGB, "pose with its covariance"),
         Row("arrow", PARTICLE_RGB, "particle"),
-        Row("ring", PLACE_RGB, "place of a global search, with its share"),
+        Row("ring", PLACE_RGB, "possible place, its share, scan and path"),
     ],
     "Landmarks": [
         Row("arrow", TAG_RGB, "landmark and where it faces"),
@@ -84,7 +84,7 @@ SECTIONS: Dict[str, List[Row]] = {
     "Place in the atlas": [
         Row("edge", ATLAS_RGB, "edge and node"),
         *(Row("arrow", SEARCH_RGB[state], words) for state, words in SEARCH_WORDS.items()),
-        Row("cross", LEFT_OUT_RGB, "candidate ruled out by the last edge"),
+        Row("cross", LEFT_OUT_RGB, "search node ruled out, and by what"),
         Row("line", FOREST_RGB, "path of a candidate"),
     ],
 }

@@ -166,7 +166,10 @@ def _marks(story: WakeUpStory) -> List[Any]:
             Line2D([], [], label="meetpoint, with its search depth", **_MEETPOINT),
         ),
         (bool(len(story.tour_m)), Line2D([], [], color=TOUR_COLOUR, linewidth=3.2, label="true path of the tour")),
-        (bool(story.depths), arrow(CANDIDATE_COLOUR, "candidate; above: the pose handed over")),
+        (
+            bool(story.depths) or story.handed_over is not None,
+            arrow(CANDIDATE_COLOUR, "candidate; above: the pose handed over"),
+        ),
         (story.final is not None, arrow(FINAL_COLOUR, "pose by the localization at the end")),
         (True, Line2D([], [], label="true place; above: at the end", **_TRUTH)),
         (True, Patch(facecolor=str(WALL_BLACK), label="wall or glass on the map")),

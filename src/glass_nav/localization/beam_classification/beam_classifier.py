@@ -146,6 +146,7 @@ class BeamClassifier:
             cases.case,
             expected,
             self.glass_map.chances(expected.cell[0, 0]),
+            self.glass_map.is_gone(expected.cell[0, 0], expected.axis_rad[0]),
             gate_m,
             scan.range_max_m,
             trusted,

@@ -14,22 +14,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glass_nav import _beam_vote
 from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, ExpectedRanges
 from glass_nav.vocabulary import BeamCase
 
 _PANE_INDEX = 1.51  # of soda-lime glass
-_COATINGS = np.array([0.5, 1.0, 2.0])  # times the usual reflectance; which it is, is learnt while driving
+COATINGS = np.array([0.5, 1.0, 2.0])  # times the usual reflectance; which it is, is learnt while driving
 _FREQUENT = np.array([0.5, 0.25, 0.25])  # until then
 _WRONG = 0.05  # share of the echoes that are told wrongly, whatever the coating
 _SCAN_SHARE, _SCAN_BEAMS, _MOST_LOG = 0.5, 5.0, 4.0  # beams of one scan are one piece of evidence; it is bounded
 _MOST_REFLECTED = 0.9
-_WALL_OVER_DARK = 5.0  # reflectance of a wall over that of the darkest one seen at the largest range
-_UNMAPPED_PER_M = 0.2  # things that end a beam where the map knows nothing
-_NEW_PER_M = 0.02  # the same where it knows something: people, new furniture
-_FACE_M = 0.5  # a wall drawn from its other side has its near face at most so far in front of the drawn one
-_OTHER_WALL, _SAME_WALL = 2.0, 4.0  # steepness of a victory: reflectances of other walls differ by factors
-_WALL_GOES_ON = 0.5  # probability that a wall which a pane adjoins goes on behind it, where the map knows nothing
-_GOES_ON_SIGMAS, _PERPENDICULAR_RAD = 2.0, np.radians(10.0)  # how straight it does
+_OTHER_WALL = 2.0  # steepness of a victory: reflectances of other walls differ by factors
 _FIRST, _MIRRORED, _SECOND = BeamCase.DIFFUSE - 1, BeamCase.SPECULAR - 1, BeamCase.FIRST_PENETRATION - 1
 
 
@@ -64,8 +59,8 @@ class Coatings:
         told &= np.isfinite(mirrored_m) & np.isfinite(behind_m)
         if not told.any():
             return self
-        clear = _reflectance(np.nan_to_num(expected.pane_incidence[0][told]))
-        reflected = np.minimum(gain * _COATINGS[:, None] * clear, _MOST_REFLECTED)  # (C, told)
+        clear = reflectance(expected.pane_incidence[0][told])
+        reflected = np.minimum(gain * COATINGS[:, None] * clear, _MOST_REFLECTED)  # (C, told)
         wins = _wins(reflected / (1.0 - reflected) * behind_m[told] / mirrored_m[told], _OTHER_WALL)
         likelihood = _WRONG + (1.0 - 2.0 * _WRONG) * np.where(at_mirrored[told], wins, 1.0 - wins)
         count = np.count_nonzero(told)
@@ -105,36 +100,22 @@ def of(
         unmapped_end: (B,) bool: the mapper did not see the place where the beam ended.
         coatings: what is known of them.
     """
-    first_m, mirrored_m, behind_m, third_m = expected.range_m[:, 0]
-    goes_on = np.where(unmapped_end & _is_perpendicular(expected), _WALL_GOES_ON, 0.0)
-    clear = _reflectance(np.nan_to_num(expected.pane_incidence[0]))
-    mirrored, loses = np.zeros((2, len(clear)))
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        for coating, frequency in zip(_COATINGS, coatings.frequencies()):
-            reflected = np.minimum(gain * coating * clear, _MOST_REFLECTED)
-            over = reflected / (1.0 - reflected)
-            seen = 1.0 / (1.0 + 1.0 / ((reflected * max_range_m / mirrored_m) ** 2 * _WALL_OVER_DARK))
-            # Up to this range whatever stands behind the pane is brighter than the mirrored echo.
-            reach_m = np.minimum(np.minimum(mirrored_m / over, behind_m), max_range_m)
-            nothing_there = np.where(unmapped_end, np.exp(-_UNMAPPED_PER_M * np.maximum(reach_m - first_m, 0.0)), 1.0)
-            over_wall = _wins(over, _SAME_WALL)
-            wins = goes_on * over_wall + (1.0 - goes_on) * nothing_there * _wins(
-                over * behind_m / mirrored_m, _OTHER_WALL
-            )
-            mirrored += frequency * seen * np.nan_to_num(wins)
-            loses += frequency * (1.0 - over_wall)
-        mirrored = np.where(np.isfinite(mirrored_m), mirrored, 0.0)
-        past_m = measured_m - first_m
-        reached = np.where(unmapped_end, np.exp(-_UNMAPPED_PER_M * np.maximum(past_m, 0.0)), 1.0)
-        density = np.where(unmapped_end, _UNMAPPED_PER_M, _NEW_PER_M)
-        for range_m, seen_side in zip((behind_m, third_m), expected.seen_side[_SECOND:]):
-            at_face = (measured_m <= range_m) & (measured_m >= range_m - _FACE_M) & ~seen_side
-            density = np.where(at_face, 1.0 / _FACE_M, density)
-        sigma_m = _GOES_ON_SIGMAS * sigma_m / np.maximum(expected.cos_incidence[_MIRRORED, 0], MIN_COS)
-        off = np.where(np.isfinite(mirrored_m), (measured_m - mirrored_m) / sigma_m, np.inf)
-        wall = goes_on * loses * np.exp(-0.5 * off**2) / (np.sqrt(2.0 * np.pi) * sigma_m)
-        behind = np.isfinite(measured_m) & (past_m > 0.0)
-    return PaneEchoes(mirrored, np.where(behind, reached * density + np.nan_to_num(wall), 0.0))
+    return PaneEchoes(
+        *_beam_vote.pane_echoes(
+            measured_m,
+            expected.range_m[:, 0],
+            expected.cos_incidence[_MIRRORED, 0],
+            expected.axis_rad[_MIRRORED] - expected.axis_rad[_FIRST],
+            reflectance(expected.pane_incidence[0]),
+            expected.seen_side,
+            unmapped_end,
+            gain * COATINGS,
+            coatings.frequencies(),
+            sigma_m,
+            max_range_m,
+            MIN_COS,
+        )
+    )
 
 
 def _wins(over: np.ndarray, steepness: float) -> np.ndarray:
@@ -142,17 +123,9 @@ def _wins(over: np.ndarray, steepness: float) -> np.ndarray:
     return 1.0 / (1.0 + over**-steepness)
 
 
-def _is_perpendicular(expected: ExpectedRanges) -> np.ndarray:
-    """(B,) bool: the wall that the mirrored path ends at may be perpendicular to the mirror, so that its image has the same
-    line: it is, or it is met at a corner.
-    """
-    turned_rad = expected.axis_rad[_MIRRORED] - expected.axis_rad[_FIRST]  # of the image, as far as the wall itself
-    with np.errstate(invalid="ignore"):
-        return ~(np.abs(np.cos(turned_rad)) >= np.sin(_PERPENDICULAR_RAD))
-
-
-def _reflectance(incidence_rad: np.ndarray) -> np.ndarray:
-    """Share of the light that a sheet of clear glass mirrors: Fresnel, unpolarised, two surfaces."""
+def reflectance(incidence_rad: np.ndarray) -> np.ndarray:
+    """Share of the light that a sheet of clear glass mirrors: Fresnel, unpolarised, two surfaces; NaN: head on."""
+    incidence_rad = np.nan_to_num(incidence_rad)
     inside = np.arcsin(np.sin(incidence_rad) / _PANE_INDEX)
     parallel, across = np.cos(incidence_rad), np.cos(inside)
     r_s = ((parallel - _PANE_INDEX * across) / (parallel + _PANE_INDEX * across)) ** 2

@@ -88,6 +88,6 @@ def _reach_m(scan: Scan, behind_m: float) -> np.ndarray:
 
 def cos_incidence(caster: RayCaster, beam_rad: np.ndarray, cell: np.ndarray, min_linearity: float) -> np.ndarray:
     """|u . n| of beams (P, B) [rad, in map] at the cells (P, B) they meet; 1 where nothing or no normal is there."""
-    normal_rad, linearity = caster.normals()
-    usable = (cell >= 0) & (linearity[cell] >= min_linearity)
-    return np.where(usable, np.abs(np.cos(beam_rad - normal_rad[cell])), 1.0)
+    normal_rad, linearity, _ = caster.walls_at(cell)
+    usable = (cell >= 0) & (linearity >= min_linearity)
+    return np.where(usable, np.abs(np.cos(beam_rad - normal_rad)), 1.0)

@@ -24,6 +24,8 @@ _BEHIND_M = 0.3  # a beam that goes on this far has passed
 _ENDED_SIGMAS = 2.5
 _GONE_RETURNS = 0.06  # share by chance; that of a pane at oblique incidence, which is therefore no evidence
 _THERE = 0.95  # prior probability that what is seen through is glass and not gone
+_OPENING_M = 0.5  # from a cell to the ends of the opening that it is in, at most
+_GONE = 0.05  # probability of being there below which it is gone: a pane taken for an open door is run into
 
 
 def crossings(
@@ -80,6 +82,7 @@ class GlassMap:
 
     def __init__(self, grid_map: GridMap, evidence: GlassEvidence) -> None:
         self._shape = grid_map.occupancy.shape
+        self._resolution_m, self._grid_yaw_rad = grid_map.resolution_m, float(grid_map.map_from_grid[2])
         self._stride = self._shape[1] + 4  # cells are counted as if the map had a border of 2
         self._mapped = self._walls(grid_map)
         self._drawn_in = np.zeros(0, np.int64)  # cells of panes that the map lacks
@@ -127,6 +130,38 @@ class GlassMap:
         log_odds = np.zeros((2, cell.size))
         log_odds[:, found] = self._log_odds[:, at[found]]
         return _chance(self._prior + log_odds).reshape(2, *cell.shape)
+
+    def is_gone(self, cell: np.ndarray, axis_rad: np.ndarray) -> np.ndarray:
+        """Whether beams passed head on along a piece of wall so often that it is neither glass nor wall: an open door.
+
+        The opening is the piece of wall around the cell that speaks most for one, since a door opens as a whole: a robot
+        that drives past meets each cell head on in a scan or two.
+
+        Args:
+            cell: (B,) flat cells of the map, -1: none.
+            axis_rad: (B,) of the normals of the wall there in map; NaN: none, which is never gone.
+        """
+        walls, at = self._numbers(np.where(cell >= 0, self._bordered(cell), -1))
+        own = np.where(walls, self._log_odds[1, at], 0.0) if len(self._wall) else np.zeros(len(cell))
+        known = np.flatnonzero((own < 0.0) & np.isfinite(axis_rad))  # only few: the rest costs milliseconds
+        normal_rad = (axis_rad[known] - self._grid_yaw_rad)[:, None, None]
+        reach = max(1, round(_OPENING_M / self._resolution_m))
+        along, across = np.arange(-reach, reach + 1)[:, None], np.arange(-1, 2)  # walls of cells are staircases
+        row, column = (index[:, None, None] for index in np.divmod(cell[known], self._shape[1]))
+        rows = np.rint(row + along * np.cos(normal_rad) + across * np.sin(normal_rad)).astype(int)
+        columns = np.rint(column - along * np.sin(normal_rad) + across * np.cos(normal_rad)).astype(int)
+        np.clip(rows, 0, self._shape[0] - 1, out=rows)
+        np.clip(columns, 0, self._shape[1] - 1, out=columns)
+        found, at = self._numbers(self._bordered(rows * self._shape[1] + columns).ravel())
+        learnt = np.zeros(rows.shape)  # (B, 2 reach + 1, 3)
+        learnt.flat[found] = self._log_odds[1, at[found]]
+        odds = np.where(learnt.max(axis=2) > -learnt.min(axis=2), learnt.max(axis=2), learnt.min(axis=2))
+        after, before = odds[:, reach + 1 :], odds[:, reach - 1 :: -1]
+        opening = odds[:, reach] + sum(np.minimum(side.cumsum(axis=1).min(axis=1), 0.0) for side in (before, after))
+        spread = 2.0 * sum(self._SPREAD) - self._SPREAD[0]  # so many cells learn from a beam
+        gone = np.zeros(len(cell), bool)
+        gone[known] = _chance(self._prior[1] + opening / spread) < _GONE
+        return gone
 
     def occupancy(self) -> np.ndarray:
         """(H, W) int8 [percent]: probability of glass for each wall cell; -1 where no beam crossed it.

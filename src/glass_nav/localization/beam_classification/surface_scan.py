@@ -34,6 +34,7 @@ def of(
     case: np.ndarray,
     expected: ExpectedRanges,
     glass: np.ndarray,
+    gone: np.ndarray,
     gate_m: np.ndarray,
     max_range_m: float,
     trusted: bool,
@@ -49,6 +50,7 @@ def of(
         case: (B,) what each beam met.
         expected: of the pose, its sample 0.
         glass: (2, B) probabilities that the first surface can be seen through, and if so that it is there.
+        gone: (B,) bool: the first surface is no longer there, and what passed it passed nothing.
         gate_m: (B,) along the beam; what is measured within it of the first surface is that surface.
         max_range_m: at which the lidar still sees a dark wall, face on.
         trusted: whether the pose is.
@@ -68,7 +70,7 @@ def of(
     passed = (there > _SURE) & np.where(
         np.isfinite(ranges_m), within, beside & gone_through & lost & _has_beside(behind)
     )
-    cut = behind & (explained | known | passed)
+    cut = behind & ~gone & (explained | known | passed)
     return SurfaceScan(np.where(cut, first_m, ranges_m), cut, True)
 
 

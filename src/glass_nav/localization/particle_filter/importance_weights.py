@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from glass_nav.geometry import angles
 from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, cos_incidence
 from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
 from glass_nav.params import choice, number
@@ -109,15 +108,10 @@ def by_field(
     field: DistanceField, map_from_base: np.ndarray, ends_m: np.ndarray, residuals: RangeResiduals, mixture: BeamMixture
 ) -> np.ndarray:
     """(P,) log likelihoods of particles (P, 3) from end points (B, 2) in the robot's frame that lie on walls."""
-    log_w = np.zeros(len(map_from_base))
     if not len(ends_m):
-        return log_w
-    cos, sin = angles.cos_sin(map_from_base[:, 2:3])
-    distance_m = field.distance(
-        map_from_base[:, 0:1] + cos * ends_m[:, 0] - sin * ends_m[:, 1],
-        map_from_base[:, 1:2] + sin * ends_m[:, 0] + cos * ends_m[:, 1],
-    )
-    return _log_density(distance_m, residuals, mixture) * min(1.0, independent_beams(residuals, mixture) / len(ends_m))
+        return np.zeros(len(map_from_base))
+    log_w = field.log_weights(ends_m, map_from_base, residuals.sigma_m, mixture.laser_z_hit, mixture.laser_z_rand)
+    return log_w * min(1.0, independent_beams(residuals, mixture) / len(ends_m))
 
 
 def known_ends(case: np.ndarray) -> np.ndarray:

@@ -265,33 +265,28 @@ class ParticleFilter:
 
     def _log_weights(self, scan: Scan, cases: BeamCases, classifier: BeamClassifier) -> np.ndarray:
         """(P,) log likelihoods of the scan."""
-        mixture, particles = self._params.mixture, self.particles
-        used = importance_weights.known_ends(cases.case) if mixture.weight_mode == "field" else cases.case
-        chosen = spread_evenly(used, mixture.laser_max_beams)
-        log_weights = self._by_field if mixture.weight_mode == "field" else self._by_ranges
+        mixture = self._params.mixture
+        if mixture.weight_mode == "field":
+            chosen = spread_evenly(importance_weights.known_ends(cases.case), mixture.laser_max_beams)
+            ends_m = scan.points_in_base()[chosen]
+            return importance_weights.by_field(self._field, self.particles, ends_m, classifier.residuals, mixture)
+        chosen = spread_evenly(cases.case, mixture.laser_max_beams)
         together = max(1, _BLOCK // max(1, len(chosen)))  # particles: all of them times the beams would take gigabytes
-        blocks = [particles[first : first + together] for first in range(0, len(particles), together)]
-        return np.concatenate([log_weights(block, scan, cases, chosen, classifier) for block in blocks])
-
-    def _by_field(
-        self, particles: np.ndarray, scan: Scan, cases: BeamCases, chosen: np.ndarray, classifier: BeamClassifier
-    ) -> np.ndarray:
-        ends_m = scan.points_in_base()[chosen]
-        return importance_weights.by_field(self._field, particles, ends_m, classifier.residuals, self._params.mixture)
-
-    def _by_ranges(
-        self, particles: np.ndarray, scan: Scan, cases: BeamCases, chosen: np.ndarray, classifier: BeamClassifier
-    ) -> np.ndarray:
-        return importance_weights.by_ranges(
-            classifier.caster,
-            classifier.thickness_m,
-            se2.compose(particles, scan.base_from_laser),
-            scan.angles_rad[chosen],
-            scan.ranges_m[chosen],
-            cases.case[chosen],
-            classifier.residuals,
-            self._params.mixture,
-            scan.range_max_m,
-            classifier.max_glass_thickness_m,
-            classifier.min_linearity,
+        return np.concatenate(
+            [
+                importance_weights.by_ranges(
+                    classifier.caster,
+                    classifier.thickness_m,
+                    se2.compose(self.particles[first : first + together], scan.base_from_laser),
+                    scan.angles_rad[chosen],
+                    scan.ranges_m[chosen],
+                    cases.case[chosen],
+                    classifier.residuals,
+                    mixture,
+                    scan.range_max_m,
+                    classifier.max_glass_thickness_m,
+                    classifier.min_linearity,
+                )
+                for first in range(0, len(self.particles), together)
+            ]
         )

@@ -69,6 +69,9 @@ from glass_nav.vocabulary import LocalizationState, Outcome
 
 MARKERS_PERIOD_S = 0.5
 RESTART_WAIT_S = 2.0  # for the service, by the wall clock
+ODOMETRY_GRACE_S = (
+    1.0  # by the wall clock, without odometry, before the log says so: at the start it may come a little later
+)
 SILENCE_S = 5.0  # without any scan for so long, the log says why
 
 
@@ -82,6 +85,7 @@ class DriverNode:
         """
         self._p = p.node
         self._clock = LoopClock()
+        self._odometry_s = time.monotonic()  # when there was some, or the node began
         atlas = atlas_file.load(shipped_atlases.find(self._p.atlas)) if self._p.atlas else None
         names = self._p.input_names(rospy.resolve_name("localization_status"))
         backend = self._move_base_backend(p.drive.rules.patience_s) if self._p.backend == MOVE_BASE else None
@@ -235,9 +239,11 @@ class DriverNode:
         try:
             newest = self._tf.lookup_transform(self._p.odom_frame_id, self._p.base_frame_id, rospy.Time(0))
             stamp_ns = conversions.ns_from_stamp(newest.header.stamp)
+            self._odometry_s = time.monotonic()
             return Odometry(stamp_ns, conversions.planar_from_transform(newest.transform))
         except (tf2_ros.TransformException, ValueError) as err:
-            self._log.warn(f"odometry: {err}")
+            if time.monotonic() - self._odometry_s > ODOMETRY_GRACE_S:
+                self._log.warn(f"odometry: {err}")
             return None
 
     def _map_from_odom(self) -> Optional[np.ndarray]:

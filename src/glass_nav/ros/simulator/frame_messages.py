@@ -53,6 +53,7 @@ def scan_msg(scan: Scan, period_s: float, frame: str) -> LaserScan:
         range_min=scan.range_min_m,
         range_max=scan.range_max_m,
         ranges=scan.ranges_m.tolist(),
+        intensities=[] if scan.intensities is None else scan.intensities.tolist(),
     )
 
 

@@ -1,8 +1,9 @@
 """The atlas, the candidates and their forest for rviz: native markers, a namespace for each that can be hidden.
 
 Namespaces: `atlas` (edges) and `nodes`; candidates as arrows in `searching`, `tentative`, `confirmed` or `ambiguous`,
-by the state of the search; `ruled_out`, crosses where candidates of the last row were left without a successor;
-`forest`, the paths of the candidates; `text`.
+by the state of the search; `forest`, the paths of the candidates; `text`; and those of topology/search_scene.py:
+`hypotheses` with their shares, `scans` and `driven` for the best of them, `ruled_out`, crosses on search nodes that
+went, with the value that ruled them out, and `rows` of the forest.
 """
 
 from __future__ import annotations
@@ -16,18 +17,19 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from glass_nav.geometry import se2
 from glass_nav.ros import conversions
-from glass_nav.ros.packed_markers import PackedMarkerArray, colour, points_marker
+from glass_nav.ros.packed_markers import PackedMarkerArray, colour, points_marker, shape_marker, text_marker
+from glass_nav.shapes import Shape
+from glass_nav.topology import search_scene, search_story
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
-from glass_nav.topology.search.search_forest import NO_PARENT
+from glass_nav.topology.search_scene import SearchScene
 from glass_nav.topology.search_session import SearchStatus
-from glass_nav.vocabulary import ATLAS_RGB, FOREST_RGB, LEFT_OUT_RGB, NODE_RGB, SEARCH_RGB
+from glass_nav.vocabulary import ATLAS_RGB, FOREST_RGB, NODE_RGB, SEARCH_RGB
 
-NAMESPACES = ("atlas", "nodes", *(state.lower() for state in SEARCH_RGB), "ruled_out", "forest", "text")
+NAMESPACES = ("atlas", "nodes", *(state.lower() for state in SEARCH_RGB), "forest", "text", *search_scene.NAMESPACES)
 MAX_PATHS = 50  # of candidates; more would only hide the map
 
 _ARROW_M = np.array([[0.0, 0.0], [0.8, 0.0], [0.8, 0.0], [0.5, 0.2], [0.8, 0.0], [0.5, -0.2]])  # pairs of ends
-_CROSS_M = np.array([[-0.25, -0.25], [0.25, 0.25], [-0.25, 0.25], [0.25, -0.25]])
 _HEIGHT_M = 0.02
 
 
@@ -42,24 +44,24 @@ def atlas_markers(atlas: Atlas, map_frame: str) -> List[Marker]:
 
 
 def search_markers(
-    localizer: AtlasLocalizer, status: SearchStatus, map_frame: str, atlas_shown: List[Marker]
+    localizer: AtlasLocalizer, status: SearchStatus, scene: SearchScene, map_frame: str, atlas_shown: List[Marker]
 ) -> MarkerArray:
     """An atlas and what is known about the robot's place in it; namespaces of other states are cleared.
 
     Args:
         localizer: of the search.
         status: what is known, with the poses to show.
+        scene: what was seen so far.
         map_frame: frame of the map.
         atlas_shown: of atlas_markers().
     """
     atlas, estimate, header = localizer.atlas, status.estimate, conversions.header(0, map_frame)
     arrows = {state: np.zeros((0, 2)) for state in SEARCH_RGB}
-    ruled_out, forest = np.zeros((0, 2)), np.zeros((0, 2))
+    forest, alive = np.zeros((0, 2)), np.zeros(0, np.int64)
     if estimate is not None:
         if status.state in arrows:
             arrows[status.state] = _placed(_ARROW_M, status.poses)
-        gone = _ruled_out(localizer)[: len(status.poses) + MAX_PATHS]
-        ruled_out = _placed(_CROSS_M, np.column_stack([atlas.nodes.position_m[gone], np.zeros(len(gone))]))
+        alive = estimate.dart
         forest = _pairs(
             [
                 _line(atlas, departure)
@@ -71,23 +73,16 @@ def search_markers(
         points_marker(header, state.lower(), 0, Marker.LINE_LIST, points, 3 * _HEIGHT_M, 0.1, _rgb(SEARCH_RGB[state]))
         for state, points in arrows.items()
     ]
-    markers.append(
-        points_marker(header, "ruled_out", 0, Marker.LINE_LIST, ruled_out, 2 * _HEIGHT_M, 0.06, _rgb(LEFT_OUT_RGB))
-    )
     markers.append(points_marker(header, "forest", 0, Marker.LINE_LIST, forest, 2 * _HEIGHT_M, 0.12, _rgb(FOREST_RGB)))
-    return PackedMarkerArray([*atlas_shown, *markers, _text(header, atlas, f"{status.state}\n{status.reason}")])
-
-
-def _ruled_out(localizer: AtlasLocalizer) -> np.ndarray:
-    """(K,) nodes of candidates of the row before without one in this row."""
-    forest = localizer.forest
-    if forest.depth < 1:
-        return np.zeros(0, np.int64)
-    before, row = forest.row(forest.depth - 1).dart, forest.row(forest.depth)
-    went_on = row.parent[(row.parent != NO_PARENT) & (row.parent_depth == forest.depth - 1)]
-    gone = np.ones(len(before), bool)
-    gone[went_on] = False
-    return np.unique(localizer.atlas.darts.node[before[gone]])
+    shown = [
+        shape_marker(header, each) if isinstance(each, Shape) else text_marker(header, each)
+        for each in scene.shapes(atlas, status.belief if status.map_from_base is None else None, alive)
+    ]
+    reason = status.reason
+    if estimate is None and status.belief is not None:  # before the first meetpoint
+        reason = search_story.on_the_way(status.belief, localizer.params.tolerances.risk)
+    words = _text(header, atlas, f"{status.state}\n{reason}")
+    return PackedMarkerArray([*atlas_shown, *markers, words, *shown])
 
 
 def _line(atlas: Atlas, dart: int) -> np.ndarray:
@@ -117,9 +112,9 @@ def _rgb(rgb: "tuple[int, int, int]") -> ColorRGBA:
 def _text(header: Header, atlas: Atlas, text: str) -> Marker:
     """Above the atlas, readable from where all of it is seen."""
     low, high = atlas.nodes.position_m.min(axis=0), atlas.nodes.position_m.max(axis=0)
-    size = max(0.3, 0.018 * float((high - low).max()))
+    size = search_scene.letter_size_m(atlas)
     pose = Pose(orientation=Quaternion(w=1.0))
-    pose.position.x, pose.position.y = 0.5 * float(low[0] + high[0]), float(high[1]) + 2.0 * size
+    pose.position.x, pose.position.y = 0.5 * float(low[0] + high[0]), float(high[1]) + 4.0 * size
     return Marker(
         header=header,
         ns="text",

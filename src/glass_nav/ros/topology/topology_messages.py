@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Optional
+import math
+from typing import Optional, Sequence
 
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -14,6 +15,8 @@ from glass_nav.msg import TurnChoice as TurnChoiceMsg
 from glass_nav.ros import conversions
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.observations import UNKNOWN, Meetpoint, ObservationError, Traversal
+from glass_nav.topology.search import mismatches
+from glass_nav.topology.search.belief import RuledOut
 from glass_nav.topology.search.search_estimate import TurnChoice
 from glass_nav.topology.search_session import SearchStatus, Turn
 
@@ -91,9 +94,27 @@ def status_msg(status: SearchStatus, frame: str) -> TopologyStatus:
     return msg
 
 
-def candidates_msg(status: SearchStatus, atlas: Optional[Atlas], frame: str) -> TopologyCandidates:
-    """The candidates that the status has poses of; none where the atlas lacks the place that scans confirmed."""
-    msg = TopologyCandidates(header=conversions.header(status.stamp_ns, frame))
+def candidates_msg(
+    status: SearchStatus, atlas: Optional[Atlas], frame: str, ruled_out: Sequence[RuledOut] = ()
+) -> TopologyCandidates:
+    """The candidates that the status has poses of; none where the atlas lacks the place that scans confirmed.
+
+    Args:
+        status: what is known.
+        atlas: of the search.
+        frame: of the map.
+        ruled_out: by the last meetpoint.
+    """
+    msg = TopologyCandidates(header=conversions.header(status.stamp_ns, frame), elsewhere=math.nan)
+    belief = status.belief
+    if belief is not None:
+        msg.shares, msg.elsewhere = belief.share.tolist(), belief.elsewhere
+        msg.hypotheses = [conversions.pose_from_planar(pose) for pose in belief.poses]
+    if atlas is not None and ruled_out:
+        gone = np.array([each.dart for each in ruled_out])
+        msg.ruled_out_nodes, msg.ruled_out_edges = atlas.darts.node[gone].tolist(), (gone >> 1).tolist()
+        msg.ruled_out_poses = [conversions.pose_from_planar(each.map_from_base) for each in ruled_out]
+        msg.ruled_out_by = [mismatches.words(each) for each in ruled_out]
     estimate = status.estimate
     if atlas is None or estimate is None:
         return msg

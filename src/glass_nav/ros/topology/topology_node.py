@@ -9,7 +9,8 @@ Subscribes: meetpoint (Meetpoint), edge_traversal (EdgeTraversal): of the driver
 Publishes: turn_choice (TurnChoice): the answer to each meetpoint while there is something to find out;
     initialpose (PoseWithCovarianceStamped) once when CONFIRMED, with the stamp of the meetpoint or scan;
     ~candidates (TopologyCandidates, latched), ~status (TopologyStatus, latched), ~markers (MarkerArray, latched):
-    see topology_displays.py for the namespaces; legend (Image, latched): what the marks in rviz mean.
+    see topology_displays.py for the namespaces; tf map -> map_atlas (static, the same frame): rviz knows the frame map
+    before the pose is known; legend (Image, latched): what the marks in rviz mean.
 Action: localize_globally (LocalizeGlobally): begins a search; feedback is ~status; succeeds when CONFIRMED, is aborted
     when AMBIGUOUS or LOST, and when preempted the search is over.
 Services: ~restart (Trigger): forget the search, the next meetpoint begins one; ~reload_atlas (Trigger): read the file
@@ -26,6 +27,7 @@ from typing import Any, Callable, List, Optional, Tuple
 import actionlib
 import numpy as np
 import rospy
+import tf2_ros
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
@@ -54,6 +56,7 @@ from glass_nav.topology import observations, search_session
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.topology.observations import ObservationError
+from glass_nav.topology.search_scene import SearchScene
 from glass_nav.topology.search_session import Decision, GoalOutcome, SearchSession, SearchStatus
 
 SERVICE_TIMEOUT_S = 30.0
@@ -70,6 +73,7 @@ class TopologyNode:
         self._base_frame = p.node.base_frame_id  # or that of the last meetpoint
         self._shown_atlas: Optional[Atlas] = None
         self._atlas_markers: List[Marker] = []  # of that atlas
+        self._scene = SearchScene()
         self._log = LogThrottle()
         self._inbox = Mailbox(reports=100, commands=100)  # reports: meetpoints and traversals, in order
         self._clock = LoopClock()
@@ -79,6 +83,10 @@ class TopologyNode:
         self._candidates = rospy.Publisher("~candidates", TopologyCandidates, queue_size=2, latch=True)
         self._status = rospy.Publisher("~status", TopologyStatus, queue_size=10, latch=True)
         self._markers = rospy.Publisher("~markers", MarkerArray, queue_size=2, latch=True)
+        self._frame = tf2_ros.StaticTransformBroadcaster()  # the frame map exists before the pose is known
+        self._frame.sendTransform(
+            conversions.transform_stamped(0, p.node.global_frame_id, f"{p.node.global_frame_id}_atlas", np.zeros(3))
+        )
         self._legends = legend.publish(p.node.global_frame_id)
         self._server = actionlib.SimpleActionServer("localize_globally", LocalizeGloballyAction, auto_start=False)
         self._server.register_goal_callback(lambda: self._inbox.put("commands", self._accept_goal))
@@ -138,6 +146,7 @@ class TopologyNode:
             return
         placed = self._scans.newest(self._base_frame)
         if placed is not None:
+            self._scene.saw(placed.scan.points_in_base()[placed.scan.answered], placed.odom_from_base)
             self._carry_out(self._session.scan(placed.scan, placed.odom_from_base))
 
     def _put_report(self, msg: Any, take: Callable[[Any], None]) -> None:
@@ -229,14 +238,20 @@ class TopologyNode:
     def _publish(self, status: SearchStatus) -> None:
         """Status, candidates and markers, all latched: whoever comes later sees what is."""
         frame, localizer = self._p.global_frame_id, self._session.localizer
+        if status.estimate is None and status.belief is None:
+            self._scene.forget()
+        if localizer is not None and status.estimate is not None:
+            self._scene.stepped(localizer)
         self._status.publish(topology_messages.status_msg(status, frame))
-        self._candidates.publish(topology_messages.candidates_msg(status, self._atlas, frame))
+        self._candidates.publish(topology_messages.candidates_msg(status, self._atlas, frame, self._scene.ruled_out))
         if localizer is None:
             return
         if localizer.atlas is not self._shown_atlas:  # its markers are made once, and sent with those of each step
             self._shown_atlas = localizer.atlas
             self._atlas_markers = topology_displays.atlas_markers(localizer.atlas, frame)
-        self._markers.publish(topology_displays.search_markers(localizer, status, frame, self._atlas_markers))
+        self._markers.publish(
+            topology_displays.search_markers(localizer, status, self._scene, frame, self._atlas_markers)
+        )
 
     def _send_feedback(self, progress: search_session.Progress) -> None:
         status = topology_messages.status_msg(progress.status, self._p.global_frame_id)

@@ -227,6 +227,10 @@ class Matcher:
         fits[fits] = self._segments_fit(departure[fits], traversal)
         return kept[fits]
 
+    def directions_fit(self, departure: np.ndarray, traversal: Traversal) -> np.ndarray:
+        """(C,) bool: the directions of the edges of darts (C,) match those driven."""
+        return self._directions_fit(departure, twin(departure), self.atlas.edges.sigma_m[departure >> 1], traversal)
+
     def _segments_fit(self, departure: np.ndarray, traversal: Traversal) -> np.ndarray:
         """(C,) bool: the walls seen do not contradict those along darts (C,); all True if there are too many."""
         if self._segments is None or not len(traversal.segments_m) or len(departure) > _MAX_COMPARED:

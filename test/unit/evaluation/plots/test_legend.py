@@ -49,9 +49,10 @@ def test_all_that_is_shown_has_a_row():
 def test_the_marks_of_the_topological_node_have_their_rows():
     pytest.importorskip("geometry_msgs", reason="no ROS beside this Python")
     from glass_nav.ros.topology import topology_displays
+    from glass_nav.topology import search_scene
 
     colours = [row.rgb for row in legend.SECTIONS["Place in the atlas"]]
-    assert {topology_displays.ATLAS_RGB, topology_displays.FOREST_RGB, topology_displays.LEFT_OUT_RGB} < set(colours)
+    assert {topology_displays.ATLAS_RGB, topology_displays.FOREST_RGB, search_scene.LEFT_OUT_RGB} < set(colours)
 
 
 def test_letters_are_smooth():

@@ -95,6 +95,45 @@ def test_a_pane_that_answers_head_on_stays_glass():
     assert chances(found)[0] > 0.8 and chances(found)[1] > 0.9
 
 
+NORMAL_RAD = 0.3 + 0.5 * np.pi  # of the wall of wall_map(), in the frame map
+
+
+def driven_past(passed, columns, scans=3):
+    """A robot drives past: a few scans meet each cell head on."""
+    return [[(flat(10, column), HEAD_ON, passed)] for column in columns for _ in range(scans)]
+
+
+def gone(found, columns, axis_rad=NORMAL_RAD):
+    columns = np.asarray(columns)
+    return found.is_gone(flat(np.full(len(columns), 10), columns), np.full(len(columns), axis_rad)).tolist()
+
+
+def test_a_door_that_every_beam_passes_head_on_is_gone_and_the_panes_beside_it_stay():
+    door, panes = range(10, 20), [*range(2, 8), *range(22, 28)]
+    found = learnt(driven_past(True, door) + driven_past(False, panes))
+    assert all(gone(found, range(11, 19))) and not any(gone(found, panes))
+
+
+def test_what_was_passed_from_the_side_only_may_be_glass():
+    found = learnt([[(flat(10, column), SIDEWAYS, True)] for column in range(5, 25) for _ in range(20)])
+    assert not any(gone(found, range(30)))
+
+
+def test_a_gap_that_a_beam_or_two_found_is_no_door():
+    assert not any(gone(learnt(driven_past(True, [14, 15], scans=1)), range(30)))
+
+
+def test_what_has_no_normal_and_what_is_no_cell_is_never_gone():
+    found = learnt(driven_past(True, range(30)))
+    assert not any(gone(found, [15], axis_rad=np.nan))
+    assert found.is_gone(np.array([-1]), np.array([NORMAL_RAD])).tolist() == [False]
+
+
+def test_a_wall_along_the_border_of_the_map_is_asked_within_the_map():
+    found = learnt([[(flat(0, column), HEAD_ON, True)] * 3 for column in range(30)] * 3, wall_map((0, slice(None))))
+    assert found.is_gone(np.array([0, 15, 29]), np.full(3, NORMAL_RAD)).tolist() == [True] * 3
+
+
 def test_what_has_no_normal_can_be_seen_through_too():
     """A railing: a third of the beams end at it, the others pass."""
     found = learnt([[(CELL, np.nan, index % 3 > 0)] for index in range(60)])

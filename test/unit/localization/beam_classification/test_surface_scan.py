@@ -12,7 +12,7 @@ from glass_nav.localization.beam_classification import surface_scan
 WALL, PANE, GONE, NEW = (0.01, 0.8), (0.99, 0.99), (0.99, 0.01), (0.3, 0.8)
 
 
-def cut(ranges_m, case, first=2.0, glass=WALL, trusted=True, gate_m=0.15, max_range_m=20.0, **offered):
+def cut(ranges_m, case, first=2.0, glass=WALL, gone=False, trusted=True, gate_m=0.15, max_range_m=20.0, **offered):
     """glass: chances of every first surface, or (B, 2) of each."""
     ranges_m = np.atleast_1d(np.asarray(ranges_m, float))
     beams = len(ranges_m)
@@ -22,6 +22,7 @@ def cut(ranges_m, case, first=2.0, glass=WALL, trusted=True, gate_m=0.15, max_ra
         case=np.broadcast_to(case, beams).astype(np.uint8),
         expected=seen,
         glass=np.broadcast_to(np.reshape(np.transpose(glass), (2, -1)), (2, beams)),
+        gone=np.full(beams, gone),
         gate_m=np.full(beams, gate_m),
         max_range_m=max_range_m,
         trusted=trusted,
@@ -33,6 +34,11 @@ def cut(ranges_m, case, first=2.0, glass=WALL, trusted=True, gate_m=0.15, max_ra
 def test_a_beam_that_passed_or_was_mirrored_is_cut_at_the_pane(case, glass):
     found = cut(5.0, case, glass=glass)
     assert found.ranges_m.tolist() == [2.0] and found.cut.tolist() == [True] and found.trusted is True
+
+
+@pytest.mark.parametrize("case", range(5))
+def test_where_a_door_is_open_by_now_nothing_is_cut(case):
+    assert cut(5.0, case, glass=PANE, gone=True).ranges_m.tolist() == [5.0]
 
 
 @pytest.mark.parametrize("range_m", [2.0, 2.1, 1.0, 0.3])

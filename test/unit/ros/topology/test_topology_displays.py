@@ -13,16 +13,18 @@ from glass_nav.topology.observations import Meetpoint, ObservationError, Travers
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search.search_estimate import TurnChoice
 from glass_nav.topology.search.search_params import SearchParams
+from glass_nav.topology.search_scene import SearchScene
 from glass_nav.topology.search_session import SearchStatus
 from glass_nav.vocabulary import SearchState
 
 
-def shown(localizer, poses):
+def shown(localizer, poses, scene=None):
+    """Namespace -> its first marker."""
     estimate = localizer.estimate
     status = SearchStatus(estimate.state if estimate else SearchState.WAITING, "why", 0, estimate, poses)
     atlas_markers = topology_displays.atlas_markers(localizer.atlas, "map")
-    markers = topology_displays.search_markers(localizer, status, "map", atlas_markers)
-    return {marker.ns: marker for marker in markers.markers}
+    markers = topology_displays.search_markers(localizer, status, scene or SearchScene(), "map", atlas_markers)
+    return {marker.ns: marker for marker in reversed(markers.markers) if marker.id == 0 or marker.ns == "rows"}
 
 
 def search():
@@ -47,13 +49,17 @@ def test_each_namespace_has_one_marker_and_only_those_of_the_state_are_shown():
 
 
 def test_what_went_is_crossed_out_and_the_way_of_what_stayed_is_drawn():
-    localizer = search()
+    localizer, scene = search(), SearchScene()
     localizer.start(Meetpoint(3, 1.5))
+    scene.stepped(localizer)
     localizer.update(Traversal(0, 8.0, 8.0), Meetpoint(3, 1.5))
+    scene.stepped(localizer)
     estimate = localizer.update(Traversal(2, 11.2, 8.0), Meetpoint(3, 1.5))
-    markers = shown(localizer, localizer.map_from_base(estimate.dart))
+    scene.stepped(localizer)
+    markers = shown(localizer, localizer.map_from_base(estimate.dart), scene)
     assert markers["confirmed"].action == Marker.ADD and markers["searching"].action == Marker.DELETE
-    np.testing.assert_allclose(np.unique(markers["ruled_out"].packed[:, 0].round(2)), [-0.25, 0.25])  # at node 0
+    crosses = markers["ruled_out"].packed
+    np.testing.assert_allclose(np.unique(crosses[:, 0].round(2)), [-4.2, -3.8])  # on node 2: node 0 is where it is
     forest = markers["forest"].packed[:, :2]
     assert len(forest) == 2 + 6  # edge 0 is one line, edge 1 three
     assert np.hypot(*(forest[1::2] - forest[0::2]).T).sum() == pytest.approx(8.0 + 11.2, abs=0.01)

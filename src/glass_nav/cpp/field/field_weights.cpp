@@ -1,0 +1,25 @@
+#include "field_weights.hpp"
+
+#include <cmath>
+#include <cstddef>
+
+namespace glass_nav {
+
+LogDensity::LogDensity(double sigma_m, double z_hit, double z_rand) : per_m_(kParts / (kMaxSigmas * sigma_m)) {
+  for (int part = 0; part <= kParts; ++part) {
+    const double sigmas = kMaxSigmas * part / kParts;
+    values_.push_back(std::log(z_hit * std::exp(-0.5 * sigmas * sigmas) + z_rand));
+  }
+}
+
+double log_weight_at(const DistanceField& field, const Points& points, const Pose& pose, const LogDensity& density) {
+  const double cos = std::cos(pose[2]), sin = std::sin(pose[2]);
+  double total = 0.0;
+  for (std::size_t i = 0; i < points.count; ++i) {
+    const double x = points.xy_m[2 * i], y = points.xy_m[2 * i + 1];
+    total += density.at(field.distance(pose[0] + cos * x - sin * y, pose[1] + sin * x + cos * y));
+  }
+  return total;
+}
+
+}  // namespace glass_nav

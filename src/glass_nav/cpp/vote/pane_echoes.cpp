@@ -1,0 +1,69 @@
+#include "pane_echoes.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace glass_nav {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kMostReflected = 0.9;
+constexpr double kWallOverDark = 5.0;   // reflectance of a wall over that of the darkest one seen at the largest range
+constexpr double kUnmappedPer_m = 0.2;  // things that end a beam where the map knows nothing
+constexpr double kNewPer_m = 0.02;      // the same where it knows something: people, new furniture
+constexpr double kFace_m = 0.5;         // a wall drawn from its other side has its near face at most so far before it
+constexpr double kWallGoesOn = 0.5;     // probability that a wall which a pane adjoins goes on behind it, unmapped
+constexpr double kGoesOnSigmas = 2.0;   // how straight it does
+constexpr double kPerpendicular = 10.0 / 180.0 * kPi;
+
+enum Path : std::size_t { kFirst, kMirrored, kSecond, kThird };
+
+/// Probability that an echo of that amplitude over another is the stronger one; reflectances of other walls differ by
+/// factors, so that against the same wall a victory is steeper.
+double wins_over_other(double over) { return 1.0 / (1.0 + 1.0 / (over * over)); }
+double wins_over_same(double over) { return 1.0 / (1.0 + 1.0 / (over * over * over * over)); }
+
+double or_zero(double value) { return std::isnan(value) ? 0.0 : value; }
+
+}  // namespace
+
+PaneEcho pane_echo(const PaneBeam& beam, const PaneModel& model) {
+  const double first_m = beam.range_m[kFirst], mirrored_m = beam.range_m[kMirrored], behind_m = beam.range_m[kSecond];
+  const bool perpendicular = !(std::abs(std::cos(beam.turned_rad)) >= std::sin(kPerpendicular));  // also a corner
+  const double goes_on = beam.unmapped_end && perpendicular ? kWallGoesOn : 0.0;
+  const bool mirrors = std::isfinite(mirrored_m);
+  double mirrored = 0.0, loses = 0.0;
+  for (std::size_t i = 0; i < model.coatings; ++i) {
+    const double reflected = std::min(model.gains[i] * beam.reflectance, kMostReflected);
+    const double over = reflected / (1.0 - reflected), over_wall = wins_over_same(over);
+    loses += model.frequencies[i] * (1.0 - over_wall);
+    if (!mirrors) continue;
+    const double amplitude = reflected * model.max_range_m / mirrored_m;
+    const double seen = 1.0 / (1.0 + 1.0 / (amplitude * amplitude * kWallOverDark));
+    // Up to this range whatever stands behind the pane is brighter than the mirrored echo.
+    const double reach_m = std::min(std::min(mirrored_m / over, behind_m), model.max_range_m);
+    const double nothing_there = beam.unmapped_end ? std::exp(-kUnmappedPer_m * std::max(reach_m - first_m, 0.0)) : 1.0;
+    mirrored +=
+        model.frequencies[i] * seen *
+        or_zero(goes_on * over_wall + (1.0 - goes_on) * nothing_there * wins_over_other(over * behind_m / mirrored_m));
+  }
+  const double past_m = beam.measured_m - first_m;
+  if (!std::isfinite(beam.measured_m) || !(past_m > 0.0)) return {mirrored, 0.0};
+  const double reached = beam.unmapped_end ? std::exp(-kUnmappedPer_m * past_m) : 1.0;
+  double density = beam.unmapped_end ? kUnmappedPer_m : kNewPer_m;
+  const auto at_face = [&](double range_m) {
+    return beam.measured_m <= range_m && beam.measured_m >= range_m - kFace_m;
+  };
+  if ((!beam.second_seen && at_face(behind_m)) || (!beam.third_seen && at_face(beam.range_m[kThird]))) {
+    density = 1.0 / kFace_m;
+  }
+  double wall = 0.0;
+  if (mirrors) {
+    const double sigma_m = kGoesOnSigmas * model.sigma_m / std::max(beam.mirrored_cos, model.min_cos);
+    const double off = (beam.measured_m - mirrored_m) / sigma_m;
+    wall = goes_on * loses * std::exp(-0.5 * off * off) / (std::sqrt(2.0 * kPi) * sigma_m);
+  }
+  return {mirrored, reached * density + wall};
+}
+
+}  // namespace glass_nav
