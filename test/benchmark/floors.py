@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
+import twin_wings
+
 from glass_nav.simulation import building_file, building_map, mapped_building, random_building, shipped_buildings
 from glass_nav.simulation.building import Building
 from glass_nav.topology.atlas import atlas_builder, atlas_file, shipped_atlases
@@ -13,7 +15,10 @@ from glass_nav.world import map_file
 from glass_nav.world.grid_map import GridMap
 
 RANDOM = "random"
-HELP = "names of shipped buildings, map_server .yaml files, or random: another floor for each seed"
+HELP = (
+    "names of shipped buildings, map_server .yaml files, or another floor for each seed: random, "
+    f"{', '.join(twin_wings.KINDS)}"
+)
 
 
 class Floor(NamedTuple):
@@ -32,8 +37,8 @@ def load(name: str, seed: int, opaque: bool) -> Floor:
         seed: of a random one.
         opaque: film on all glass. The walls of maps are opaque anyway.
     """
-    if name == RANDOM:
-        building = random_building.build(seed)
+    if name in (RANDOM, *twin_wings.KINDS):
+        building = random_building.build(seed) if name == RANDOM else twin_wings.build(name, seed)
         grid_map = building_map.draw(building)
         atlas = _built(grid_map, building.name)
     elif name.endswith(".yaml"):

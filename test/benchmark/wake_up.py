@@ -9,6 +9,8 @@ in which the base stood at an obstacle.
 
     test/benchmark/wake_up.py --opaque --seeds 14        # film on all glass; all buildings, or --buildings A B
     test/benchmark/wake_up.py --lidars sensitive weak coated --jobs 2
+    test/benchmark/wake_up.py --buildings twin_wings four_wings half_turn tower --no-tour   # parts that look alike
+    test/benchmark/wake_up.py --believed glass_wedge --no-tour   # robots that are not in their map
 """
 
 from __future__ import annotations
@@ -45,6 +47,7 @@ from glass_nav.vocabulary import Outcome, SearchState
 
 SEARCH_S, LEG_S = 900.0, 120.0  # simulated, at most
 MAX_EDGES = 60
+SOON_S = 90.0
 LEGS = 3
 RIGHT_M, RIGHT_RAD = 0.5, math.radians(20.0)
 MIN_LEG_M, MAX_LEG_M, LEG_ROOM_M = 4.0, 15.0, 0.45
@@ -86,6 +89,7 @@ class Trial:
             self.robot.on_status = self._print
         self.rng = np.random.default_rng([job.seed, 2])
         self._last_node = -1
+        self._shown: Optional[SearchEstimate] = None
         self._began_ns = self.simulation.stamp_ns
 
     @property
@@ -99,8 +103,11 @@ class Trial:
         """Run until the search is over, or driving has stopped."""
         robot = self.robot
         robot.wake_up(self.grid_map)
+        step_s = 0.0
         while self.now_s < SEARCH_S and not robot.has_given_up:
+            began = time.process_time()
             robot.step()
+            step_s = max(step_s, time.process_time() - began)
             estimate = robot.session.status.estimate
             if estimate is not None and (estimate.done or estimate.depth >= MAX_EDGES):
                 break
@@ -110,6 +117,7 @@ class Trial:
             "failures": robot.failures,
             "edges": -1 if estimate is None else estimate.depth,
             "search_s": self.now_s,
+            "step_s": step_s,  # of driver, search and simulation together
             "candidates": -1 if estimate is None else len(estimate.dart),
             "reason": "" if estimate is None else estimate.reason,
             **self._errors(estimate),
@@ -117,7 +125,8 @@ class Trial:
 
     def _print(self, status: SearchStatus) -> None:
         estimate, arrival = status.estimate, self.robot.arrival
-        if estimate is not None and arrival is not None:
+        if estimate is not None and arrival is not None and estimate is not self._shown:
+            self._shown = estimate
             print(
                 f"{self.now_s:7.1f} s depth {estimate.depth} {estimate.state}: {estimate.reason}; rank "
                 f"{estimate.choice.rank if estimate.choice else '-'}; {self._truth(arrival)}{self._belief()}",
@@ -256,6 +265,18 @@ def line(name: str, runs: List[Dict[str, Any]]) -> str:
     )
 
 
+def bars(runs: List[Dict[str, Any]]) -> str:
+    """How many were right, and how fast, in one sentence; a robot that was not found took for ever."""
+    seconds = np.sort([each["search_s"] if each["right"] else math.inf for each in runs])
+    right = sum(each["right"] for each in runs)
+    return (
+        f"{right} of {len(runs)} right ({right / len(runs):.1%}), {sum(each['wrong'] for each in runs)} wrong, "
+        f"{sum(each['collisions'] > 0 for each in runs)} with a collision; CONFIRMED after "
+        f"{seconds[(len(seconds) - 1) // 2]:.0f} s in the median, "
+        f"{np.mean(seconds <= SOON_S):.1%} within {SOON_S:.0f} s; slowest step {max(each['step_s'] for each in runs):.2f} s of CPU"
+    )
+
+
 def main() -> None:
     """Run all, print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -311,6 +332,7 @@ def main() -> None:
     for name in arguments.buildings:
         print(line(name, [each for each in runs if each["building"] == name]))
     print(line("all", runs))
+    print(f"\n{bars(runs)}")
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ import parameters_page
 import pytest
 import yaml
 
+import glass_nav.params
 from glass_nav.cli import atlas, compare, doctor, landmarks, locate, maps, params, replay, report, simulate
 from glass_nav.cli.parser import CommandParser
 
@@ -114,6 +115,26 @@ def test_the_parameters_page_is_what_the_structs_say() -> None:
 def test_every_parameter_is_explained() -> None:
     rows = [row.split(" | ") for row in parameters_page.page().splitlines() if row.startswith("| `")]
     assert [row[0] for row in rows if not row[4].strip(" |")] == []
+
+
+@every_page
+def test_parameters_that_a_page_sets_exist_and_may_have_that_value(page: Path) -> None:
+    structs = [struct for struct, _ in parameters_page.NODES.values()]
+    for name, value in re.findall(r"`([a-z]+(?:_[a-z0-9]+)+): ([^`{}]+)`", prose(page)):
+        takers = [struct for struct in structs if name in glass_nav.params.names(struct)]
+        assert takers, f"{page.name}: no node has ~{name}"
+        faults = [glass_nav.params.type_fault(struct, name, yaml.safe_load(value)) for struct in takers]
+        choices = [glass_nav.params.choices(struct).get(name, (value,)) for struct in takers]
+        assert "" in faults and any(value in each for each in choices), f"{page.name}: {name}: {value}: {faults}"
+
+
+def test_the_readme_names_every_program() -> None:
+    text = (REPO / "README.md").read_text(encoding="utf-8")
+    nodes = [path.name for path in (REPO / "scripts").glob("*_node")]
+    assert [node for node in nodes if f"`{node}`" not in text] == []
+    modules = [atlas, compare, doctor, landmarks, locate, maps, params, replay, report, simulate]
+    words = {"map" if module is maps else module.__name__.rpartition(".")[2] for module in modules}
+    assert [word for word in sorted(words) if not re.search(rf"`(?:glass_nav )?{word}`", text)] == []
 
 
 @every_page

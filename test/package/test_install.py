@@ -95,6 +95,7 @@ def test_nothing_of_the_tests_or_the_build_is_installed(install: Path) -> None:
         "glass_nav._grid",
         "glass_nav._mrpt_io",
         "glass_nav._mrpt_rays",
+        "glass_nav._particles",
         "glass_nav.msg",
         "glass_nav.srv",
     ],

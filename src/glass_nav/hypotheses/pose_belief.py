@@ -67,6 +67,9 @@ class MapScans(Protocol):
     def beams(self, scan: Scan, map_from_base: np.ndarray, most_m: float, most_rad: float) -> Optional[BeamsExplained]:
         """Poses (K, 3) slid by no more than that, with the beams explained from there; None: no evidence."""
 
+    def seen_from(self, map_from_base: np.ndarray) -> Scan:
+        """The scan that a robot at a pose (3,) would see if the map were right."""
+
 
 @dataclass(frozen=True)
 class _View:
@@ -337,6 +340,19 @@ class _SearchedScan:
             np.concatenate([getattr(part, name) for part in self._judged]) for name in ("poses", "explained", "known")
         )
         return BeamsExplained(poses, beams.ends_m, explained, known)
+
+
+def expected_nats(scans: MapScans, map_from_base: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """(K,) log likelihood ratios of a pose (3,) to others (K, 3) that a robot at the first one can expect of one scan.
+
+    0 where nothing would be seen.
+    """
+    beams = scans.beams(scans.seen_from(map_from_base), np.concatenate([map_from_base[None], others]), _OFF_M, _OFF_RAD)
+    if beams is None:
+        return np.zeros(len(others))
+    pieces = new_walls.pieces(beams.ends_m)
+    unexplained = (beams.known & ~beams.explained) @ pieces
+    return _NATS * np.maximum(unexplained[1:] - unexplained[0], 0.0)
 
 
 def _of_view(beams: BeamsExplained, view: _View) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:

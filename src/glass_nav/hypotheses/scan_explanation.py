@@ -30,6 +30,7 @@ _MAX_THICK_M = 0.3  # a thicker wall is no glass
 _SLIDES_M, _SLIDES_RAD = 0.5, np.radians(15.0)  # a pose that would slide further stays where it was given
 _AT_ONCE = 64  # poses
 _MIN_BEAMS = 10
+_SEES_M = 25.0  # a simulated scan
 _MIN_KNOWN = 0.25  # of the beams that returned; where the map knows fewer of them it cannot judge
 
 
@@ -112,6 +113,12 @@ class ScanExplanation:
         if self._matcher is None:
             self._matcher = ScanMatcher(self._grid_map, self._field)
         return PlaceSearch(self._matcher, self._field, scan.points_in_base()[used], odom_from_base)
+
+    def seen_from(self, map_from_base: np.ndarray) -> Scan:
+        """The scan that a robot at a pose (3,) would see if the map were right: the first surface along each beam."""
+        directions = np.arange(_BEAMS) * (2.0 * np.pi / _BEAMS) - np.pi
+        first_m = self._caster.cast(map_from_base[None], directions, _SEES_M)[0]
+        return Scan(0, first_m, directions, 0.0, _SEES_M, np.zeros(3))
 
     def _slid(self, points_m: np.ndarray, poses: np.ndarray, most_m: float, most_rad: float) -> np.ndarray:
         slid = scan_alignment.align(self._field, points_m, poses, last_scale_m=0.1).poses

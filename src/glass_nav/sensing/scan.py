@@ -6,6 +6,7 @@ B beams. Ranges follow REP 117: -inf too near, +inf nothing met, NaN no measurem
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Optional
 
 import numpy as np
@@ -47,11 +48,17 @@ class Scan:
         return np.isfinite(self.ranges_m)
 
     def points_in_base(self) -> np.ndarray:
-        """(B, 2) end points [m] in the robot's frame; NaN where the beam did not answer."""
+        """(B, 2) end points [m] in the robot's frame, not to be changed; NaN where the beam did not answer."""
+        return self._points_in_base
+
+    @cached_property
+    def _points_in_base(self) -> np.ndarray:
         x, y, yaw = self.base_from_laser
         bearing = self.angles_rad + yaw
         ranges_m = np.where(self.answered, self.ranges_m, np.nan)
-        return np.stack([x + ranges_m * np.cos(bearing), y + ranges_m * np.sin(bearing)], axis=-1)
+        points_m = np.stack([x + ranges_m * np.cos(bearing), y + ranges_m * np.sin(bearing)], axis=-1)
+        points_m.flags.writeable = False
+        return points_m
 
     def as_measured(self, ranges_m: np.ndarray) -> np.ndarray:
         """(B,) ranges from where each beam began, of points on the beams with these ranges from the laser at the stamp.

@@ -130,7 +130,14 @@ class GoalEnd:
     status: SearchStatus
 
 
-Decision = Union[SearchStatus, Progress, Turn, InitialPose, GoalEnd, LogLine]
+@dataclass(frozen=True)
+class AtlasRequest:
+    """An atlas of this map is to be made, and to be given to SearchSession.atlas_made()."""
+
+    grid_map: GridMap
+
+
+Decision = Union[SearchStatus, Progress, Turn, InitialPose, GoalEnd, LogLine, AtlasRequest]
 
 
 # -- the session
@@ -139,14 +146,15 @@ Decision = Union[SearchStatus, Progress, Turn, InitialPose, GoalEnd, LogLine]
 class SearchSession:
     """One search at a time, for as long as the node runs; start() first."""
 
-    def __init__(self, read_atlas: ReadAtlas, p: SessionParams, search: SearchParams) -> None:
+    def __init__(self, read_atlas: Optional[ReadAtlas], p: SessionParams, search: SearchParams) -> None:
         """
         Args:
-            read_atlas: reads the atlas to use now, at the start and whenever it is to be read again.
+            read_atlas: reads the atlas to use now, at the start and whenever it is to be read again; None: there is none,
+                one is to be made of each map that is served.
             p: of the session.
             search: how each search is done.
         """
-        self._read_atlas = read_atlas
+        self._read_atlas, self._makes_atlas = read_atlas, read_atlas is None
         self._p, self._search_params = p, search
         self._explanation = ServedExplanation()
         self._map: Optional[Tuple[GridMap, str]] = None  # that is served, and its name for people
@@ -166,7 +174,7 @@ class SearchSession:
     @property
     def is_to_end(self) -> bool:
         """Whether the node is to end: the atlas was refused, and nobody waits for its map."""
-        return self._p.end_without_atlas and self._status.state == SearchState.NO_ATLAS
+        return self._p.end_without_atlas and self._status.state == SearchState.NO_ATLAS and not self._makes_atlas
 
     @property
     def localizer(self) -> Optional[AtlasLocalizer]:
@@ -202,6 +210,8 @@ class SearchSession:
         Raises:
             ValueError, OSError: it cannot be used.
         """
+        if self._read_atlas is None:
+            return [self._show(SearchState.NO_ATLAS, "an atlas is made as soon as a map is served")]
         loaded = self._load()
         if self._p.search_at_start:
             waiting = self._await_meetpoint("the node has started")
@@ -271,6 +281,8 @@ class SearchSession:
         """
         if self.takes_scans:
             self._explanation.take(grid_map)
+        if self._makes_atlas:
+            return self._map_without_atlas(grid_map, name)
         if not self._p.check_map:
             return []
         self._map = grid_map, name
@@ -283,6 +295,25 @@ class SearchSession:
             self._localizer = None
             status = self._show(SearchState.NO_ATLAS, f"the atlas {err}")
             return [LogLine(f"atlas refused: {err}", logging.ERROR), status, *self._end_goal(status.reason)]
+
+    def atlas_made(self, grid_map: GridMap, atlas: "Atlas | AtlasError") -> List[Decision]:
+        """The answer to an AtlasRequest.
+
+        Args:
+            grid_map: of the request.
+            atlas: of the map, or why there is none.
+        """
+        if self._map is None or self._map[0] is not grid_map:
+            return []  # another map was served since
+        if isinstance(atlas, AtlasError):
+            status = self._show(SearchState.NO_ATLAS, f"no atlas can be made of {self._map[1]}: {atlas}")
+            return [LogLine(status.reason, logging.ERROR), status, *self._end_goal(status.reason)]
+        name = self._map[1]
+        self._read_atlas = lambda: (f"the atlas made of {name}", atlas)
+        loaded = self._load()
+        if self._p.search_at_start:
+            return [loaded, self._await_meetpoint("the atlas is made")]
+        return [loaded, self._show(SearchState.IDLE, "no search was asked for")]
 
     def goal(self, goal: Goal) -> List[Decision]:
         """Somebody asks for a search; another goal that is on was preempted by that."""
@@ -330,10 +361,23 @@ class SearchSession:
 
     # -- how an event is decided
 
+    def _map_without_atlas(self, grid_map: GridMap, name: str) -> List[Decision]:
+        if self._localizer is not None and self._map is not None:
+            try:
+                self._localizer.atlas.check_map(grid_map, name)
+                return []
+            except AtlasError:  # another one
+                self._localizer = None
+        self._map = grid_map, name
+        status = self._show(SearchState.NO_ATLAS, f"an atlas of {name} is being made")
+        return [LogLine(status.reason), status, AtlasRequest(grid_map)]
+
     def _load(self) -> LogLine:
         """Raises what reading raises, and AtlasError if the atlas is of another map than the one that is served, or the
         visits are of another atlas.
         """
+        if self._read_atlas is None:
+            raise AtlasError("no atlas has been made yet")
         found_at, atlas = self._read_atlas()
         atlas = self._with_visits(atlas)
         warning = ""

@@ -564,3 +564,38 @@ def test_without_a_map_or_if_they_are_not_asked_for_scans_are_not_looked_at(monk
         session.start()
         session.map_served(served("glass_atrium"), "that of topic /map")
         assert not session.is_looking and seen(session, 0.0, T_0) == []
+
+
+# -- no atlas
+
+
+def without_atlas(**fields: Any) -> SearchSession:
+    return SearchSession(None, SessionParams(**fields), SearchParams())
+
+
+def test_without_an_atlas_one_is_made_of_the_map_and_the_search_begins() -> None:
+    session = without_atlas(end_without_atlas=True)
+    assert states(session.start()) == [SearchState.NO_ATLAS] and not session.is_to_end
+    with pytest.raises(AtlasError, match="no atlas has been made yet"):
+        session.reload_atlas()
+    office, atlas = served("glass_office"), glass_office()[1]
+    decisions = session.map_served(office, "that of topic /map")
+    assert only(decisions, search_session.AtlasRequest).grid_map is office
+    assert session.status.reason == "an atlas of that of topic /map is being made"
+    assert session.atlas_made(served("glass_atrium"), atlas) == []  # of a map before
+    decisions = session.atlas_made(office, atlas)
+    assert states(decisions) == [SearchState.WAITING] and session.localizer is not None
+    assert texts(decisions)[0].startswith("the atlas made of that of topic /map: ")
+    assert session.map_served(office, "that of topic /map") == []  # it is served again
+    assert states(session.reload_atlas()) == [SearchState.WAITING]
+    decisions = session.map_served(served("glass_atrium"), "that of topic /map")
+    assert len(decisions) == 3 and session.status.state == SearchState.NO_ATLAS
+
+
+def test_a_map_that_no_atlas_can_be_made_of_is_said_and_a_search_may_wait_to_be_asked_for() -> None:
+    session, office = without_atlas(search_at_start=False), served("glass_office")
+    session.map_served(office, "that of topic /map")
+    decisions = session.atlas_made(office, AtlasError("no path of 1 m in this map"))
+    assert texts(decisions) == ["no atlas can be made of that of topic /map: no path of 1 m in this map"]
+    assert session.status.state == SearchState.NO_ATLAS
+    assert states(session.atlas_made(office, glass_office()[1])) == [SearchState.IDLE]

@@ -117,10 +117,10 @@ class ExpectedRanges {
   // -- the other samples
 
   void look_from_others() {
+    see_nothing();
     const std::vector<Need> needs = needs_of_beams();
     std::vector<std::size_t> first, all;
     for (std::size_t b = 0; b < beams_; ++b) {
-      if (needs[b] == Need::nothing) see_nothing(b);
       if (needs[b] == Need::first) first.push_back(b);
       if (needs[b] == Need::all) all.push_back(b);
     }
@@ -148,16 +148,14 @@ class ExpectedRanges {
     return needs;
   }
 
-  void put_nothing(std::size_t at) {
-    out_.range_m[at] = kInfinite;
-    out_.cos[at] = 1.0;
-    out_.cell[at] = -1;
-    out_.thickness_m[at] = 0.0F;
-  }
-
-  void see_nothing(std::size_t beam) {
+  /// What is not met is not written again.
+  void see_nothing() {
     for (std::size_t path = 0; path < kPathCount; ++path) {
-      for (std::size_t n = 1; n < samples_; ++n) put_nothing(index(path, n, beam));
+      const std::size_t from = index(path, 1, 0), count = (samples_ - 1) * beams_;
+      std::fill_n(out_.range_m + from, count, kInfinite);
+      std::fill_n(out_.cos + from, count, 1.0);
+      std::fill_n(out_.cell + from, count, -1);
+      std::fill_n(out_.thickness_m + from, count, 0.0F);
     }
   }
 
@@ -194,21 +192,19 @@ class ExpectedRanges {
       for (std::size_t n = 1; n < samples_; ++n) {
         const std::size_t from = (n - 1) * count + i, at = index(kFirst, n, b);
         const std::int32_t met = cell[from];
-        if (met >= 0 && met != known) {
-          normal = grid_.normals().at(met);
+        if (met < 0) continue;
+        if (met != known) {
+          normal = lines_.normal(met);
           known = met;
         }
-        const bool straight = met >= 0 && lines_.straight(normal);
-        if (met < 0 || (!straight && may_miss(n, b))) {
-          put_nothing(at);
-        } else {
-          const Ray u = straight ? ray(n, b) : Ray{};
-          out_.range_m[at] = range_m[from];
-          out_.cos[at] = straight ? std::abs(normal.x * u.dx + normal.y * u.dy) : 1.0;
-          out_.cell[at] = met;
-          out_.thickness_m[at] = wanted_.thickness_m[met];
-        }
-        for (const std::size_t path : {kMirrored, kSecond, kThird}) put_nothing(index(path, n, b));
+        const bool straight = lines_.straight(normal);
+        if (!straight && may_miss(n, b)) continue;
+        out_.range_m[at] = range_m[from];
+        out_.cell[at] = met;
+        out_.thickness_m[at] = wanted_.thickness_m[met];
+        if (!straight) continue;
+        const Ray u = ray(n, b);
+        out_.cos[at] = std::abs(normal.x * u.dx + normal.y * u.dy);
       }
     }
   }
@@ -229,6 +225,7 @@ class ExpectedRanges {
       for (std::size_t n = 1; n < samples_; ++n) {
         const std::size_t from = path * plane + (n - 1) * count, row = index(path, n, 0);
         for (std::size_t i = 0; i < count; ++i) {
+          if (cell[from + i] < 0) continue;
           out_.range_m[row + beams[i]] = range_m[from + i];
           out_.cos[row + beams[i]] = cos[from + i];
           out_.cell[row + beams[i]] = cell[from + i];
@@ -245,7 +242,7 @@ class ExpectedRanges {
         }
         for (std::size_t path = 0; path < kPathCount; ++path) {
           const std::size_t at = index(path, n, b);
-          out_.thickness_m[at] = out_.cell[at] < 0 ? 0.0F : wanted_.thickness_m[out_.cell[at]];
+          if (out_.cell[at] >= 0) out_.thickness_m[at] = wanted_.thickness_m[out_.cell[at]];
         }
       }
     }
@@ -289,19 +286,23 @@ class ExpectedRanges {
       const std::size_t from = index(path, 0, beam), to = path * beams_ + beam;
       const std::int32_t cell = out_.cell[from];
       const WallLine& line = seen_.at[path][beam].line;
-      const double range = seen_.at[path][beam].range, axis = std::atan2(line.ny, line.nx) + wanted_.grid_yaw;
+      const double range = seen_.at[path][beam].range, axis = axis_rad(line);
       out_.seen_side[to] = cell < 0 || is_seen_side(cell, line, path == kMirrored ? mirrored : straight);
       if (path == kMirrored) {
         const double mirror_cos = out_.cos[index(kFirst, 0, beam)];
         const double line_m = range + kFace / std::max(out_.cos[from], kMinCos) + 2.0 * kFace * mirror_cos;
         out_.line_m[to] = line_m * cell_m;
-        const double turned = 2.0 * (std::atan2(first.ny, first.nx) + wanted_.grid_yaw) + kPi;
-        out_.axis_rad[to] = line.straight ? turned - axis : kNaN;
+        out_.axis_rad[to] = 2.0 * axis_rad(first) + kPi - axis;
       } else {
         out_.line_m[to] = range_by_line(line, straight, range) * cell_m;
-        out_.axis_rad[to] = line.straight ? axis : kNaN;
+        out_.axis_rad[to] = axis;
       }
     }
+  }
+
+  /// Of the normal in the map; NaN where there is no line.
+  double axis_rad(const WallLine& line) const {
+    return line.straight ? std::atan2(line.ny, line.nx) + wanted_.grid_yaw : kNaN;
   }
 
   /// At which a beam crosses the line of a wall, which it meets there; half a cell more than that where there is no

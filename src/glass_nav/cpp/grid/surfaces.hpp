@@ -52,13 +52,14 @@ class SurfaceFinder {
   /// from surface to surface together, since the marcher is fastest with many.
   template <class Rays, class Reach, class Found>
   void along_all(std::size_t count, const Reach& t_max, Rays& rays, const Found& found) const {
-    std::vector<Search> searches(count);
+    std::vector<Search> searches;
     std::vector<Surfaces> surfaces(count);
     std::vector<std::size_t> going(count);  // rays that are not at their end
+    searches.reserve(count);
     for (std::size_t i = 0; i < count; ++i) {
       const double reach = t_max(rays.beam());
       const Ray ray = rays.next();
-      searches[i] = {ray, GridWalk(ray, cells_.width, cells_.height, reach)};
+      searches.push_back({ray, GridWalk(ray, cells_.width, cells_.height, reach)});
       going[i] = i;
     }
     for (std::size_t k = 0; k < 3 && !going.empty(); ++k) {

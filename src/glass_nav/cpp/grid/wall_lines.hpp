@@ -44,6 +44,7 @@ class WallLines {
   bool straight(const WallNormals::Normal& normal) const {
     return normal.linearity > 0.0F && normal.linearity >= min_linearity_;
   }
+  WallNormals::Normal normal(std::int32_t cell) const { return normals_.at(cell); }
   bool straight(std::int32_t cell) const { return straight(normals_.at(cell)); }
 
   WallLine of(std::int32_t cell) const {

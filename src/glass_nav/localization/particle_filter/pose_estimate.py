@@ -9,14 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
+from glass_nav import _particles
 from glass_nav.geometry import angles
 from glass_nav.localization.particle_filter import resampling
 
 _YAW_BINS = 36  # bins of 10 degrees go round
-_NEIGHBOURS = np.array([(x, y, yaw) for x in (-1, 0, 1) for y in (-1, 0, 1) for yaw in (-1, 0, 1)][14:])
 
 
 @dataclass(frozen=True)
@@ -36,7 +34,7 @@ def of(poses: np.ndarray, weights: np.ndarray) -> PoseEstimate:
         poses: (P, 3) particles in map.
         weights: (P,) that sum to 1.
     """
-    label = _clusters(poses)
+    label = _particles.clusters(poses, resampling.BIN, _YAW_BINS)  # histogram bins that touch are one cluster
     share = np.bincount(label, weights)
     best = int(np.argmax(share))
     members = label == best
@@ -53,22 +51,3 @@ def moments(poses: np.ndarray, weights: np.ndarray) -> "tuple[np.ndarray, np.nda
     off = poses - mean
     off[:, 2] = angles.wrap(off[:, 2])
     return mean, (off * w[:, None]).T @ off
-
-
-def _clusters(poses: np.ndarray) -> np.ndarray:
-    """(P,) label of each particle: histogram bins that touch are one cluster."""
-    cells = resampling.bins(poses)
-    base = cells[:, :2].min(axis=0) - 1
-    span_y = cells[:, 1].max() - base[1] + 2
-
-    def key(cell: np.ndarray) -> np.ndarray:  # yaw goes round
-        x, y = cell[..., 0] - base[0], cell[..., 1] - base[1]
-        return (x * span_y + y) * _YAW_BINS + cell[..., 2] % _YAW_BINS
-
-    keys, first, which = np.unique(key(cells), return_index=True, return_inverse=True)
-    which = which.reshape(-1)
-    wanted = key(cells[first][:, None, :] + _NEIGHBOURS[None])
-    at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-    row, column = np.nonzero(keys[at] == wanted)
-    links = coo_matrix((np.ones(len(row)), (row, at[row, column])), shape=(len(keys),) * 2)
-    return connected_components(links, directed=False)[1][which]

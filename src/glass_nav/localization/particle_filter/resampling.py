@@ -12,7 +12,7 @@ import numpy as np
 
 from glass_nav.params import number
 
-_BIN = np.array([0.5, 0.5, np.radians(10.0)])  # AMCL's: m, m, rad
+BIN = np.array([0.5, 0.5, np.radians(10.0)])  # AMCL's: m, m, rad
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def low_variance(weights: np.ndarray, count: int, rng: np.random.Generator) -> n
 
 def bins(poses: np.ndarray) -> np.ndarray:
     """(P, 3) int cells of the histogram over poses: 0.5 m, 0.5 m, 10 degrees."""
-    return np.floor(poses / _BIN).astype(np.int64)
+    return np.floor(poses / BIN).astype(np.int64)
 
 
 def enough_particles(poses: np.ndarray, limits: ParticleCount) -> int:

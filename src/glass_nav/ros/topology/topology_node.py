@@ -20,9 +20,11 @@ Parameters: TopologyParams, read once; explained in config/topology.yaml.
 
 from __future__ import annotations
 
+import itertools
 import threading
+from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any, Callable, List, Optional, Tuple
+from typing import Any, Callable, Iterator, List, Optional, Tuple
 
 import actionlib
 import numpy as np
@@ -53,13 +55,14 @@ from glass_nav.ros.topology import topology_displays, topology_messages
 from glass_nav.ros.topology.scan_memory import ScanMemory
 from glass_nav.ros.topology.topology_params import TopologyParams
 from glass_nav.topology import observations, search_session
-from glass_nav.topology.atlas import atlas_file, shipped_atlases
+from glass_nav.topology.atlas import atlas_builder, atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.topology.observations import ObservationError
 from glass_nav.topology.search_scene import SearchScene
 from glass_nav.topology.search_session import Decision, GoalOutcome, SearchSession, SearchStatus
 
 SERVICE_TIMEOUT_S = 30.0
+FROM_MAP = "map"  # in place of a file: the atlas is made of the map that is served
 LAST_WORDS_S = 2.0  # by the wall clock, for others to hear the status
 
 
@@ -68,7 +71,8 @@ class TopologyNode:
 
     def __init__(self, p: TopologyParams) -> None:
         self._p = p.node
-        self._session = SearchSession(self._read_atlas, p.session, p.search)
+        made = self._atlas_name == FROM_MAP
+        self._session = SearchSession(None if made else self._read_atlas, p.session, p.search)
         self._scans = ScanMemory(p.node.odom_frame_id) if self._session.takes_scans else None
         self._base_frame = p.node.base_frame_id  # or that of the last meetpoint
         self._shown_atlas: Optional[Atlas] = None
@@ -97,6 +101,7 @@ class TopologyNode:
             search_session.Turn: self._publish_turn,
             search_session.InitialPose: self._publish_pose,
             search_session.GoalEnd: self._end_goal,
+            search_session.AtlasRequest: self._make_atlas,
             LogLine: self._log.write,
         }
         self._carry_out(self._session.start())
@@ -109,7 +114,7 @@ class TopologyNode:
             ("edge_traversal", EdgeTraversal, self._take_traversal),
         ):
             rospy.Subscriber(topic, kind, self._put_report, callback_args=take, queue_size=10, tcp_nodelay=True)
-        if p.session.check_map or self._session.takes_scans:
+        if p.session.check_map or self._session.takes_scans or made:
             rospy.Subscriber(
                 "map",
                 OccupancyGrid,
@@ -221,9 +226,32 @@ class TopologyNode:
         self._carry_out(decisions)
         return self._session.status.reason
 
+    @property
+    def _atlas_name(self) -> str:
+        return str(rospy.get_param("~atlas", self._p.atlas))
+
+    def _make_atlas(self, request: search_session.AtlasRequest) -> None:
+        """Beside the run loop; that of a large map takes a minute."""
+
+        @contextmanager
+        def watched(what: str, steps: int) -> Iterator[Callable[[], None]]:
+            rospy.loginfo(f"making the atlas: {what}, {steps} steps")
+            done = itertools.count(1)
+            yield lambda: rospy.loginfo_throttle(5.0, f"making the atlas: {what}, {next(done)} of {steps} steps")
+
+        def make() -> None:
+            made: "Atlas | AtlasError"
+            try:
+                made, _ = atlas_builder.build(request.grid_map, FROM_MAP, FROM_MAP, watch=watched)
+            except AtlasError as err:
+                made = err
+            self._inbox.put("commands", lambda: self._carry_out(self._session.atlas_made(request.grid_map, made)))
+
+        threading.Thread(target=make, daemon=True).start()
+
     def _read_atlas(self) -> Tuple[str, Atlas]:
         """Raises AtlasError; ValueError without a name."""
-        name = str(rospy.get_param("~atlas", self._p.atlas))
+        name = self._atlas_name
         if not name:
             raise ValueError("~atlas must be a file, a folder or the name of a shipped atlas, got ''")
         path = shipped_atlases.find(name)

@@ -13,7 +13,7 @@ from glass_nav.topology.search_session import SessionParams
 class TopologyNodeParams:
     """What the node itself needs."""
 
-    atlas: str = ""  # atlas.json, atlas.npz, the folder of one, or the name of a shipped one
+    atlas: str = ""  # atlas.json, atlas.npz, the folder of one, the name of a shipped one, or map: made
     global_frame_id: str = "map"
     odom_frame_id: str = "odom"  # of the odometry by which scans are deskewed and poses are followed
     base_frame_id: str = "base_link"  # of the robot, until a meetpoint names another one

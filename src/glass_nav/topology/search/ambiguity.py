@@ -18,6 +18,7 @@ from typing import List, Optional, Tuple
 
 import numpy as np
 
+from glass_nav.topology.search.expected_views import ExpectedViews
 from glass_nav.topology.search.matching import Matcher
 
 MAX_PAIRS = 200_000  # of one search; a torus of 40,000 darts takes 40,000 pairs
@@ -32,21 +33,24 @@ class Proof:
     pairs: int  # searched
 
 
-def prove(matcher: Matcher, dart: np.ndarray, max_pairs: int = MAX_PAIRS) -> Proof:
+def prove(
+    matcher: Matcher, dart: np.ndarray, max_pairs: int = MAX_PAIRS, views: Optional[ExpectedViews] = None
+) -> Proof:
     """Whether candidates can be told apart.
 
     Args:
         matcher: of the atlas.
         dart: (C,) candidates at meetpoints that are alike.
         max_pairs: the search stops after this number.
+        views: scans at meetpoints tell them apart, too; None: they do not.
     """
     group = np.arange(len(dart))
     searched, known = 0, np.zeros((0, 2), np.int64)
     while True:
         apart = np.flatnonzero(group != group[0])
         if not len(apart):
-            return Proof(True, None, searched)
-        met, ranks = _search(matcher, dart[0], dart[apart[0]], max_pairs - searched)
+            return Proof(views is None or not views.is_exhausted, None, searched)
+        met, ranks = _search(matcher, dart[0], dart[apart[0]], max_pairs - searched, views)
         searched += len(met)
         if ranks is not None or searched >= max_pairs:
             return Proof(False, ranks, searched)
@@ -64,7 +68,9 @@ def _groups(pairs: np.ndarray, dart: np.ndarray) -> np.ndarray:
     return csgraph.connected_components(graph, directed=False)[1][compact[pairs.size :]]
 
 
-def _search(matcher: Matcher, first: int, second: int, max_pairs: int) -> Tuple[np.ndarray, Optional[List[int]]]:
+def _search(
+    matcher: Matcher, first: int, second: int, max_pairs: int, views: Optional[ExpectedViews]
+) -> Tuple[np.ndarray, Optional[List[int]]]:
     """The pairs (P, 2) that turns lead to from one pair, level by level, and the turns to the first that differs."""
     count = len(matcher.atlas.darts)
     start = np.array([_key(np.array([first]), np.array([second]), count)[0]])
@@ -80,7 +86,10 @@ def _search(matcher: Matcher, first: int, second: int, max_pairs: int) -> Tuple[
                 matcher.atlas.clockwise(a[able], np.array(rank)),
                 matcher.atlas.clockwise(b[able], np.array(rank)),
             )
-            bad = np.flatnonzero(~(matcher.alike_along(one, other) & matcher.alike_along(other, one)))
+            alike = matcher.alike_along(one, other) & matcher.alike_along(other, one)
+            if views is not None:
+                alike[alike] = views.alike(one[alike] ^ 1, other[alike] ^ 1)
+            bad = np.flatnonzero(~alike)
             if len(bad):
                 return _pairs(visited, count), _turns(levels, int(able[bad[0]]), rank)
             keys.append(_key(one ^ 1, other ^ 1, count))

@@ -20,6 +20,7 @@ from glass_nav.topology.atlas.atlas import Atlas, Visits
 from glass_nav.topology.observations import Meetpoint, Traversal
 from glass_nav.topology.search import learnt_atlas
 from glass_nav.topology.search.belief import Belief
+from glass_nav.topology.search.expected_views import ExpectedViews
 from glass_nav.topology.search.graph_verdict import GraphVerdict
 from glass_nav.topology.search.joint_belief import JointBelief
 from glass_nav.topology.search.joint_verdict import JointVerdict
@@ -54,9 +55,11 @@ class AtlasLocalizer:
         self._by_graph = GraphVerdict(self._matcher, self._forest, params)
         self._passed = PassedEdges()
         self._joint: Optional[JointBelief] = None
+        self._views: Optional[ExpectedViews] = None
         if scans is not None and params.use_scans and not params.document:
             self._joint = JointBelief(scans, self._matcher)
-        self._by_both = JointVerdict(self._matcher, self._forest, self._passed, params)
+            self._views = ExpectedViews(self._matcher.atlas, scans)
+        self._by_both = JointVerdict(self._matcher, self._forest, self._passed, params, self._views)
         self._estimate: Optional[SearchEstimate] = None
         self._edges_before = 0  # driven before the forest began anew
 
@@ -91,6 +94,8 @@ class AtlasLocalizer:
         self._estimate, self._edges_before = None, 0
         if self._joint is not None:
             self._joint.forget()
+        if self._views is not None:
+            self._views.forget()
 
     def start(self, meetpoint: Meetpoint) -> SearchEstimate:
         """The first meetpoint. Scans since begin() stay what is known."""

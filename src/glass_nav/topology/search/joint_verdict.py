@@ -14,6 +14,7 @@ import numpy as np
 from glass_nav.topology.observations import Meetpoint
 from glass_nav.topology.search import ambiguity, vote
 from glass_nav.topology.search.belief import NO_DART, Belief
+from glass_nav.topology.search.expected_views import ExpectedViews
 from glass_nav.topology.search.matching import Matcher
 from glass_nav.topology.search.passed_edges import PassedEdges
 from glass_nav.topology.search.search_estimate import SearchEstimate, TurnChoice
@@ -23,15 +24,22 @@ from glass_nav.vocabulary import SearchState
 
 _MIN_DRIVEN_M = 1.0  # before a place is confirmed: odometry must agree with it
 _LOST_SEARCHES, _LOST_M = 3, 4.0  # of the whole map, and driven, before it is given up
-_AMBIGUOUS_EDGES = 6  # driven before places that no turn tells apart are given up: scans may
 _MAX_SHOWN = 0.9995  # of a probability in words
 
 
 class JointVerdict:
     """Of one search at a time."""
 
-    def __init__(self, matcher: Matcher, forest: SearchForest, passed: PassedEdges, params: SearchParams) -> None:
+    def __init__(
+        self,
+        matcher: Matcher,
+        forest: SearchForest,
+        passed: PassedEdges,
+        params: SearchParams,
+        views: Optional[ExpectedViews] = None,
+    ) -> None:
         self._matcher, self._forest, self._passed, self._params = matcher, forest, passed, params
+        self._views = views
 
     def final(self, belief: Belief, depth: int) -> Optional[SearchEstimate]:
         """CONFIRMED or LOST, wherever the robot is; None: not yet."""
@@ -70,18 +78,20 @@ class JointVerdict:
             choice = TurnChoice(self._least_passed(here), here.degree)
             reason = f"{places}; next a new edge, as more walls are to confirm it"
             return self._estimate(state, reason, depth, dart, choice)
-        voted = vote.expected(self._matcher, dart, share)
+        if self._views is not None:
+            self._views.arrive(dart)
+        voted = vote.expected(self._matcher, dart, share, self._views)
         if voted.splits:
             reason = f"{places}; next the turn that leaves the least doubt per metre"
             return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(voted.rank, here.degree))
-        proof = ambiguity.prove(self._matcher, dart)
+        proof = ambiguity.prove(self._matcher, dart, views=self._views)
         if proof.ranks is not None:
             reason = f"{places}; next towards the nearest difference, {len(proof.ranks)} edges away"
             choice = TurnChoice(proof.ranks[0], here.degree)
             return self._estimate(SearchState.SEARCHING, reason, depth, dart, choice)
         rank = self._least_passed(here)
         listed = float(belief.share[known].sum())
-        if proof.indistinguishable and 1.0 - listed < self._params.tolerances.risk and depth >= _AMBIGUOUS_EDGES:
+        if proof.indistinguishable and 1.0 - listed < self._params.tolerances.risk and depth > 0:
             reason = f"{len(dart)} places match, and no turn can tell them apart"
             return self._estimate(SearchState.AMBIGUOUS, reason, depth, dart, None)
         reason = f"{places}; no turn is known to tell them apart, next a new edge"

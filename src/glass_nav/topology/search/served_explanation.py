@@ -36,3 +36,9 @@ class ServedExplanation:
         if self._explanation is None:
             return None
         return self._explanation.beams(scan, map_from_base, most_m, most_rad)
+
+    def seen_from(self, map_from_base: np.ndarray) -> Scan:
+        """As of ScanExplanation; without a map nothing is seen."""
+        if self._explanation is None:
+            return Scan(0, np.zeros(0), np.zeros(0), 0.0, 1.0, np.zeros(3))
+        return self._explanation.seen_from(map_from_base)

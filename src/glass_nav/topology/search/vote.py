@@ -11,15 +11,17 @@ leaves those that expect what the truth shows. C candidates, R ranks.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import List, Tuple
+from typing import List, Optional, Tuple
 
 import numpy as np
 
+from glass_nav.topology.search.expected_views import ExpectedViews
 from glass_nav.topology.search.matching import Matcher
 
 _POLLED = 100  # candidates whose expectations are compared pairwise: 2 ms of a step
 _BACK = 0.999  # share of the gain of the way back
 _MIN_GAIN = 0.01  # share of the doubt that a turn must remove to be worth taking
+_LOOKED_AT = 8  # candidates whose views are compared pairwise
 _EQUAL = 1e-9  # survivors by which two turns differ only by rounding
 
 
@@ -58,22 +60,27 @@ def best(matcher: Matcher, dart: np.ndarray) -> Vote:
     )
 
 
-def expected(matcher: Matcher, dart: np.ndarray, share: np.ndarray) -> Vote:
+def expected(matcher: Matcher, dart: np.ndarray, share: np.ndarray, views: Optional[ExpectedViews] = None) -> Vote:
     """The turn that is expected to leave the least probability outside the leading place per metre driven.
 
     Args:
         matcher: of the atlas.
         dart: (C,) candidates at a meetpoint of one degree, two or more of them, the likeliest first.
         share: (C,) probability of each, in any unit.
+        views: scans at the next meetpoint are evidence, too; None: they are not.
     """
-    dart, share = dart[:_POLLED], share[:_POLLED] / share[:_POLLED].sum()
+    most = _POLLED if views is None else _LOOKED_AT
+    dart, share = dart[:most], share[:most] / share[:most].sum()
     degree = int(matcher.atlas.degree[matcher.atlas.darts.node[dart[0]]])
     now = 1.0 - float(share.max())
     outside, length = np.zeros(degree), np.zeros(degree)
     for rank in range(degree):
         departure = matcher.departures(dart, rank)
-        alike = _alike(matcher, departure)  # the first would not rule out the second
-        left = (alike * share).max(axis=1) / np.maximum(alike @ share, 1e-300)
+        likelihood = _alike(matcher, departure).astype(float)  # (C, C) of the second if the first is true
+        if views is not None:
+            first, second = np.nonzero(likelihood)
+            likelihood[first, second] = np.exp(-views.nats(departure[first] ^ 1, departure[second] ^ 1))
+        left = (likelihood * share).max(axis=1) / (likelihood @ share)
         outside[rank] = float(share @ (1.0 - left))
         length[rank] = float(share @ matcher.length_m[departure >> 1])
     gain = (now - outside) / length

@@ -147,3 +147,15 @@ def test_without_three_landmarks_or_on_their_circle_no_position_is_expected():
     visible = np.array([[True, True, True], [True, True, False], [True, True, True]])
     sigma = bearing_errors.expected_sigma(circle, points, visible, 0.01)
     assert sigma[0] > 100.0 and sigma[1] == np.inf and sigma[2] < 0.2
+
+
+def test_a_layout_within_the_drawing_of_figure_6_gives_the_errors_of_figure_7():
+    tags_m = np.array([[-3.0, 5.0], [-1.0, 4.0], [0.0, 4.0], [2.0, 5.0]])  # found by test/benchmark/landmark_layouts.py
+    errors_m = []
+    for viewer_m in np.array([[0.0, 3.0], [-1.0, 3.0], [0.0, 2.0], [-1.0, 2.0]]):
+        around = tags_m[np.argsort(np.arctan2(*(tags_m - viewer_m).T))]  # clockwise, as the viewer sees them
+        errors_m += [
+            bearing_errors.limits_of_error(np.delete(around, left_out, axis=0), viewer_m, np.radians(1.0)).max()
+            for left_out in range(4)
+        ]
+    assert max(errors_m) == pytest.approx(0.135, abs=0.001) and len(errors_m) == 16

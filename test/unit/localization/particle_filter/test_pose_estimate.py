@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
+from scipy.sparse import csgraph
 
 from glass_nav.geometry import angles
-from glass_nav.localization.particle_filter import pose_estimate
+from glass_nav.localization.particle_filter import pose_estimate, resampling
 
 
 def cloud(rng, pose, deviation, count=2000):
@@ -49,3 +50,19 @@ def test_a_single_particle_is_the_pose():
     best = pose_estimate.of(np.array([[1.0, 2.0, 3.0]]), np.array([1.0]))
     np.testing.assert_allclose(best.map_from_base, [1.0, 2.0, 3.0])
     np.testing.assert_allclose(best.covariance, 0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_clusters_are_the_filled_bins_that_touch(seed):
+    """Against a graph of all pairs of particles."""
+    rng = np.random.default_rng(seed)
+    poses = np.column_stack([rng.uniform(-4.0, 4.0, (250, 2)), rng.uniform(-np.pi, np.pi, 250)])
+    bins = resampling.bins(poses)
+    apart = np.abs(bins[:, None] - bins)
+    apart[..., 2] = np.minimum(apart[..., 2], 36 - apart[..., 2])
+    _, label = csgraph.connected_components(apart.max(axis=-1) <= 1)
+    weights = rng.dirichlet(np.ones(len(poses)))
+    best = pose_estimate.of(poses, weights)
+    heaviest = np.argmax(np.bincount(label, weights))
+    np.testing.assert_array_equal(best.members, label == heaviest)
+    assert 1 < np.count_nonzero(best.members) < len(poses)

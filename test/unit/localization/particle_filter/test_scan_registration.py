@@ -40,7 +40,7 @@ class Robot:
             self.find(odometry_at(true), self.points(true))
 
     def points(self, true):
-        return L_ROOM.scan(true, rng=self.rng).points_in_base()
+        return L_ROOM.scan(true, rng=self.rng).points_in_base().copy()
 
     def find(self, odom_from_base, points):
         found = self.anchor.find(se2.compose(self.map_from_odom, odom_from_base), TIGHT, odom_from_base, points)
@@ -181,7 +181,7 @@ def test_a_scan_that_fits_all_along_a_corridor_contradicts_no_odometry(seed):
     for x_m in np.arange(25.0, 32.0, 0.3):
         true = np.array([x_m, 0.9, 0.0])
         prediction = true + [rng.normal(0.0, 0.3), 0.0, 0.0]
-        points = CORRIDOR.scan(true, rng=rng).points_in_base()
+        points = CORRIDOR.scan(true, rng=rng).points_in_base().copy()
         anchor.find(prediction, TIGHT, prediction, points[np.isfinite(points).all(axis=1)])
         assert not anchor.contradicts_odometry
 

@@ -294,11 +294,13 @@ def test_what_nothing_else_can_tell_apart_scans_do_and_before_the_first_edge() -
     localizer.count_visits(localizer.atlas.visits)  # no edge was driven
 
 
-def test_places_that_look_alike_stay_both() -> None:
+def test_places_that_look_alike_stay_both_and_are_proved_to() -> None:
     both = MadeScans(lambda poses: np.full(len(poses), 0.95), np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]]))
     localizer = AtlasLocalizer(twins(), SearchParams(use_edge_angles=False), both)
     told = driven_in_the_first_row(localizer, both)
-    assert all(each.state == SearchState.SEARCHING and len(each.dart) == 2 for each in told)
+    assert {each.state for each in told[:-1]} == {SearchState.SEARCHING} and {len(each.dart) for each in told} == {2}
+    assert told[-1].state == SearchState.AMBIGUOUS
+    assert told[-1].reason == "2 places match, and no turn can tell them apart"
     belief = localizer.belief
     assert belief is not None and belief.elsewhere < 0.001
     np.testing.assert_allclose(belief.share[:2], belief.share[0])

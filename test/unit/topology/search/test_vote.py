@@ -61,3 +61,15 @@ def test_many_candidates_are_polled_and_counted_as_all() -> None:
     np.testing.assert_allclose(voted.survivors, [len(darts)] * 4)
     assert not voted.splits
     assert vote.left_right_votes(matcher, darts) == (0, len(darts))
+
+
+def test_the_turn_that_leaves_the_least_doubt_per_metre_is_taken() -> None:
+    # To the left all differ after 4 m at least, to the right the third one does: what counts are the shares.
+    matcher = three_junctions((4.0, 8.0, 12.0), (5.0, 5.0, 9.0))
+    voted = vote.expected(matcher, ARRIVALS, np.array([0.5, 0.1, 0.4]))
+    np.testing.assert_allclose(voted.survivors, [0.5, 0.0, 0.6 * (1 / 6)])  # probability outside the first
+    np.testing.assert_allclose(voted.length_m[1:], [0.5 * 4 + 0.1 * 8 + 0.4 * 12, 0.6 * 5 + 0.4 * 9])
+    assert voted.rank == 1 and voted.splits
+    near = vote.expected(matcher, ARRIVALS, np.array([0.6, 0.0001, 0.3999]))
+    assert near.rank == 2  # nearly as much for a shorter way
+    assert not vote.expected(three_junctions((9.0,) * 3, (7.0,) * 3), ARRIVALS, np.ones(3)).splits

@@ -1,0 +1,59 @@
+"""Views of meetpoints that differ, in a map worked by hand (made_scans.py)."""
+
+from __future__ import annotations
+
+import made_atlases
+import numpy as np
+import pytest
+from made_scans import MadeScans
+
+from glass_nav.topology.search import ambiguity, expected_views, vote
+from glass_nav.topology.search.expected_views import ExpectedViews
+from glass_nav.topology.search.matching import Matcher, Tolerances
+
+
+def rows(east_looks_different: bool) -> "tuple[Matcher, ExpectedViews]":
+    """Two equal rows of three places, 100 m apart; seen from any place of the first row, that at x = 112 is other."""
+    xy = [(x + shift, 0.0) for shift in (0.0, 100.0) for x in (0, 6, 12)]
+    atlas = made_atlases.corridors(xy, [0.5, 1.3, 0.5] * 2, [(0, 1), (1, 2), (3, 4), (4, 5)])
+
+    def share(poses: np.ndarray) -> np.ndarray:
+        return np.where(east_looks_different & (poses[:, 0] > 110.0), 0.5, 1.0)
+
+    scans = MadeScans(share, np.zeros((0, 3)))
+    return Matcher(atlas, Tolerances(), use_angles=False), ExpectedViews(atlas, scans)
+
+
+AT_THE_MIDDLE = np.array([1, 5])  # of both rows, come from the west
+
+
+@pytest.mark.parametrize("differ", [True, False])
+def test_places_that_only_look_different_are_told_apart_by_going_there(differ: bool) -> None:
+    matcher, views = rows(differ)
+    np.testing.assert_allclose(views.nats(np.array([3]), np.array([7])), [0.5 * 40.0 * differ])  # half of 80 pieces
+    assert views.alike(np.array([3, 1]), np.array([7, 5])).tolist() == [not differ, True]
+    assert ambiguity.prove(matcher, AT_THE_MIDDLE).indistinguishable  # by the graph alone
+    proof = ambiguity.prove(matcher, AT_THE_MIDDLE, views=views)
+    assert (proof.indistinguishable, proof.ranks) == (not differ, [1] if differ else None)
+    voted = vote.expected(matcher, AT_THE_MIDDLE, np.array([0.6, 0.4]), views)
+    assert voted.splits == differ and (not differ or voted.rank == 1)
+
+
+def test_what_was_seen_once_is_expected_to_tell_nothing_more_until_another_search() -> None:
+    _, views = rows(True)
+    assert views.nats(np.array([3]), np.array([7]))[0] > 0.0
+    views.arrive(np.array([3, 7]))
+    assert views.nats(np.array([3]), np.array([7])).tolist() == [0.0]
+    views.forget()
+    assert views.nats(np.array([3]), np.array([7]))[0] > 0.0
+
+
+def test_nothing_is_proved_where_there_was_no_time_to_compare_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(expected_views, "_COMPARED", 1)
+    matcher, views = rows(False)
+    views.arrive(np.zeros(0, np.int64))
+    assert not ambiguity.prove(matcher, AT_THE_MIDDLE, views=views).indistinguishable and views.is_exhausted
+    for _ in range(20):  # the next steps go on
+        views.arrive(np.zeros(0, np.int64))
+        proved = ambiguity.prove(matcher, AT_THE_MIDDLE, views=views).indistinguishable
+    assert proved and not views.is_exhausted
