@@ -27,7 +27,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, NamedTuple
+from typing import Any, Dict, Iterator, List, NamedTuple, Sequence
 
 REPO = Path(__file__).resolve().parents[2]
 NAVIGATION = REPO / "test" / "navigation"
@@ -57,9 +57,11 @@ STACKS = {
 }
 
 
-def missing_packages() -> List[str]:
+NEEDED = ("amcl", "move_base", "navfn", "dwa_local_planner")
+
+
+def missing_packages(needed: Sequence[str] = NEEDED) -> List[str]:
     """Of those that the stacks need."""
-    needed = ("amcl", "move_base", "navfn", "dwa_local_planner")
     return [name for name in needed if subprocess.run(["rospack", "find", name], capture_output=True).returncode]
 
 

@@ -74,8 +74,8 @@ def test_a_cell_where_nothing_is_is_a_phantom(more, cell_m, phantom, outdated):
 
 
 def test_a_person_who_walked_on_explains_nothing_any_more():
-    person = Person(np.array([[0.5, 1.5], [3.5, 1.5]]), speed_m_s=1.0)
-    assert len(score(room(people=(person,)), (0.9, 1.5), time_s=2.5).phantoms) == 1
+    person = Person(np.array([[0.5, 1.5], [30.5, 1.5]]), speed_m_s=1.0)
+    assert len(score(room(people=(person,)), (0.9, 1.5), time_s=14.5).phantoms) == 1
 
 
 def test_cells_of_a_turned_costmap_are_where_they_are_in_the_map():

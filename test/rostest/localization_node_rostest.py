@@ -116,8 +116,11 @@ class LocalizationOnARealRobot(unittest.TestCase):
         for transform in sent:
             self.assertEqual((transform.header.frame_id, transform.child_frame_id), ("map", "odom"))
             stamp_ns = conversions.ns_from_stamp(transform.header.stamp)
-            scan_ns = stamp_ns - TOLERANCE_NS  # a correction follows what was sent when the scan came by 1 ns
-            self.assertTrue({scan_ns, scan_ns - 1} & set(self.scans), "map -> odom is not stamped scan + tolerance")
+            ahead_ns = stamp_ns - np.array(list(self.scans))
+            self.assertTrue(  # farther on a busy machine, see map_to_odom.py
+                np.any((ahead_ns >= TOLERANCE_NS) & (ahead_ns <= TOLERANCE_NS + 500_000_000)),
+                "map -> odom is not stamped scan + tolerance",
+            )
             self.assertTrue(np.all(np.isfinite(conversions.planar_from_transform(transform.transform))))
 
     def check_cases(self) -> None:

@@ -22,7 +22,7 @@ MARKED_M = 0.1  # a point of a pane is marked if an occupied cell is so near
 PHANTOM_M = 0.2  # an occupied cell so far from every surface shows nothing that is there
 SEEN_SLACK_M = 0.15
 STEP_M = 0.05
-WALKED_S = np.linspace(0.0, 1.0, 6)  # where people were that long ago, the costmap may show them still
+WALKED_S = np.linspace(0.0, 10.0, 51)  # what people left behind the robot was not seen since
 
 
 class Score(NamedTuple):

@@ -148,7 +148,7 @@ class LocalizationHealth:
             {
                 "digest": now.grid_map.digest,
                 "origin": f"x {x:.3f} m, y {y:.3f} m, yaw {yaw:.4f} rad",
-                "occupied": int(now.grid_map.occupied.sum()),
-                "free": int(now.grid_map.free.sum()),
+                "occupied": now.grid_map.occupied_count,
+                "free": now.grid_map.free_count,
             },
         )

@@ -70,6 +70,16 @@ class GridMap:
         """(H, W) bool: a robot may stand here."""
         return (self.occupancy >= 0) & (self.occupancy <= FREE_PERCENT)
 
+    @cached_property
+    def occupied_count(self) -> int:
+        """How many cells are occupied."""
+        return int(np.count_nonzero(self.occupied))
+
+    @cached_property
+    def free_count(self) -> int:
+        """How many cells are free."""
+        return int(np.count_nonzero(self.free))
+
     def centres(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Cell centres (..., 2) [m] in the frame map."""
         grid = np.stack([np.asarray(columns) + 0.5, np.asarray(rows) + 0.5], axis=-1) * self.resolution_m

@@ -136,3 +136,8 @@ def test_a_fingerprint_is_of_cells_and_place_and_outlives_a_message():
     ]
     assert len({each.fingerprint for each in [here, *others]}) == 6
     assert grid(cells, (-0.0, 0.0, 0.0)).fingerprint == grid(cells, (0.0, 0.0, 0.0)).fingerprint
+
+
+def test_cells_are_counted_by_what_they_are():
+    there = grid([[0, 25, 26], [64, 65, 100], [-1, -1, 0]])
+    assert (there.free_count, there.occupied_count) == (3, 2)

@@ -26,6 +26,7 @@ class DistanceField {
         max_distance_m_(max_distance_m),
         x_(map_from_grid[0]),
         y_(map_from_grid[1]),
+        yaw_(map_from_grid[2]),
         cos_(std::cos(map_from_grid[2])),
         sin_(std::sin(map_from_grid[2])),
         distance_m_(static_cast<std::size_t>(height + 2) * (width + 2)) {
@@ -37,11 +38,27 @@ class DistanceField {
     }
   }
 
-  double distance(double x_m, double y_m) const {
-    const Square at = square(x_m, y_m);
-    const double lower = at.d00 + (at.d01 - at.d00) * at.right, upper = at.d10 + (at.d11 - at.d10) * at.right;
-    return with_outside(lower + (upper - lower) * at.up, at.outside_m);
-  }
+  double distance(double x_m, double y_m) const { return distance(square(x_m, y_m)); }
+
+  /// Distances of points of a frame, as seen from the grid: one rotation for each of them.
+  class Placed {
+   public:
+    /// x, y, yaw of the frame in the map.
+    Placed(const DistanceField& field, const std::array<double, 3>& pose)
+        : field_(field),
+          column_(field.column(pose[0], pose[1])),
+          row_(field.row(pose[0], pose[1])),
+          cos_(std::cos(pose[2] - field.yaw_) / field.resolution_m_),
+          sin_(std::sin(pose[2] - field.yaw_) / field.resolution_m_) {}
+
+    double distance(double x_m, double y_m) const {
+      return field_.distance(field_.square_at(column_ + cos_ * x_m - sin_ * y_m, row_ + sin_ * x_m + cos_ * y_m));
+    }
+
+   private:
+    const DistanceField& field_;
+    double column_, row_, cos_, sin_;
+  };
 
   Slope at(double x_m, double y_m) const {
     const Square at = square(x_m, y_m);
@@ -67,10 +84,18 @@ class DistanceField {
     return outside_m > 0.0 ? std::fmin(distance_m + outside_m, max_distance_m_) : distance_m;
   }
 
-  Square square(double x_m, double y_m) const {
-    const double dx = x_m - x_, dy = y_m - y_;
-    const double column = (cos_ * dx + sin_ * dy) / resolution_m_ + 0.5;  // of the grid with its border
-    const double row = (cos_ * dy - sin_ * dx) / resolution_m_ + 0.5;
+  double distance(const Square& at) const {
+    const double lower = at.d00 + (at.d01 - at.d00) * at.right, upper = at.d10 + (at.d11 - at.d10) * at.right;
+    return with_outside(lower + (upper - lower) * at.up, at.outside_m);
+  }
+
+  // Of the grid with its border.
+  double column(double x_m, double y_m) const { return (cos_ * (x_m - x_) + sin_ * (y_m - y_)) / resolution_m_ + 0.5; }
+  double row(double x_m, double y_m) const { return (cos_ * (y_m - y_) - sin_ * (x_m - x_)) / resolution_m_ + 0.5; }
+
+  Square square(double x_m, double y_m) const { return square_at(column(x_m, y_m), row(x_m, y_m)); }
+
+  Square square_at(double column, double row) const {
     const double right = within(column, width_ + 0.999), up = within(row, height_ + 0.999);
     const int left = static_cast<int>(right), below = static_cast<int>(up);
     const float* corner = &distance_m_[static_cast<std::size_t>(below) * (width_ + 2) + left];
@@ -85,7 +110,7 @@ class DistanceField {
   }
 
   int height_, width_;
-  double resolution_m_, max_distance_m_, x_, y_, cos_, sin_;
+  double resolution_m_, max_distance_m_, x_, y_, yaw_, cos_, sin_;
   std::vector<float> distance_m_;
 };
 

@@ -13,11 +13,10 @@ LogDensity::LogDensity(double sigma_m, double z_hit, double z_rand) : per_m_(kPa
 }
 
 double log_weight_at(const DistanceField& field, const Points& points, const Pose& pose, const LogDensity& density) {
-  const double cos = std::cos(pose[2]), sin = std::sin(pose[2]);
+  const DistanceField::Placed from_pose(field, pose);
   double total = 0.0;
   for (std::size_t i = 0; i < points.count; ++i) {
-    const double x = points.xy_m[2 * i], y = points.xy_m[2 * i + 1];
-    total += density.at(field.distance(pose[0] + cos * x - sin * y, pose[1] + sin * x + cos * y));
+    total += density.at(from_pose.distance(points.xy_m[2 * i], points.xy_m[2 * i + 1]));
   }
   return total;
 }

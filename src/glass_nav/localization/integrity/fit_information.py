@@ -32,7 +32,7 @@ _MIN_DEVIATION_M = 0.002  # of walls and of their pieces
 _PRIOR_WEIGHT, _MEMORY = 10.0, 0.98  # beams that _EDGE_CELLS is worth, and weight of the past per scan
 _FITTED = 2.0  # sides whose error the fit takes up: their offset is a shift of the robot
 _PRIOR_BEAMS = 0.01  # weight of FREE_M
-_UNMAPPED_BEAMS = 4.0  # that may have ended at another thing as near as a piece of a wall errs
+_UNMAPPED_BEAMS = 1.0, 4.0  # least and most that may have ended at another thing as near as a piece of a wall errs
 _STEPS_M = np.array([0.04, 0.08, 0.13, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0])
 _STEPS_M = np.concatenate([-_STEPS_M[::-1], [0.0], _STEPS_M])
 _STEP_WIDTHS_M = np.gradient(_STEPS_M)
@@ -93,9 +93,9 @@ class ScanFit:
             left_m = np.abs(residual_m)
             left_m = left_m[left_m < _CLOSE_M]
             self._scale_m = max(self._edge_m, 1.4826 * float(np.median(left_m)) if len(left_m) else 0.0)
+        kernel_m = _KERNEL_SCALES * self._scale_m
         weight, near = (
-            (kernel**2 / (kernel**2 + residual_m**2) * steepness) ** 2
-            for kernel in (_KERNEL_SCALES * self._scale_m, max(_KERNEL_SCALES * self._scale_m, _NEAR_M))
+            (kernel**2 / (kernel**2 + residual_m**2) * steepness) ** 2 for kernel in (kernel_m, max(kernel_m, _NEAR_M))
         )
         if not matched:
             weight = near
@@ -109,7 +109,7 @@ class ScanFit:
         if matched:
             piece = np.cumsum(np.bincount(first, minlength=len(points_m))) - 1
             self._learn(weight, residual_m, piece, side[first])
-        unmapped = _UNMAPPED_BEAMS**2 * (self._variance(1) + self._variance(2))
+        unmapped = _unmapped_beams(residual_m, steepness, kernel_m) ** 2 * (self._variance(1) + self._variance(2))
         variance = ((_PRIOR_BEAMS * FREE_M) ** 2 + unmapped) * np.eye(3)
         clusters = (
             weighted.sum(axis=0)[None],
@@ -121,7 +121,7 @@ class ScanFit:
             variance += self._variance(size) * sums.T @ sums
         covariance = inverse @ variance @ inverse
         if matched:
-            covariance = self._widened(covariance, arms_m, map_from_base, lever_m, len(first))
+            covariance = self._widened(covariance, weighted.T @ jacobian, arms_m, map_from_base, lever_m, len(first))
         to_yaw = np.array([1.0, 1.0, 1.0 / lever_m])
         weighted = near[:, None] * jacobian
         offset = np.linalg.solve(weighted.T @ jacobian + _PRIOR_BEAMS * np.eye(3), weighted.T @ -residual_m) * to_yaw
@@ -165,9 +165,24 @@ class ScanFit:
             each[size] = _MEMORY * each[size] + (1.0 - _MEMORY) * value
 
     def _widened(
-        self, covariance: np.ndarray, arms_m: np.ndarray, map_from_base: np.ndarray, lever_m: float, pieces: int
+        self,
+        covariance: np.ndarray,
+        information: np.ndarray,
+        arms_m: np.ndarray,
+        map_from_base: np.ndarray,
+        lever_m: float,
+        pieces: int,
     ) -> np.ndarray:
-        """Covariance (3, 3), in metres, with what the loss along its longest axis adds."""
+        """Covariance (3, 3), in metres, with what the loss along its longest axis adds to its linearization there.
+
+        Args:
+            covariance: (3, 3) of the linearized fit.
+            information: (3, 3) of that fit, for beams of deviation 1.
+            arms_m: (B, 2) from the robot to the ends, in map's axes.
+            map_from_base: (3,) pose.
+            lever_m: a turn by 1 rad is as long as this.
+            pieces: of walls that the beams ended at.
+        """
         variances, axes = np.linalg.eigh(covariance)
         axis = axes[:, 2]
         cos, sin = angles.cos_sin(_STEPS_M[:, None] * (axis[2] / lever_m))
@@ -178,10 +193,24 @@ class ScanFit:
         )
         squared = distance_m**2
         kernel = (_KERNEL_SCALES * self._scale_m) ** 2
-        loss = (0.5 * _KERNEL_SCALES**2 * pieces / len(arms_m)) * np.sum(squared / (squared + kernel), axis=1)
-        likelihood = np.exp(-np.maximum(loss - loss[len(loss) // 2], 0.0)) * _STEP_WIDTHS_M
-        variance = float(likelihood @ _STEPS_M**2 / likelihood.sum())
-        return covariance + max(0.0, variance - variances[2]) * np.outer(axis, axis)
+        share = 0.5 * _KERNEL_SCALES**2 * pieces / len(arms_m)
+        loss = share * np.sum(squared / (squared + kernel), axis=1)
+        linearized = share * float(axis @ information @ axis) / kernel * _STEPS_M**2
+        added = _variance_of(loss) - max(_variance_of(linearized), variances[2])
+        return covariance + max(0.0, added) * np.outer(axis, axis)
+
+
+def _variance_of(loss: np.ndarray) -> float:
+    """[m2] of a step, with such negative log likelihoods of _STEPS_M."""
+    likelihood = np.exp(-np.maximum(loss - loss[len(loss) // 2], 0.0)) * _STEP_WIDTHS_M
+    return float(likelihood @ _STEPS_M**2 / likelihood.sum())
+
+
+def _unmapped_beams(residual_m: np.ndarray, steepness: np.ndarray, kernel_m: float) -> float:
+    """How many beams within the kernel (half a width of kernel_m) are not of the wall, as dense as they are just outside."""
+    beside = (np.abs(residual_m) > kernel_m) & (np.abs(residual_m) < 3.0 * kernel_m) & (steepness > 0.0)
+    least, most = _UNMAPPED_BEAMS
+    return min(max(0.5 * float(np.count_nonzero(beside)), least), most)
 
 
 def _first_of_each_piece(points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:

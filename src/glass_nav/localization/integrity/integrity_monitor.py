@@ -13,7 +13,7 @@ import numpy as np
 
 from glass_nav.geometry import angles
 from glass_nav.localization.integrity.fit_information import FitInformation, ScanFit
-from glass_nav.localization.integrity.pose_covariance import PoseCovariance, larger_of
+from glass_nav.localization.integrity.pose_covariance import PoseCovariance, widened_by
 from glass_nav.localization.particle_filter.motion import OdometryNoise
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.scan import Scan, spread_evenly
@@ -106,7 +106,7 @@ class IntegrityMonitor:
         if self._covariance is None:
             return spread
         carried = self._covariance.carried(step, noise)
-        covariance = larger_of(carried, spread)
+        covariance = widened_by(carried, spread)
         if self._now is not None:
             beside = _beside(self._now, carried)
             excess = max(0.0, 1.0 - 4.0 / max(beside**2, 1e-9))  # that is not chance

@@ -23,6 +23,7 @@ from glass_nav.localization.particle_filter.motion import OdometryNoise
 _MEMORY = 0.95  # weight of the past per update, of the scale of odometry's noise
 _MIN_SCALE = 0.01  # of the variances of the model of odometry
 _ALIKE = 1.5  # ratio of variances up to which the scan is as good as the carried pose
+_FAR = 4.0  # ratio of variances from which the spread of the particles counts
 _MAX_CORRECTION = 6.0  # deviations: a larger one is an event of its own
 
 
@@ -96,13 +97,16 @@ def better_of(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return (mixed * ratio) @ mixed.T
 
 
-def larger_of(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """(3, 3): in each direction the larger of two covariances."""
-    root = np.linalg.cholesky(first + 1e-12 * np.eye(3))
-    half = np.linalg.solve(root, second)
+def widened_by(covariance: np.ndarray, spread: np.ndarray) -> np.ndarray:
+    """(3, 3): a covariance, in directions in which a spread (3, 3) is far larger that spread.
+
+    Particles spread as their proposal does, whatever the scan determines: only far beyond, they are in doubt themselves.
+    """
+    root = np.linalg.cholesky(covariance + 1e-12 * np.eye(3))
+    half = np.linalg.solve(root, spread)
     values, axes = np.linalg.eigh(np.linalg.solve(root, half.T))
     mixed = root @ axes
-    return (mixed * np.maximum(values, 1.0)) @ mixed.T
+    return (mixed * np.maximum(values * -np.expm1(-((values / _FAR) ** 2)), 1.0)) @ mixed.T
 
 
 def _turned(yaw: float) -> np.ndarray:

@@ -39,7 +39,9 @@ class LocalizationNodeParams:
     scan_topics: Tuple[str, ...] = ()  # of several lidars; empty: scan
     tf_broadcast: bool = True
     publish_tf_before_localized: bool = True  # False: map -> odom is published once the state has been LOCALIZED
-    transform_tolerance: float = number(0.1, 0.0, 100.0)  # [s] how far ahead of the scan map -> odom is stamped
+    transform_tolerance: float = number(
+        0.1, 0.0, 100.0
+    )  # [s] how far ahead of the scan map -> odom is stamped, at least
     transform_wait_s: float = number(1.0, 0.0, 100.0)  # [s] how long a scan waits for odom <- base <- laser
     publish_wheel_tf: bool = False  # odom -> base as the wheels tell it, with wheel_topics
     use_map_topic: bool = False

@@ -87,9 +87,16 @@ def test_the_better_of_two_is_never_better_than_both_together(seed):
     better = pose_covariance.better_of(first, second)
     both = np.linalg.inv(np.linalg.inv(first) + np.linalg.inv(second))
     assert np.linalg.eigvalsh(better - both).min() > -1e-9
-    larger = pose_covariance.larger_of(first, second)
-    for each in (first, second):
-        assert np.linalg.eigvalsh(larger - each).min() > -1e-9
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_spread_of_the_particles_counts_in_directions_in_which_it_is_far_larger(seed):
+    rng = np.random.default_rng(seed)
+    first, second = random_covariance(rng), random_covariance(rng)
+    wider = pose_covariance.widened_by(first, second)
+    assert np.linalg.eigvalsh(wider - first).min() > -1e-9
+    np.testing.assert_allclose(pose_covariance.widened_by(first, 2.0 * first), first, rtol=1e-6)
+    np.testing.assert_allclose(pose_covariance.widened_by(first, 400.0 * first), 400.0 * first, rtol=1e-6)
 
 
 def test_of_two_alike_the_scan_holds():

@@ -36,6 +36,7 @@ def frame():
         np.array([1, 0, 0, 0, 3], np.uint8),
         np.array([1.01, np.nan, 0.05, np.nan, 2.49]),
         np.array([np.nan, 1.0, np.nan, np.nan, 1.25]),
+        np.array([900.0, 0.0, 0.0, 0.0, 120.0]),
     )
     reading = OdometrySample(STAMP_NS, np.array([0.5, 0.25, -0.5]), np.array([0.4, 0.1, -0.2]))
     return Frame(STAMP_NS, POSE, reading.odom_from_base, scan, truth, (reading,), False)
