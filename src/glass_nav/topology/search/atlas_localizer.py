@@ -92,7 +92,6 @@ class AtlasLocalizer:
     def begin(self) -> None:
         """What was known is forgotten; scans may come before the first meetpoint."""
         self._estimate, self._edges_before = None, 0
-        self._forest.clear()
         if self._joint is not None:
             self._joint.forget()
         if self._views is not None:
@@ -128,6 +127,8 @@ class AtlasLocalizer:
         depth = self._edges_before + max(self._forest.depth, 0) if self._estimate is not None else 0
         final = None if belief is None else self._by_both.final(belief, depth)
         if final is not None:
+            if self._estimate is None:  # no meetpoint yet: the forest is that of a search before
+                final = replace(final, dart=final.dart[:0], errors=final.errors[:0])
             self._estimate = final
         return True, final
 

@@ -118,10 +118,6 @@ class SearchForest:
         """From each depth to the next."""
         return tuple(self._traversals)
 
-    def clear(self) -> None:
-        """No search is on: the depth is -1."""
-        self._meetpoints, self._traversals, self._rows, self._errors = [], [], {}, 0
-
     def begin(self, meetpoint: Meetpoint) -> None:
         """Start over at a meetpoint."""
         self._meetpoints, self._traversals, self._rows, self._errors = [meetpoint], [], {}, 0
