@@ -3,8 +3,8 @@
 A beam is explained if it ended at one of the ranges that the five cases expect: the first surface along it, the next
 ones behind if the walls before are thin enough for glass, or the mirrored one (seed document glass_localization.txt).
 So beams that passed panes do not rule a candidate out, and a wall at any distance does not support it. A beam that
-ended in unmapped space is no evidence, unless it crossed a wall too thick for glass: the mapper was not there. Each pose may first
-slide to where the scan fits best, since it is known to about a decimetre.
+ended in unmapped space is no evidence, unless it crossed a wall too thick for glass: the mapper was not there. Each pose
+may first slide to where the scan fits best, since it is known to about a decimetre.
 """
 
 from __future__ import annotations
