@@ -18,13 +18,10 @@ def compose(a_from_b: np.ndarray, b_from_c: np.ndarray) -> np.ndarray:
     a_from_b, b_from_c = np.asarray(a_from_b, float), np.asarray(b_from_c, float)
     cos, sin = angles.cos_sin(a_from_b[..., 2])
     x, y = b_from_c[..., 0], b_from_c[..., 1]
-    return np.stack(
-        np.broadcast_arrays(
-            a_from_b[..., 0] + cos * x - sin * y,
-            a_from_b[..., 1] + sin * x + cos * y,
-            angles.wrap(a_from_b[..., 2] + b_from_c[..., 2]),
-        ),
-        axis=-1,
+    return _stacked(
+        a_from_b[..., 0] + cos * x - sin * y,
+        a_from_b[..., 1] + sin * x + cos * y,
+        angles.wrap(a_from_b[..., 2] + b_from_c[..., 2]),
     )
 
 
@@ -33,7 +30,7 @@ def inverse(a_from_b: np.ndarray) -> np.ndarray:
     a_from_b = np.asarray(a_from_b, float)
     cos, sin = angles.cos_sin(a_from_b[..., 2])
     x, y = a_from_b[..., 0], a_from_b[..., 1]
-    return np.stack([-cos * x - sin * y, sin * x - cos * y, angles.wrap(-a_from_b[..., 2])], axis=-1)
+    return _stacked(-cos * x - sin * y, sin * x - cos * y, angles.wrap(-a_from_b[..., 2]))
 
 
 def transform_points(a_from_b: np.ndarray, points_b: np.ndarray) -> np.ndarray:
@@ -41,11 +38,17 @@ def transform_points(a_from_b: np.ndarray, points_b: np.ndarray) -> np.ndarray:
     a_from_b, points_b = np.asarray(a_from_b, float), np.asarray(points_b, float)
     cos, sin = angles.cos_sin(a_from_b[..., 2])
     x, y = points_b[..., 0], points_b[..., 1]
-    return np.stack(
-        np.broadcast_arrays(a_from_b[..., 0] + cos * x - sin * y, a_from_b[..., 1] + sin * x + cos * y), axis=-1
-    )
+    return _stacked(a_from_b[..., 0] + cos * x - sin * y, a_from_b[..., 1] + sin * x + cos * y)
 
 
 def travelled(before_from_after: np.ndarray) -> Tuple[float, float]:
     """Distance [m] and turn [rad], both >= 0, of one step of odometry (3,)."""
     return float(np.hypot(*before_from_after[:2])), float(abs(angles.wrap(before_from_after[2])))
+
+
+def _stacked(*columns: np.ndarray) -> np.ndarray:
+    """Arrays that broadcast to (...), as (..., number of arrays). np.stack takes twice as long for a single pose."""
+    stacked = np.empty(np.broadcast(*columns).shape + (len(columns),))
+    for number, column in enumerate(columns):
+        stacked[..., number] = column
+    return stacked

@@ -143,7 +143,10 @@ class GlassMap:
         """
         walls, at = self._numbers(np.where(cell >= 0, self._bordered(cell), -1))
         own = np.where(walls, self._log_odds[1, at], 0.0) if len(self._wall) else np.zeros(len(cell))
+        gone = np.zeros(len(cell), bool)
         known = np.flatnonzero((own < 0.0) & np.isfinite(axis_rad))  # only few: the rest costs milliseconds
+        if not len(known):
+            return gone
         normal_rad = (axis_rad[known] - self._grid_yaw_rad)[:, None, None]
         reach = max(1, round(_OPENING_M / self._resolution_m))
         along, across = np.arange(-reach, reach + 1)[:, None], np.arange(-1, 2)  # walls of cells are staircases
@@ -159,7 +162,6 @@ class GlassMap:
         after, before = odds[:, reach + 1 :], odds[:, reach - 1 :: -1]
         opening = odds[:, reach] + sum(np.minimum(side.cumsum(axis=1).min(axis=1), 0.0) for side in (before, after))
         spread = 2.0 * sum(self._SPREAD) - self._SPREAD[0]  # so many cells learn from a beam
-        gone = np.zeros(len(cell), bool)
         gone[known] = _chance(self._prior[1] + opening / spread) < _GONE
         return gone
 

@@ -16,6 +16,7 @@ from glass_nav.localization.particle_filter import motion
 from glass_nav.localization.particle_filter.motion import OdometryNoise
 
 _MIN_DEVIATION = np.array([0.01, 0.01, np.radians(0.2)])  # of a sure pose: m, m, rad
+_AS_IT_IS = np.ones(3)  # noise
 
 
 @dataclass(frozen=True)
@@ -26,17 +27,21 @@ class DeadReckoning:
     covariance: np.ndarray  # (3, 3) over x [m], y [m], yaw [rad], in map
     distance_m: float = 0.0  # driven since the pose was sure
 
-    def carried(self, step: np.ndarray, noise: OdometryNoise) -> DeadReckoning:
-        """After a step (3,) of odometry, in the robot's frame before it.
+    def carried(self, step: np.ndarray, noise: OdometryNoise, noise_scale: np.ndarray = _AS_IT_IS) -> DeadReckoning:
+        """After a step of odometry. Its noise is per step: steps are those between two updates of the particles.
 
-        The noise of odometry is per step: steps are those between two updates of the particles.
+        Args:
+            step: (3,) in the robot's frame before it.
+            noise: of odometry.
+            noise_scale: (3,) factors of its variances along, across and of the heading.
         """
         _, _, yaw = self.map_from_base
         cos, sin = np.cos(yaw), np.sin(yaw)
         turned = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])  # robot's axes before the step, in map
         along_x, along_y, _ = turned @ step
         by_pose = np.array([[1.0, 0.0, -along_y], [0.0, 1.0, along_x], [0.0, 0.0, 1.0]])
-        grown = by_pose @ self.covariance @ by_pose.T + turned @ motion.covariance(step, noise) @ turned.T
+        added = motion.covariance(step, noise) * np.sqrt(np.outer(noise_scale, noise_scale))
+        grown = by_pose @ self.covariance @ by_pose.T + turned @ added @ turned.T
         distance_m, _ = se2.travelled(step)
         return DeadReckoning(se2.compose(self.map_from_base, step), grown, self.distance_m + distance_m)
 

@@ -66,12 +66,7 @@ class PoseCovariance:
         """(3, 3) after a step (3,) of odometry since the last update, in the robot's frame then."""
         if step is None or self._last is None:
             return self._at_update
-        before = DeadReckoning(self._last, np.zeros((3, 3)))
-        moved = DeadReckoning(self._last, self._at_update).carried(step, noise).covariance
-        by_odometry = before.carried(step, noise).covariance
-        turned = _turned(self._last[2])
-        scale = turned @ np.diag(np.sqrt(self._noise_scale)) @ turned.T
-        return moved - by_odometry + scale @ by_odometry @ scale.T
+        return DeadReckoning(self._last, self._at_update).carried(step, noise, self._noise_scale).covariance
 
     def _learn(self, step: np.ndarray, map_from_base: np.ndarray, noise: OdometryNoise) -> None:
         """How large this correction is in the model of odometry."""
