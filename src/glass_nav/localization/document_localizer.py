@@ -56,6 +56,7 @@ class DocumentLocalizer:
 
     def set_map(self, grid_map: GridMap) -> None:
         """Another map; the particles stay where they are."""
+        self._resolution_m = grid_map.resolution_m
         self._classifier = BeamClassifier(self._params.classifier, grid_map)
         self._schedule.request()
 
@@ -186,7 +187,7 @@ class DocumentLocalizer:
             updated,
             judgement.confidence,
             judgement.places,
-            protection_level.of(map_from_base, best.covariance),
+            protection_level.of(map_from_base, best.covariance, self._resolution_m),
         )
 
 

@@ -366,7 +366,7 @@ class Localizer:
             updated,
             judgement.confidence,
             judgement.places,
-            protection_level.of(map_from_base, covariance),
+            protection_level.of(map_from_base, covariance, self._grid_map.resolution_m),
         )
 
     def _look_for_panes(self, scan: Scan, estimate: Estimate) -> None:

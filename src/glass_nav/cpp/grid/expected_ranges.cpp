@@ -281,18 +281,19 @@ class ExpectedRanges {
     const double into = first.projection(straight);
     const Ray mirrored{straight.x, straight.y, straight.dx - 2.0 * into * first.nx,
                        straight.dy - 2.0 * into * first.ny};
+    const double first_axis = axis_rad(first);
     out_.incidence_rad[beam] = first.straight ? std::acos(std::min(out_.cos[index(kFirst, 0, beam)], 1.0)) : kNaN;
     for (std::size_t path = 0; path < kPathCount; ++path) {
       const std::size_t from = index(path, 0, beam), to = path * beams_ + beam;
       const std::int32_t cell = out_.cell[from];
       const WallLine& line = seen_.at[path][beam].line;
-      const double range = seen_.at[path][beam].range, axis = axis_rad(line);
+      const double range = seen_.at[path][beam].range, axis = path == kFirst ? first_axis : axis_rad(line);
       out_.seen_side[to] = cell < 0 || is_seen_side(cell, line, path == kMirrored ? mirrored : straight);
       if (path == kMirrored) {
         const double mirror_cos = out_.cos[index(kFirst, 0, beam)];
         const double line_m = range + kFace / std::max(out_.cos[from], kMinCos) + 2.0 * kFace * mirror_cos;
         out_.line_m[to] = line_m * cell_m;
-        out_.axis_rad[to] = 2.0 * axis_rad(first) + kPi - axis;
+        out_.axis_rad[to] = 2.0 * first_axis + kPi - axis;
       } else {
         out_.line_m[to] = range_by_line(line, straight, range) * cell_m;
         out_.axis_rad[to] = axis;

@@ -29,7 +29,8 @@ class FirstHits {
 
   /// @param t_max  t_max(beam): how far to follow a ray
   /// @param rays   next() and at_new_origin(), see RayStream
-  /// @param found  found(i, t, cell): once for every i < count, in any order; cell -1: nothing up to t_max
+  /// @param found  found(i, t, cell, search): once for every i < count, in any order; cell -1: nothing up to t_max;
+  ///               search(): the Search with which to go on from a cell
   template <class Reach, class Rays, class Found>
   void along_all(std::size_t count, const Reach& t_max, Rays& rays, const Found& found) const {
     std::array<Lane, kLanes> lanes;  // several rays at a time, for the reasons of ExactRayMarcher
@@ -60,7 +61,8 @@ class FirstHits {
         if (step == Step::doubt) {
           doubtful.push_back({lane.ray, lane.t_max, lane.index});
         } else {
-          found(lane.index, lane.t, step == Step::hit ? static_cast<std::int32_t>(lane.cell) : -1);
+          const std::int32_t met = step == Step::hit ? static_cast<std::int32_t>(lane.cell) : -1;
+          found(lane.index, lane.t, met, [&] { return search_from(lane); });
         }
         if (!fill(lane)) lane = lanes[--busy];  // it is processed in the next round
       }
@@ -174,20 +176,53 @@ class FirstHits {
     return Step::on;
   }
 
+  Search search_from(const Lane& lane) const {
+    GridWalk walk(lane.ray, cells_.width, cells_.height, lane.t_max);
+    walk.skip_to(static_cast<int>(lane.x.cell), static_cast<int>(lane.y.cell), lane.t);
+    return {lane.ray, walk};
+  }
+
   /// Casts the rays that are not plain, from their origins on.
   template <class Found>
   void decide(const std::vector<Doubtful>& doubtful, const Found& found) const {
     const auto start = [&](std::size_t j) {
       return Search{doubtful[j].ray, GridWalk(doubtful[j].ray, cells_.width, cells_.height, doubtful[j].t_max)};
     };
-    marcher_.march_all(
-        doubtful.size(), start, NothingIgnored{},
-        [&](std::size_t j, const GridWalk& walk, std::int32_t met) { found(doubtful[j].index, walk.t(), met); });
+    marcher_.march_all(doubtful.size(), start, NothingIgnored{},
+                       [&](std::size_t j, const GridWalk& walk, std::int32_t met) {
+                         found(doubtful[j].index, walk.t(), met, [&] { return Search{doubtful[j].ray, walk}; });
+                       });
   }
 
   GridCells cells_;
   ExactRayMarcher marcher_;
   bool small_;
+};
+
+/// The first hits that a ray marcher finds, one like the other.
+template <class RayMarcher>
+class MarchedFirstHits {
+ public:
+  MarchedFirstHits(const GridCells& cells, const RayMarcher& marcher) : cells_(cells), marcher_(marcher) {}
+
+  /// As FirstHits::along_all.
+  template <class Reach, class Rays, class Found>
+  void along_all(std::size_t count, const Reach& t_max, Rays& rays, const Found& found) const {
+    std::vector<Ray> started;
+    started.reserve(count);
+    const auto start = [&](std::size_t) {
+      const double reach = t_max(rays.beam());
+      started.push_back(rays.next());
+      return Search{started.back(), GridWalk(started.back(), cells_.width, cells_.height, reach)};
+    };
+    marcher_.march_all(count, start, NothingIgnored{}, [&](std::size_t i, const GridWalk& walk, std::int32_t met) {
+      found(i, walk.t(), met, [&] { return Search{started[i], walk}; });
+    });
+  }
+
+ private:
+  GridCells cells_;
+  const RayMarcher& marcher_;
 };
 
 }  // namespace glass_nav

@@ -95,9 +95,10 @@ template <class Use>
 void GridRaycaster::with_ray_marcher(const Use& use) const {
   const GridCells grid = cells();
   if (guide_ == nullptr) {
-    use(grid, ExactRayMarcher(grid));
+    use(grid, FirstHits(grid), ExactRayMarcher(grid));
   } else {
-    use(grid, GuidedRayMarcher(grid, *guide_));
+    const GuidedRayMarcher marcher(grid, *guide_);
+    use(grid, MarchedFirstHits(grid, marcher), marcher);
   }
 }
 
@@ -112,28 +113,13 @@ void GridRaycaster::cast_first(const RayBatch& batch, const double* reach_m, dou
 
 template <class Reach>
 void GridRaycaster::find_first(const RayBatch& batch, const Reach& t_max, double* range_m, std::int32_t* cell) const {
-  const GridCells grid = cells();
-  const auto store = [&](std::size_t i, double t, std::int32_t met) {
-    range_m[i] = met < 0 ? kInfinity : t * resolution_m_;
-    if (cell != nullptr) cell[i] = met;
-  };
-  if (guide_ == nullptr) {
-    const FirstHits first_hits(grid);
+  with_ray_marcher([&](const GridCells&, const auto& first_hits, const auto&) {
     for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
-      first_hits.along_all(count, t_max, rays,
-                           [&](std::size_t i, double t, std::int32_t met) { store(first + i, t, met); });
+      first_hits.along_all(count, t_max, rays, [&](std::size_t i, double t, std::int32_t met, const auto&) {
+        range_m[first + i] = met < 0 ? kInfinity : t * resolution_m_;
+        if (cell != nullptr) cell[first + i] = met;
+      });
     });
-    return;
-  }
-  const GuidedRayMarcher marcher(grid, *guide_);
-  for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
-    const auto start = [&](std::size_t) {
-      const double reach = t_max(rays.beam());
-      const Ray ray = rays.next();
-      return Search{ray, GridWalk(ray, grid.width, grid.height, reach)};
-    };
-    marcher.march_all(count, start, NothingIgnored{},
-                      [&](std::size_t i, const GridWalk& walk, std::int32_t met) { store(first + i, walk.t(), met); });
   });
 }
 
@@ -143,8 +129,8 @@ void GridRaycaster::find_surfaces(const RayBatch& batch, const SurfaceLimits& li
   const SurfaceRules rules{limits.max_thickness_m / resolution_m_, limits.min_linearity,
                            limits.min_gap_m / resolution_m_};
   const WallNormals& wall_normals = normals();  // before the threads start
-  with_ray_marcher([&](const GridCells& grid, const auto& marcher) {
-    const SurfaceFinder finder(grid, marcher, wall_normals, rules);
+  with_ray_marcher([&](const GridCells& grid, const auto& first_hits, const auto& marcher) {
+    const SurfaceFinder finder(grid, first_hits, marcher, wall_normals, rules);
     for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
       constexpr std::size_t kTogether = 512;  // their state fits the level 2 cache
       for (std::size_t done = 0; done < count; done += kTogether) {

@@ -90,7 +90,7 @@ class GridRaycaster {
  private:
   GridCells cells() const;
   template <class Use>
-  void with_ray_marcher(const Use& use) const;  // use(GridCells, marcher)
+  void with_ray_marcher(const Use& use) const;  // use(GridCells, first hits, marcher)
   template <class Reach>
   void find_first(const RayBatch& batch, const Reach& t_max, double* range_m, std::int32_t* cell) const;
   template <class Reach, class Store>

@@ -68,6 +68,15 @@ class GridWalk {
     off_boundary_ = std::min(off_x, off_y);
   }
 
+  /// Goes to a cell ahead that the ray is known to enter at t, far from any corner.
+  /// @param x, y  of the cell, mirrored as the axes are
+  void skip_to(int x, int y, double t) {
+    x_axis_.cell = x;
+    y_axis_.cell = y;
+    t_ = t;
+    off_boundary_ = 1.0;
+  }
+
   /// False if the ray certainly did not enter the present cell at a corner.
   bool near_corner() const { return off_boundary_ <= kCorner; }
 

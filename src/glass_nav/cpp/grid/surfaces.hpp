@@ -41,33 +41,46 @@ struct Incidences {
 };
 
 /// Looks along rays and through what they meet.
-template <class RayMarcher>
+template <class FirstHits, class RayMarcher>
 class SurfaceFinder {
  public:
-  SurfaceFinder(const GridCells& cells, const RayMarcher& marcher, const WallNormals& normals,
-                const SurfaceRules& rules)
-      : cells_(cells), marcher_(marcher), normals_(normals), rules_(rules) {}
+  /// @param first_hits  finds the first surfaces
+  /// @param marcher     finds those behind and beside them
+  SurfaceFinder(const GridCells& cells, const FirstHits& first_hits, const RayMarcher& marcher,
+                const WallNormals& normals, const SurfaceRules& rules)
+      : cells_(cells), first_hits_(first_hits), marcher_(marcher), normals_(normals), rules_(rules) {}
 
-  /// Follows `count` rays of the stream `rays`, each up to t_max(beam); found(i, Surfaces, Ray) for each. All rays go
-  /// from surface to surface together, since the marcher is fastest with many.
+  /// Follows `count` rays of the stream `rays`, each up to t_max(beam); found(i, Surfaces, Ray) for each, in any order
+  /// and without the ray where it meets nothing. All rays go from surface to surface together, since the marcher is
+  /// fastest with many.
   template <class Rays, class Reach, class Found>
   void along_all(std::size_t count, const Reach& t_max, Rays& rays, const Found& found) const {
+    std::vector<std::size_t> meeting;  // the rays that meet something, whose searches and surfaces follow
     std::vector<Search> searches;
-    std::vector<Surfaces> surfaces(count);
-    std::vector<std::size_t> going(count);  // rays that are not at their end
+    std::vector<Surfaces> surfaces;
+    std::vector<std::size_t> going;  // those of them that are not at their end
+    meeting.reserve(count);
+    going.reserve(count);
     searches.reserve(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      const double reach = t_max(rays.beam());
-      const Ray ray = rays.next();
-      searches.push_back({ray, GridWalk(ray, cells_.width, cells_.height, reach)});
-      going[i] = i;
-    }
-    for (std::size_t k = 0; k < 3 && !going.empty(); ++k) {
+    surfaces.reserve(count);
+    first_hits_.along_all(count, t_max, rays, [&](std::size_t i, double t, std::int32_t met, const auto& search) {
+      if (met < 0) {
+        found(i, Surfaces{}, Ray{});
+        return;
+      }
+      going.push_back(meeting.size());
+      meeting.push_back(i);
+      searches.push_back(search());
+      surfaces.emplace_back();
+      surfaces.back().cell[0] = met;
+      surfaces.back().range[0] = t;
+    });
+    mirror(going, searches, surfaces);
+    for (std::size_t k = 1; k < 3 && !going.empty(); ++k) {
+      pass_surface(k - 1, going, searches, surfaces);
       seek_surface(k, going, searches, surfaces);
-      if (k == 0) mirror(going, searches, surfaces);
-      if (k < 2) pass_surface(k, going, searches, surfaces);  // nothing behind the third is needed
     }
-    for (std::size_t i = 0; i < count; ++i) found(i, surfaces[i], searches[i].ray);
+    for (std::size_t j = 0; j < meeting.size(); ++j) found(meeting[j], surfaces[j], searches[j].ray);
   }
 
   /// The incidence at the end of the ray and of its mirrored path.
@@ -101,23 +114,19 @@ class SurfaceFinder {
     int rows_to(std::int32_t other) const { return other / width - cell / width; }
   };
 
-  /// Sends the rays on to their surface number k; `going` keeps those that meet one.
+  /// Sends the rays on to their surface number k > 0; `going` keeps those that meet one.
   void seek_surface(std::size_t k, std::vector<std::size_t>& going, std::vector<Search>& searches,
                     std::vector<Surfaces>& surfaces) const {
-    const auto search = [&](std::size_t j) -> const Search& { return searches[going[j]]; };
-    const auto found = [&](std::size_t j, const GridWalk& walk, std::int32_t met) {
-      searches[going[j]].walk = walk;
-      surfaces[going[j]].cell[k] = met;
-      if (met >= 0) surfaces[going[j]].range[k] = walk.t();
-    };
-    if (k == 0) {
-      marcher_.march_all(going.size(), search, NothingIgnored{}, found);
-    } else {
-      std::vector<WallLine> passed;  // a flat ray would meet the posts and steps of the wall it has passed again
-      for (const std::size_t i : going) passed.push_back(wall_line(surfaces[i].cell[k - 1]));
-      const auto on_passed = [&](std::size_t j, std::int32_t cell) { return passed[j].has(cell); };
-      marcher_.march_all(going.size(), search, on_passed, found);
-    }
+    std::vector<WallLine> passed;  // a flat ray would meet the posts and steps of the wall it has passed again
+    for (const std::size_t i : going) passed.push_back(wall_line(surfaces[i].cell[k - 1]));
+    marcher_.march_all(
+        going.size(), [&](std::size_t j) -> const Search& { return searches[going[j]]; },
+        [&](std::size_t j, std::int32_t cell) { return passed[j].has(cell); },
+        [&](std::size_t j, const GridWalk& walk, std::int32_t met) {
+          searches[going[j]].walk = walk;
+          surfaces[going[j]].cell[k] = met;
+          if (met >= 0) surfaces[going[j]].range[k] = walk.t();
+        });
     const auto ended = [&](std::size_t i) { return surfaces[i].cell[k] < 0; };
     going.erase(std::remove_if(going.begin(), going.end(), ended), going.end());
   }
@@ -217,6 +226,7 @@ class SurfaceFinder {
   }
 
   const GridCells& cells_;
+  const FirstHits& first_hits_;
   const RayMarcher& marcher_;
   const WallNormals& normals_;
   SurfaceRules rules_;

@@ -4,7 +4,8 @@ The term is that of satellite navigation (RTCA DO-229): the error exceeds its pr
 risk. An error above the level of a pose that is reported as LOCALIZED is misleading information.
 
 Errors of scan registration have heavier tails than a normal distribution, so the multiples of the standard deviation
-are those of Student's t. Its body is scaled to the same variance.
+are those of Student's t. Its body is scaled to the same variance. A grid map says where a wall is to half a cell, and all
+walls of one direction may be drawn off to the same side: the level of 99.9 % is at least that, however many beams agree.
 """
 
 from __future__ import annotations
@@ -37,10 +38,11 @@ class ProtectionLevels:
 UNKNOWN = ProtectionLevels(np.full(3, np.nan), np.full(3, np.nan))
 
 
-def of(map_from_base: np.ndarray, covariance: np.ndarray) -> ProtectionLevels:
-    """Levels of a pose (3,) in map with a covariance (3, 3) over x [m], y [m], yaw [rad] in map."""
+def of(map_from_base: np.ndarray, covariance: np.ndarray, resolution_m: float) -> ProtectionLevels:
+    """Levels of a pose (3,) in a map of cells so wide, with a covariance (3, 3) over x [m], y [m], yaw [rad] in map."""
     cos, sin = np.cos(map_from_base[2]), np.sin(map_from_base[2])
     axes = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
     deviations = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", axes, covariance, axes), 0.0))
     p95, p999 = np.minimum(_MULTIPLES[:, None] * deviations, [np.inf, np.inf, np.pi])
+    p999[:2] = np.maximum(p999[:2], 0.5 * resolution_m)
     return ProtectionLevels(p95, p999)

@@ -24,7 +24,7 @@ import itertools
 import threading
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any, Callable, Iterator, List, Optional, Tuple
+from typing import Any, Callable, Dict, Iterator, List, Optional, Tuple
 
 import actionlib
 import numpy as np
@@ -51,7 +51,7 @@ from glass_nav.ros import action_status, command_line, conversions, legend, mail
 from glass_nav.ros.log_throttle import LogThrottle
 from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
-from glass_nav.ros.topology import topology_displays, topology_messages
+from glass_nav.ros.topology import topology_displays, topology_messages, topology_params
 from glass_nav.ros.topology.scan_memory import ScanMemory
 from glass_nav.ros.topology.topology_params import TopologyParams
 from glass_nav.topology import observations, search_session
@@ -320,8 +320,11 @@ def main() -> None:
     """Start the node; exit code 2 if a parameter cannot be used, 3 if the atlas cannot, see ~end_without_atlas too."""
     if command_line.answers_help(__doc__):
         return
-    shutdown.run_node(
-        "topology",
-        lambda given: TopologyNode(params.load(TopologyParams, given, rospy.get_name())),
-        (AtlasError, OSError),
-    )
+    shutdown.run_node("topology", _node, (AtlasError, OSError))
+
+
+def _node(given: Dict[str, Any]) -> TopologyNode:
+    kept, gone = topology_params.without_gone(given)
+    for line in gone:
+        rospy.logwarn(line)
+    return TopologyNode(params.load(TopologyParams, kept, rospy.get_name()))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any, Dict, List, Mapping, Tuple
 
 from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.topology.search_session import SessionParams
@@ -37,3 +38,16 @@ class TopologyParams:
     node: TopologyNodeParams = field(default_factory=TopologyNodeParams)
     session: SessionParams = field(default_factory=SessionParams)
     search: SearchParams = field(default_factory=SearchParams)
+
+
+_GONE = {  # parameters of earlier versions -> what does their work
+    "searches": "the belief decides when a robot is LOST",
+    "follow_places": "the belief follows every place that is possible",
+    "follow_lead": "~risk says when a place is confirmed",
+}
+
+
+def without_gone(given: Mapping[str, Any]) -> Tuple[Dict[str, Any], List[str]]:
+    """The parameters without those that only earlier versions had, and a line on each of these."""
+    kept = {name: value for name, value in given.items() if name not in _GONE}
+    return kept, [f"~{name} is ignored: it is gone, {_GONE[name]}" for name in given if name in _GONE]
