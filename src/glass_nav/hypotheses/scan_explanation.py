@@ -3,8 +3,9 @@
 A beam is explained if it ended at one of the ranges that the five cases expect: the first surface along it, the next
 ones behind if the walls before are thin enough for glass, or the mirrored one (seed document glass_localization.txt).
 So beams that passed panes do not rule a candidate out, and a wall at any distance does not support it. A beam that
-ended in unmapped space is no evidence, unless it crossed a wall too thick for glass: the mapper was not there. Each pose
-may first slide to where the scan fits best, since it is known to about a decimetre.
+ended in unmapped space is no evidence, unless it crossed a wall too thick for glass: the mapper was not there. Nor did
+he see the back of a wall, so a beam that comes to it from there may end before the face that is drawn. Each pose may
+first slide to where the scan fits best, since it is known to about a decimetre.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from glass_nav.world.grid_map import GridMap
 _BEAMS = 120  # of a scan that are used
 _NEAR_CELLS = 3.0  # a beam that ends this close to an expected range is explained
 _MAX_THICK_M = 0.3  # a thicker wall is no glass
+_BACK_M = 0.5  # from the back of a wall, which was not seen, to the face that was
 _SLIDES_M, _SLIDES_RAD = 0.5, np.radians(15.0)  # a pose that would slide further stays where it was given
 _AT_ONCE = 64  # poses
 _MIN_BEAMS = 10
@@ -140,7 +142,12 @@ class ScanExplanation:
         offered = np.stack([hits.first_m, hits.second_m, hits.third_m, hits.mirrored_m])  # (4, P, B)
         explained = (np.abs(offered - measured) <= self._near_m).any(axis=0)
         stopped = (hits.first_m < measured) & (hits.first_thickness_m > _MAX_THICK_M)  # it went through no glass
-        return explained, explained | stopped | self._known_area.ends(points_m, poses)
+        ends = se2.transform_points(poses[:, None], points_m)
+        ahead_m = offered[:3] - measured
+        near = np.abs(ahead_m) < _BACK_M
+        back = (near & (ahead_m > 0.0)).any(axis=0) & ~(near & (ahead_m <= 0.0)).any(axis=0)
+        back &= self._known_area.is_unmapped(ends)
+        return explained, explained | stopped | (self._known_area.contains(ends) & ~back)
 
 
 def _used_beams(scan: Scan) -> Optional[np.ndarray]:

@@ -144,3 +144,16 @@ def test_a_scan_in_which_hardly_a_beam_came_back_proposes_nothing_and_moves_noth
     assert explanation.search(nothing, np.zeros(3)) is None
     assert explanation.beams(nothing, PLACES, 0.5, 0.5) is None
     np.testing.assert_array_equal(explanation.fitted(nothing, PLACES, 0.5, 0.5)[0], PLACES)
+
+
+def test_a_beam_that_ends_at_the_back_of_a_wall_is_no_evidence_and_one_that_ends_behind_a_wall_is():
+    """Two rooms, and between them a yard that the mapper did not see: of each wall the map has the face in the room."""
+    occupancy = np.full((80, 240), UNKNOWN, np.int8)  # 4 m by 12 m
+    occupancy[:, :80] = occupancy[:, 160:] = 0
+    occupancy[:, [80, 160]] = 100  # at x = 4 m and 8 m
+    explanation = ScanExplanation(GridMap(occupancy, 0.05, np.zeros(3)))
+    angles_rad = np.linspace(-0.1, 0.1, 20)
+    for end_m, explained, known in ((8.0, True, True), (7.7, False, False), (4.4, False, True), (6.0, False, False)):
+        scan = Scan(0, (end_m - 2.0) / np.cos(angles_rad), angles_rad, 0.1, 25.0, np.zeros(3))
+        beams = explanation.beams(scan, np.array([[2.0, 2.0, 0.0]]), 0.0, 0.0)  # slides nowhere
+        assert (beams.explained == explained).all() and (beams.known == known).all(), end_m
