@@ -49,6 +49,19 @@ def test_the_pose_is_the_one_that_odometry_leads_to():
     assert reckoned.distance_m == pytest.approx(np.hypot(0.3, 0.1) + 0.2)
 
 
+def test_a_scale_of_the_noise_is_that_of_its_variances_along_and_across_the_robot():
+    start, step = DeadReckoning(np.array([1.0, 2.0, 0.7]), np.zeros((3, 3))), np.array([0.5, 0.1, 0.3])
+    scale = np.array([4.0, 0.25, 9.0])
+    cos, sin = np.cos(0.7), np.sin(0.7)
+    along_across = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    plain, scaled = (
+        along_across @ start.carried(step, OdometryNoise(), factors).covariance @ along_across.T
+        for factors in (np.ones(3), scale)
+    )
+    np.testing.assert_allclose(np.diag(scaled), scale * np.diag(plain))
+    np.testing.assert_allclose(correlation(scaled), correlation(plain))
+
+
 def test_a_look_alike_60_m_away_is_out_of_the_question_after_60_m():
     reckoned = driven(DeadReckoning(np.zeros(3), SURE), [(0.1, 0.0, 0.0)] * 600, OdometryNoise())
     here, twin = reckoned.map_from_base, reckoned.map_from_base - [60.0, 0.0, 0.0]
