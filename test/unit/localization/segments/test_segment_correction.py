@@ -116,7 +116,7 @@ def test_in_a_room_the_document_finds_it_too_with_more_steps(room_walls):
 
 def test_people_in_a_room_do_not_pull(room_walls):
     true = np.array([2.3, 1.7, 1.0])
-    points = L_ROOM.scan(true, rng=np.random.default_rng(0)).points_in_base()
+    points = L_ROOM.scan(true, rng=np.random.default_rng(0)).points_in_base().copy()
     points[20:50] *= 0.55  # a sixth of the beams end at somebody
     corrector = SegmentCorrector(room_walls)
     for start in starts(true, 5, 1, 0.3, np.radians(5.0)):
