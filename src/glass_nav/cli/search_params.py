@@ -16,6 +16,7 @@ from glass_nav.topology.search_session import SessionParams
 NODE_ONLY = frozenset(
     [
         "atlas",
+        "base_frame_id",
         "global_frame_id",
         "odom_frame_id",
         "initial_pose_sigma_m",

@@ -268,7 +268,7 @@ class PoseBelief:
             self._append(now, evidence, share)
             self._keep_distinct()
             return
-        worth = np.flatnonzero(share >= max(_CHANCE - _AS_GOOD, np.nanmax(share, initial=0.0) - _AS_GOOD))
+        worth = np.flatnonzero(share >= max(_CHANCE - _AS_GOOD, np.fmax.reduce(share, initial=0.0) - _AS_GOOD))
         self.propose(now[worth])
         self._keep_distinct()
 

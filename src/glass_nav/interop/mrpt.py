@@ -38,7 +38,7 @@ def grid_to_mrpt(grid_map: GridMap) -> Any:
     Raises:
         ValueError: the map is turned, which MRPT's cannot be.
     """
-    x, y, yaw = grid_map.map_from_grid
+    x, y, yaw = (float(value) for value in grid_map.map_from_grid)
     if yaw != 0.0:
         raise ValueError(f"a map of MRPT cannot be turned, got an origin with yaw {yaw:g} rad")
     rows, columns = grid_map.occupancy.shape

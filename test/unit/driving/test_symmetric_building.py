@@ -75,8 +75,7 @@ def test_a_robot_in_a_cross_of_four_equal_arms_is_ambiguous_and_lists_the_four_p
     atlas, _ = atlas_builder.build(grid_map, "cross", "cross")
     simulation = Simulation(building, lidar.preset("sensitive"), seed=3)
     driver, limits = EdgeDriver(), BaseLimits()
-    explanation = ScanExplanation(grid_map)
-    localizer = AtlasLocalizer(atlas, SearchParams(), explanation.shares, explanation)
+    localizer = AtlasLocalizer(atlas, SearchParams(), ScanExplanation(grid_map))
     rank: Optional[int] = None
     for _ in range(20):
         task = EdgeTask(driver, RecoveryParams(), limits, rank)
@@ -93,8 +92,8 @@ def test_a_robot_in_a_cross_of_four_equal_arms_is_ambiguous_and_lists_the_four_p
         rank = estimate.choice.rank
     assert estimate.state == SearchState.AMBIGUOUS, estimate.reason
     assert "4 places match, and no turn can tell them apart" in estimate.reason
-    standing = localizer.standing
-    assert standing is not None and standing.places >= 4 and standing.lead < 0.05  # nor do the scans
+    belief = localizer.belief
+    assert belief is not None and belief.share[3] > 0.05, belief  # nor do the scans
     poses = localizer.map_from_base(estimate.dart)
     off = np.hypot(*(poses[:, :2] - simulation.map_from_base[:2]).T)
     turned = np.sort(np.mod(poses[:, 2] - poses[off.argmin(), 2] + 0.1, 2.0 * np.pi) - 0.1)

@@ -122,12 +122,16 @@ class Publishers:
         return round(self._p.transform_tolerance * 1e9)
 
     def _send(self, transform: Optional[StampedTransform]) -> None:
-        if transform is not None and not rospy.is_shutdown():
-            self._broadcaster.sendTransform(
-                conversions.transform_stamped(
-                    transform.stamp_ns, self._frame, self._p.odom_frame_id, transform.map_from_odom
-                )
-            )
+        if transform is None:
+            return
+        message = conversions.transform_stamped(
+            transform.stamp_ns, self._frame, self._p.odom_frame_id, transform.map_from_odom
+        )
+        try:
+            self._broadcaster.sendTransform(message)
+        except rospy.ROSException:
+            if not rospy.is_shutdown():  # else the topic was closed while a scan arrived
+                raise
 
     def send_trouble(self, estimate: Optional[Estimate], state: LocalizationState, trouble: str) -> None:
         """~status, and its text in rviz, while no scan is being used.
