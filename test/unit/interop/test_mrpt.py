@@ -71,10 +71,9 @@ STAND_IN = SimpleNamespace(
 )
 
 
-def stand_in(monkeypatch, found=True):
+def stand_in(monkeypatch):
     package, module = ModuleType("mrpt"), ModuleType("mrpt.pymrpt")
-    if found:
-        module.mrpt = STAND_IN
+    module.mrpt = STAND_IN
     monkeypatch.setitem(sys.modules, "mrpt", package)
     monkeypatch.setitem(sys.modules, "mrpt.pymrpt", module)
 
@@ -133,7 +132,7 @@ def test_a_pose_comes_back(bindings):
 
 
 def test_who_lacks_the_bindings_is_told_what_to_install(monkeypatch):
-    stand_in(monkeypatch, found=False)
+    monkeypatch.setitem(sys.modules, "mrpt.pymrpt", None)  # as if it could not be found
     with pytest.raises(ImportError, match=r"apt install python3-pymrpt \(Debian 13\) or ros-noetic-python-mrpt"):
         interop.bindings()
 
