@@ -65,7 +65,6 @@ class WiredRobot:
             decisions.Command: self._hear_command,
             decisions.TraversalReport: self._hear_traversal,
             decisions.MeetpointReport: self._hear_meetpoint,
-            decisions.SearchRestart: lambda _: self.restart_search(),
             decisions.DriveStatus: self._hear_driver,
             decisions.GoalEnd: self.ends.append,
             search_session.SearchStatus: self._hear_search,

@@ -31,7 +31,7 @@ class Command:
 
 @dataclass(frozen=True)
 class TraversalReport:
-    """The edge by which the robot came to a meetpoint; the report of that follows."""
+    """The edge by which the robot came to a meetpoint, or that it came along none; the report of that follows."""
 
     arrival: Arrival  # its traversal is not None
 
@@ -75,9 +75,4 @@ class GoalEnd:
     stamp_ns: int = 0  # of the odometry then
 
 
-@dataclass(frozen=True)
-class SearchRestart:
-    """The search is to begin anew: it cannot follow the robot to where it stands."""
-
-
-Decision = Union[Command, TraversalReport, MeetpointReport, DriveStatus, Feedback, GoalEnd, SearchRestart, LogLine]
+Decision = Union[Command, TraversalReport, MeetpointReport, DriveStatus, Feedback, GoalEnd, LogLine]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import logging
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import List, Optional
 
 import numpy as np
@@ -23,7 +23,6 @@ from glass_nav.driving.decisions import (
     Feedback,
     GoalEnd,
     MeetpointReport,
-    SearchRestart,
     TraversalReport,
 )
 from glass_nav.driving.driver_params import DriveParams
@@ -38,6 +37,7 @@ from glass_nav.health import Health, Level
 from glass_nav.log_line import LogLine
 from glass_nav.sensing.scan import Scan
 from glass_nav.topology.atlas.atlas import Atlas
+from glass_nav.topology.observations import NOT_FOLLOWED
 from glass_nav.vocabulary import SEARCH_IS_OVER, DriverPhase, LocalizationState, Outcome, SearchState
 from glass_nav.world.grid_map import GridMap
 
@@ -408,11 +408,8 @@ class Driver:
         if arrival.traversal is not None:
             self._decisions.append(TraversalReport(arrival))
         elif self._search_is(*IN_SEARCH):
-            self._log(
-                "the search cannot follow the robot to this meetpoint: it is asked to begin anew", logging.WARNING
-            )
-            self._decisions.append(SearchRestart())
-            return  # it will wait for a meetpoint then
+            self._log("it came to this meetpoint along no edge: the search goes on by dead reckoning", logging.WARNING)
+            self._decisions.append(TraversalReport(replace(arrival, traversal=NOT_FOLLOWED)))
         self._report(arrival)
 
     def _report(self, arrival: Arrival) -> None:

@@ -11,8 +11,6 @@ Publishes: cmd_vel (Twist); meetpoint (Meetpoint) and edge_traversal (EdgeTraver
     (DriverStatus, latched); ~markers (MarkerArray): see driver_displays.py; /diagnostics.
 Actions: traverse_edge (TraverseEdge), goto_node (GotoNode). There is one robot: a goal of either ends what is on, and a
     turn_choice waits for neither.
-Calls: restart_search (Trigger; launch/driver.launch remaps it to ~restart of the topology node) when it stands at a
-    meetpoint that the search cannot follow it to: it was restarted, or carried.
 Parameters: DriverParams, read once; explained in config/driver.yaml.
 """
 
@@ -29,7 +27,6 @@ import rospy
 import tf2_ros
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import OccupancyGrid
-from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 from glass_nav import params
@@ -68,7 +65,6 @@ from glass_nav.topology.atlas.atlas import AtlasError
 from glass_nav.vocabulary import LocalizationState, Outcome
 
 MARKERS_PERIOD_S = 0.5
-RESTART_WAIT_S = 2.0  # for the service, by the wall clock
 ODOMETRY_GRACE_S = (
     1.0  # by the wall clock, without odometry, before the log says so: at the start it may come a little later
 )
@@ -104,7 +100,6 @@ class DriverNode:
             decisions.DriveStatus: self._send_status,
             decisions.Feedback: self._send_feedback,
             decisions.GoalEnd: self._end_goal,
-            decisions.SearchRestart: self._restart_search,
             LogLine: self._log.write,
         }
         self._tf = tf2_ros.Buffer()
@@ -292,9 +287,6 @@ class DriverNode:
         finish = {Outcome.SUCCEEDED: server.set_succeeded, Outcome.PREEMPTED: server.set_preempted}
         finish.get(end.ending.outcome, server.set_aborted)(result, end.ending.reason)
 
-    def _restart_search(self, _request: decisions.SearchRestart) -> None:
-        threading.Thread(target=_call_restart_search, daemon=True).start()
-
     # -- what people see
 
     def _show(self) -> None:
@@ -325,17 +317,6 @@ class DriverNode:
         health, counts = self._driver.health, vars(self._scans.counts)
         values = {**health.values, **{f"scans {name}": count for name, count in counts.items()}}
         self._diagnostics.publish({"driver": replace(health, values=values)})
-
-
-def _call_restart_search() -> None:
-    name = rospy.resolve_name("restart_search")
-    try:
-        rospy.wait_for_service(name, RESTART_WAIT_S)
-        answer = rospy.ServiceProxy(name, Trigger)()
-        if not answer.success:
-            rospy.logwarn(f"the search does not begin anew: {answer.message}")
-    except (rospy.ROSException, rospy.ServiceException) as err:
-        rospy.logwarn(f"the search does not begin anew, call ~restart of the topology node: {err}")
 
 
 def main() -> None:
