@@ -11,6 +11,8 @@ from typing import Optional
 
 import numpy as np
 
+from glass_nav.geometry import angles, se2
+from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.observations import Meetpoint
 from glass_nav.topology.search import ambiguity, vote
 from glass_nav.topology.search.belief import NO_DART, Belief
@@ -24,6 +26,10 @@ from glass_nav.vocabulary import SearchState
 
 _MIN_DRIVEN_M = 1.0  # before a place is confirmed: odometry must agree with it
 _LOST_SEARCHES, _LOST_M = 3, 4.0  # of the whole map, and driven, before it is given up
+_NODE_M, _EDGE_RAD = 0.7, 0.5  # from where a pose expects a meetpoint, and the edge that the robot came along
+_WORTH = (
+    0.2  # share of the doubt that a turn removes by itself; else it is better to drive to a difference farther away
+)
 _MAX_SHOWN = 0.9995  # of a probability in words
 
 
@@ -38,6 +44,7 @@ class JointVerdict:
         params: SearchParams,
         views: Optional[ExpectedViews] = None,
     ) -> None:
+        self._atlas = matcher.atlas
         self._matcher, self._forest, self._passed, self._params = matcher, forest, passed, params
         self._views = views
 
@@ -68,8 +75,11 @@ class JointVerdict:
             return final
         here = self._forest.meetpoints[-1]
         left = belief.left(self._params.tolerances.risk)
-        known = left[belief.dart[left] != NO_DART]
-        dart, first = np.unique(belief.dart[known], return_index=True)
+        at = np.where(
+            belief.dart[left] != NO_DART, belief.dart[left], darts_near(self._atlas, belief.poses[left], here)
+        )
+        known, at = left[at != NO_DART], at[at != NO_DART]
+        dart, first = np.unique(at, return_index=True)
         order = np.argsort(first)
         dart, share = dart[order], belief.share[known[first[order]]]
         places = f"{self._place(belief)}, {len(left)} place{'s' * (len(left) != 1)} left"
@@ -81,14 +91,16 @@ class JointVerdict:
         if self._views is not None:
             self._views.arrive(dart)
         voted = vote.expected(self._matcher, dart, share, self._views)
-        if voted.splits:
+        proof = None
+        if voted.removed < _WORTH:
+            proof = ambiguity.prove(self._matcher, dart, views=self._views)
+            if proof.ranks is not None:
+                reason = f"{places}; next towards the nearest difference, {len(proof.ranks)} edges away"
+                choice = TurnChoice(proof.ranks[0], here.degree)
+                return self._estimate(SearchState.SEARCHING, reason, depth, dart, choice)
+        if voted.splits or proof is None:
             reason = f"{places}; next the turn that leaves the least doubt per metre"
             return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(voted.rank, here.degree))
-        proof = ambiguity.prove(self._matcher, dart, views=self._views)
-        if proof.ranks is not None:
-            reason = f"{places}; next towards the nearest difference, {len(proof.ranks)} edges away"
-            choice = TurnChoice(proof.ranks[0], here.degree)
-            return self._estimate(SearchState.SEARCHING, reason, depth, dart, choice)
         rank = self._least_passed(here)
         listed = float(belief.share[known].sum())
         if proof.indistinguishable and 1.0 - listed < self._params.tolerances.risk and depth > 0:
@@ -125,3 +137,19 @@ class JointVerdict:
             return here.degree // 2
         least = np.flatnonzero(times == times.min())
         return int(least[len(least) // 2]) if least[0] > 0 or len(least) == 1 else int(least[-1])
+
+
+def darts_near(atlas: Atlas, poses: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
+    """(K,) the dart that is the reference edge of a meetpoint where a robot with pose (K, 3) stands, by its place and
+    direction alone; NO_DART where no node of that degree is near.
+    """
+    back = float(meetpoint.bearings_rad[0]) if len(meetpoint.bearings_rad) else np.pi
+    dart = np.full(len(poses), NO_DART, np.int64)
+    for k, pose in enumerate(poses):
+        off_m = np.hypot(*(atlas.nodes.position_m - se2.transform_points(pose, meetpoint.centre_m)).T)
+        node = int(off_m.argmin())
+        ring = atlas.rings[node]
+        off_rad = np.abs(angles.wrap(atlas.darts.bearing_rad[ring] - pose[2] - back))
+        if off_m[node] < _NODE_M and len(ring) == meetpoint.degree and off_rad.min() < _EDGE_RAD:
+            dart[k] = ring[off_rad.argmin()]
+    return dart

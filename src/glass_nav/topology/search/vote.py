@@ -22,6 +22,7 @@ _POLLED = 100  # candidates whose expectations are compared pairwise: 2 ms of a 
 _BACK = 0.999  # share of the gain of the way back
 _MIN_GAIN = 0.01  # share of the doubt that a turn must remove to be worth taking
 _LOOKED_AT = 8  # candidates whose views are compared pairwise
+_BY_GRAPH_ALONE = 0.8  # chance that a difference of the graph is none where scans would show none: it was drawn so
 _EQUAL = 1e-9  # survivors by which two turns differ only by rounding
 
 
@@ -34,6 +35,7 @@ class Vote:
     length_m: np.ndarray  # (R,) mean length of the edges
     rank: int  # of the turn that won
     splits: bool  # some turn leaves fewer candidates than there are
+    removed: float = 0.0  # share of the doubt that the turn is expected to remove; of expected() only
 
 
 def best(matcher: Matcher, dart: np.ndarray) -> Vote:
@@ -78,15 +80,17 @@ def expected(matcher: Matcher, dart: np.ndarray, share: np.ndarray, views: Optio
         departure = matcher.departures(dart, rank)
         likelihood = _alike(matcher, departure).astype(float)  # (C, C) of the second if the first is true
         if views is not None:
+            likelihood = np.maximum(likelihood, _BY_GRAPH_ALONE)
             first, second = np.nonzero(likelihood)
-            likelihood[first, second] = np.exp(-views.nats(departure[first] ^ 1, departure[second] ^ 1))
+            likelihood[first, second] *= np.exp(-views.nats(departure[first] ^ 1, departure[second] ^ 1))
         left = (likelihood * share).max(axis=1) / (likelihood @ share)
         outside[rank] = float(share @ (1.0 - left))
         length[rank] = float(share @ matcher.length_m[departure >> 1])
     gain = (now - outside) / length
     gain[0] *= _BACK  # of equal turns another one
     rank = int(gain.argmax())
-    return Vote(np.arange(degree), outside, length, rank, bool(now - outside[rank] > _MIN_GAIN * now))
+    removed = float(now - outside[rank]) / max(now, _EQUAL)
+    return Vote(np.arange(degree), outside, length, rank, removed > _MIN_GAIN, removed)
 
 
 def seed(matcher: Matcher, dart: np.ndarray) -> int:
