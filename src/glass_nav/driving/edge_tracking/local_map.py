@@ -230,7 +230,7 @@ class LocalMap:
         for to, cells, whole in (
             (wide._ended, self._ended, np.max),
             (wide._passed, self._passed, np.min),  # a cell with a wall in it was not passed
-            (wide._stood, self._stood, np.max),
+            (wide._stood, self._stood, np.min),
         ):
             beside = [(0, 0)] * (cells.ndim - 2)
             padded = np.pad(cells, [*beside, (int(low[1]), int(high[1])), (int(low[0]), int(high[0]))], "edge")
