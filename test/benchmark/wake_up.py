@@ -203,14 +203,13 @@ class Trial:
         if localizer is None or belief is None or self.robot.arrival is None:
             return None
         left = belief.left(localizer.params.tolerances.risk)
-        left = left[belief.dart[left] != NO_DART]
         true = [k for k in left.tolist() if is_right(belief.poses[k], self.simulation.map_from_base)]
-        if not true or len(left) < 2:
-            return 0
+        if not true or len(left) < 2 or belief.dart[true[0]] == NO_DART:
+            return None if true and len(left) > 1 else 0
         views = ExpectedViews(localizer.matcher.atlas, ScanExplanation(self.grid_map))
-        others = np.unique(belief.dart[left[left != true[0]]])
-        dart = int(belief.dart[true[0]])
-        return best_plan.edges(localizer.matcher, views, dart, others[others != dart])
+        left = left[belief.dart[left] != NO_DART]
+        plan = best_plan.BestPlan(localizer.matcher, views, belief.dart[left], belief.poses[left])
+        return plan.edges(left.tolist().index(true[0]))
 
     def _print(self, status: SearchStatus) -> None:
         estimate, arrival = status.estimate, self.robot.arrival

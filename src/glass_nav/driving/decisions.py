@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import Optional, Union
+from typing import Optional, Tuple, Union
 
 import numpy as np
 
 from glass_nav.driving.edge_tracking.edge_driver import Arrival
+from glass_nav.driving.node_visits import NodeVisit
 from glass_nav.driving.tasks import Ending
 from glass_nav.log_line import LogLine
 from glass_nav.vocabulary import DriverPhase
@@ -75,4 +76,12 @@ class GoalEnd:
     stamp_ns: int = 0  # of the odometry then
 
 
-Decision = Union[Command, TraversalReport, MeetpointReport, DriveStatus, Feedback, GoalEnd, LogLine]
+@dataclass(frozen=True)
+class VisitReport:
+    """What the robot saw of the nodes that it passed on the way to a goal."""
+
+    visits: Tuple[NodeVisit, ...]
+    stamp_ns: int  # of the last scan
+
+
+Decision = Union[Command, TraversalReport, MeetpointReport, DriveStatus, Feedback, GoalEnd, VisitReport, LogLine]

@@ -24,12 +24,14 @@ from glass_nav.driving.decisions import (
     GoalEnd,
     MeetpointReport,
     TraversalReport,
+    VisitReport,
 )
 from glass_nav.driving.driver_params import DriveParams
 from glass_nav.driving.edge_names import rank_from_words
 from glass_nav.driving.edge_tracking.edge_driver import Arrival, EdgeDriver
 from glass_nav.driving.input_watch import InputNames, InputWatch, Odometry
 from glass_nav.driving.meetpoint_stay import MeetpointStay
+from glass_nav.driving.node_visits import VisitWatch
 from glass_nav.driving.place_goals import PlaceGoal, PlaceTasks, TaskTo
 from glass_nav.driving.seek_policy import SeekPolicy
 from glass_nav.driving.tasks import EdgeTask, Ending, GoTask, Moment, Task
@@ -86,6 +88,7 @@ class Driver:
         self._edge = EdgeDriver(p.edge)
         self._places = PlaceTasks(p, self._edge, names.map_frame, atlas, backend)
         self._inputs = InputWatch(p.rules, names)
+        self._visits = None if atlas is None or not p.rules.report_visits else VisitWatch(atlas)
         self._stay = MeetpointStay()
         self._seeking = SeekPolicy(p.rules.seek_attempts)
         self._search: Optional[SearchState] = None
@@ -166,6 +169,10 @@ class Driver:
         if not self._inputs.take_scan(scan.stamp_ns):
             return False
         self._edge.see(scan, odom_from_base)
+        if self._visits is not None and self._job is not None and isinstance(self._job.task, GoTask):
+            map_from_base = self._inputs.map_from_base_at(odom_from_base)
+            if map_from_base is not None and self._inputs.localization == LocalizationState.LOCALIZED:
+                self._visits.see(scan, odom_from_base, map_from_base)
         return True
 
     def search_reports(self, state: SearchState) -> List[Decision]:
@@ -391,6 +398,9 @@ class Driver:
             self._say(DriverPhase.FAILED, f"{job.name}: {ending.reason}")
         if job.action is not None:
             self._end_goal(job.action, ending, job.travelled_m, arrival)
+        visits = [] if self._visits is None else self._visits.take()
+        if visits:
+            self._decisions.append(VisitReport(tuple(visits), self._inputs.scan_ns))
 
     def _end_goal(
         self, action: Action, ending: Ending, travelled_m: float = 0.0, arrival: Optional[Arrival] = None

@@ -7,8 +7,8 @@ Subscribes: scan (LaserScan); scan_surfaces (LaserScan), in its place while the 
     (TurnChoice), the answer to the last meetpoint; topology_status (TopologyStatus) and localization_status
     (LocalizationStatus), which launch/driver.launch remaps to those of the two nodes; map (OccupancyGrid): where it is
     free to drive straight to the nearest edge; tf odom <- base <- laser, and map <- odom for goals in the map.
-Publishes: cmd_vel (Twist); meetpoint (Meetpoint) and edge_traversal (EdgeTraversal) with the same stamp; ~status
-    (DriverStatus, latched); ~markers (MarkerArray): see driver_displays.py; /diagnostics.
+Publishes: cmd_vel (Twist); meetpoint (Meetpoint) and edge_traversal (EdgeTraversal) with the same stamp; node_visits
+    (NodeVisits) at the end of a goal of goto_node; ~status (DriverStatus, latched); ~markers (MarkerArray): see driver_displays.py; /diagnostics.
 Actions: traverse_edge (TraverseEdge), goto_node (GotoNode). There is one robot: a goal of either ends what is on, and a
     turn_choice waits for neither.
 Parameters: DriverParams, read once; explained in config/driver.yaml.
@@ -43,6 +43,7 @@ from glass_nav.msg import (
     GotoNodeFeedback,
     LocalizationStatus,
     Meetpoint,
+    NodeVisits,
     TopologyStatus,
     TraverseEdgeAction,
     TraverseEdgeFeedback,
@@ -100,6 +101,7 @@ class DriverNode:
             decisions.DriveStatus: self._send_status,
             decisions.Feedback: self._send_feedback,
             decisions.GoalEnd: self._end_goal,
+            decisions.VisitReport: self._send_visits,
             LogLine: self._log.write,
         }
         self._tf = tf2_ros.Buffer()
@@ -108,6 +110,7 @@ class DriverNode:
         self._commands = rospy.Publisher("cmd_vel", Twist, queue_size=1, tcp_nodelay=True)
         self._meetpoints = rospy.Publisher("meetpoint", Meetpoint, queue_size=5)
         self._traversals = rospy.Publisher("edge_traversal", EdgeTraversal, queue_size=5)
+        self._visits = rospy.Publisher("node_visits", NodeVisits, queue_size=5)
         self._status = rospy.Publisher("~status", DriverStatus, queue_size=10, latch=True)
         self._markers = rospy.Publisher("~markers", MarkerArray, queue_size=2)
         self._diagnostics = Diagnostics("driver")
@@ -268,6 +271,9 @@ class DriverNode:
 
     def _send_meetpoint(self, report: decisions.MeetpointReport) -> None:
         self._meetpoints.publish(driver_messages.meetpoint_msg(report.arrival, self._p.base_frame_id))
+
+    def _send_visits(self, report: decisions.VisitReport) -> None:
+        self._visits.publish(driver_messages.visits_msg(report, self._p.base_frame_id))
 
     def _send_status(self, status: decisions.DriveStatus) -> None:
         self._status.publish(driver_messages.status_msg(status, self._p.base_frame_id))

@@ -52,9 +52,6 @@ def prove(
             return Proof(views is None or not views.is_exhausted, None, searched)
         met, ranks = _search(matcher, dart[0], dart[apart[0]], max_pairs - searched, views)
         searched += len(met)
-        if ranks is not None and views is not None:
-            looks = _search(matcher, dart[0], dart[apart[0]], max_pairs - searched, views, by_looks=True)[1]
-            ranks = ranks if looks is None else looks
         if ranks is not None or searched >= max_pairs:
             return Proof(False, ranks, searched)
         known = np.concatenate([known, met])
@@ -72,12 +69,9 @@ def _groups(pairs: np.ndarray, dart: np.ndarray) -> np.ndarray:
 
 
 def _search(
-    matcher: Matcher, first: int, second: int, max_pairs: int, views: Optional[ExpectedViews], by_looks: bool = False
+    matcher: Matcher, first: int, second: int, max_pairs: int, views: Optional[ExpectedViews]
 ) -> Tuple[np.ndarray, Optional[List[int]]]:
-    """The pairs (P, 2) that turns lead to from one pair, level by level, and the turns to the first that differs.
-
-    by_looks: only what scans would show counts; a graph that differs where nothing is seen to differ was drawn so.
-    """
+    """The pairs (P, 2) that turns lead to from one pair, level by level, and the turns to the first that differs."""
     count = len(matcher.atlas.darts)
     start = np.array([_key(np.array([first]), np.array([second]), count)[0]])
     levels: List[Tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # keys, index in the level before, rank
@@ -92,16 +86,15 @@ def _search(
                 matcher.atlas.clockwise(a[able], np.array(rank)),
                 matcher.atlas.clockwise(b[able], np.array(rank)),
             )
-            same_graph = matcher.alike_along(one, other) & matcher.alike_along(other, one)
-            alike = np.ones(len(able), bool) if by_looks else same_graph.copy()
+            alike = matcher.alike_along(one, other) & matcher.alike_along(other, one)
             if views is not None:
                 alike[alike] = views.alike(one[alike] ^ 1, other[alike] ^ 1)
             bad = np.flatnonzero(~alike)
             if len(bad):
                 return _pairs(visited, count), _turns(levels, int(able[bad[0]]), rank)
-            keys.append(_key(one ^ 1, other ^ 1, count)[same_graph])
-            parents.append(able[same_graph])
-            turned.append(np.full(int(same_graph.sum()), rank))
+            keys.append(_key(one ^ 1, other ^ 1, count))
+            parents.append(able)
+            turned.append(np.full(len(able), rank))
         key, index = np.unique(np.concatenate(keys), return_index=True)
         new = np.isin(key, visited, assume_unique=True, invert=True)
         frontier, index = key[new], index[new]
