@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Optional, Tuple
+import math
+from typing import TYPE_CHECKING, Any, Optional, Tuple
 
 import numpy as np
 
@@ -12,7 +13,8 @@ if TYPE_CHECKING:
 
 def wrap(angle_rad: ArrayLike) -> np.ndarray:
     """The same angle in [-pi, pi); any shape, NaN stays NaN."""
-    return np.mod(np.asarray(angle_rad) + np.pi, 2.0 * np.pi) - np.pi
+    angle: Any = angle_rad if isinstance(angle_rad, float) else np.asarray(angle_rad)  # numpy is slow with a single one
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 def mean(angle_rad: np.ndarray, weights: Optional[np.ndarray] = None) -> float:
