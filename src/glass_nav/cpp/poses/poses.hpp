@@ -8,9 +8,9 @@ namespace glass_nav {
 /// The same angle in [-pi, pi); NaN stays NaN.
 inline double wrap(double angle_rad) {
   constexpr double kPi = 3.14159265358979323846;
-  double turned = std::fmod(angle_rad + kPi, 2.0 * kPi);
-  if (turned < 0.0) turned += 2.0 * kPi;
-  return turned - kPi;
+  const double whole_turns = std::floor((angle_rad + kPi) * (0.5 / kPi));
+  const double wrapped = angle_rad - 2.0 * kPi * whole_turns;
+  return wrapped < -kPi ? -kPi : wrapped;  // a last bit below is not let through
 }
 
 /// a_from_c = a_from_b, b_from_c: three numbers each.

@@ -99,13 +99,12 @@ class LocalMap:
         edges = (np.arange(self._size) + 0.5) * cell_m
         x = self._first[0] * cell_m + edges[None, :] - laser[0]
         y = self._first[1] * cell_m + edges[:, None] - laser[1]
-        ended = self._ends(scan, laser)
-        passed = self._passes(scan, laser, x, y)
-        passed[ended[1]] = False
-        self._count(self._ended, *ended)
-        cells = np.flatnonzero(passed)
-        direction = np.arctan2(y[cells // self._size, 0], x[0, cells % self._size])
-        self._count(self._passed, self._direction(direction), cells)
+        ends = self._ends(scan, laser)
+        self._count(self._ended, np.unique(ends))
+        passes = self._passes(scan, laser, x, y)
+        ended = np.zeros(self._size**2, bool)
+        ended[ends % self._size**2] = True
+        self._count(self._passed, passes[~ended[passes % self._size**2]])
         body = (x + laser[0] - odom_from_base[0]) ** 2 + (y + laser[1] - odom_from_base[1]) ** 2
         self._stood |= body <= self._p.robot_radius_m**2
 
@@ -196,13 +195,13 @@ class LocalMap:
                 moved[..., to_y, to_x] = cells[..., from_y, from_x]
             cells[...] = moved
 
-    def _direction(self, angle_rad: np.ndarray) -> np.ndarray:
-        """(...) which of the directions an angle in odom belongs to."""
+    def _counters(self, angle_rad: np.ndarray, cell: np.ndarray) -> np.ndarray:
+        """(K,) flat indices of counts: of the directions that angles (K,) in odom belong to, at flat cells (K,)."""
         turn = self._p.directions / (2.0 * np.pi)
-        return np.floor(np.mod(angle_rad * turn + 0.5, self._p.directions)).astype(np.int64) % self._p.directions
+        return np.floor(angle_rad * turn + 0.5).astype(np.int64) % self._p.directions * self._size**2 + cell
 
-    def _ends(self, scan: Scan, laser: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Direction (K,) and cell (K,) in the window of all beams that came back."""
+    def _ends(self, scan: Scan, laser: np.ndarray) -> np.ndarray:
+        """(K,) counters of all beams that came back."""
         answered = scan.answered
         bearing = scan.angles_rad[answered] + laser[2]
         ranges_m = scan.ranges_m[answered]
@@ -210,31 +209,30 @@ class LocalMap:
         column_row = np.floor(points / self._p.resolution_m).astype(np.int64) - self._first
         inside = ((column_row >= 0) & (column_row < self._size)).all(axis=1)
         cell = column_row[inside, 1] * self._size + column_row[inside, 0]
-        return self._direction(bearing[inside]), cell
+        return self._counters(bearing[inside], cell)
 
     def _passes(self, scan: Scan, laser: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """(n * n,) bool: a beam passed this cell."""
+        """(K,) counters of the cells that a beam passed, each cell once."""
         count = len(scan)
         step = float(scan.angles_rad[1] - scan.angles_rad[0]) if count > 1 else 2.0 * np.pi
         ranges_m = np.where(np.isposinf(scan.ranges_m), min(self._p.unanswered_m, scan.range_max_m), scan.ranges_m)
         ranges_m = np.where(np.isfinite(ranges_m), ranges_m, 0.0) - _BEFORE_M
         around = ndimage.minimum_filter1d(ranges_m, 3, mode="nearest")  # a beam beside it counts as well
-        away = np.hypot(x, y)
-        passed = (away < around.max()).ravel()  # may be: the angle takes longest
-        cells = np.flatnonzero(passed)
-        relative = np.arctan2(y[cells // self._size, 0], x[0, cells % self._size]) - laser[2] - scan.angles_rad[0]
+        away = np.sqrt(x * x + y * y).ravel()
+        cells = np.flatnonzero(away < around.max())  # may be passed: the angle takes longest
+        bearing = np.arctan2(y[cells // self._size, 0], x[0, cells % self._size])
         middle = 0.5 * step * (count - 1)
-        beam = np.rint((angles.wrap(relative - middle) + middle) / step).astype(np.int64)
+        relative = angles.wrap(bearing - laser[2] - scan.angles_rad[0] - middle) + middle
+        beam = np.rint(relative / step).astype(np.int64)
         looked = (beam >= 0) & (beam < count)
-        passed[cells] = looked & (away.ravel()[cells] < around[np.where(looked, beam, 0)])
-        return passed
+        passed = looked & (away[cells] < around[np.where(looked, beam, 0)])
+        return self._counters(bearing[passed], cells[passed])
 
-    def _count(self, counts: np.ndarray, direction: np.ndarray, cell: np.ndarray) -> None:
-        """One more for each pair of direction and cell, once; both counts are halved where there are many."""
-        flat = np.unique(direction * self._size**2 + cell)
+    def _count(self, counts: np.ndarray, counters: np.ndarray) -> None:
+        """One more at each of these counters (K,), no two the same; both counts are halved where there are many."""
         counts = counts.reshape(-1)
-        counts[flat] += 1
-        many = flat[counts[flat] >= _FORGET_AT]
+        counts[counters] += 1
+        many = counters[counts[counters] >= _FORGET_AT]
         if len(many):
             for of_all in (self._ended, self._passed):
                 of_all.reshape(-1)[many] >>= 1
