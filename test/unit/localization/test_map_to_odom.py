@@ -92,7 +92,7 @@ def test_where_the_tolerance_ends_as_the_next_scan_arrives_some_time_is_left_for
     sent_to(sender, lambda _: 1)
     for scan_ns in range(6000 * MS, 100_000 * MS, 100 * MS):
         left_ns = sender.arrived(scan_ns, scan_ns + MS, 100 * MS).stamp_ns - (scan_ns + 101 * MS)
-        assert 9 * MS <= left_ns <= 25 * MS
+        assert 20 * MS <= left_ns <= 55 * MS
 
 
 def test_a_pause_of_the_scans_is_no_reason_to_reach_further():
@@ -104,7 +104,7 @@ def test_a_pause_of_the_scans_is_no_reason_to_reach_further():
 def test_a_busy_machine_is_forgotten():
     sender = MapToOdom()
     sent_to(sender, lambda number: 80 if number < 10 else 2, count=3000)
-    assert sender.arrived(300_000 * MS, 300_001 * MS, 100 * MS).stamp_ns < 300_125 * MS
+    assert sender.arrived(300_000 * MS, 300_001 * MS, 100 * MS).stamp_ns < 300_155 * MS
 
 
 def test_stamps_differ_also_as_seconds_in_a_double():
@@ -131,4 +131,4 @@ def test_after_the_clock_was_set_back_stamps_are_those_of_the_scans_again():
     sender.corrected(9000 * MS, ONE, 50 * MS)
     sender.start_over()
     assert sender.corrected(100 * MS, OTHER, 50 * MS).stamp_ns == 150 * MS
-    assert sender.arrived(130 * MS, 130 * MS, 50 * MS).stamp_ns == 180 * MS
+    assert sender.arrived(120 * MS, 120 * MS, 50 * MS).stamp_ns == 170 * MS
