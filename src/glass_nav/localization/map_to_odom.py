@@ -16,9 +16,7 @@ import numpy as np
 
 _STEP_NS = 1_000  # between two stamps: Python's tf2 reads them as doubles, whose steps are 240 ns wide today
 _JUMP_NS = 1_000_000_000  # stamps that go back by more are of a clock that was set back
-_MARGIN_NS = (
-    20_000_000  # wanted between the arrival of a scan and the end of the last transform: it takes time to listeners
-)
+_MARGIN_NS = 50_000_000  # wanted from the arrival of a scan to the end of the last transform: the next may be late
 _LATEST_NS = 500_000_000  # scans that come later than that are not expected again: they had stopped
 _ADDED_KEPT = 0.998  # how much of what was added is left at the next scan
 _AHEAD_NS = 500_000_000  # a scan stamped further in the future has a wrong clock, and tf would keep its stamp
