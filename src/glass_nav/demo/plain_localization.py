@@ -151,7 +151,7 @@ class PlainMcl:
             weights = resampling.normalised(self._model.log_weights(self._particles, scan))
             best = pose_estimate.of(self._particles, weights)
             drawn = resampling.low_variance(weights, self._count.max_particles, self._rng)
-            enough = resampling.enough_particles(self._particles[np.unique(drawn)], self._count)
+            enough = resampling.enough_particles(self._particles[drawn], self._count)
             self._particles = self._particles[resampling.low_variance(weights, enough, self._rng)]
             self._map_from_odom = se2.compose(best.map_from_base, se2.inverse(odom_from_base))
             self._odom_from_base, self._update_due = np.array(odom_from_base, float), False
