@@ -19,7 +19,6 @@ from glass_nav.driving.decisions import (
     Feedback,
     GoalEnd,
     MeetpointReport,
-    SearchRestart,
     TraversalReport,
 )
 from glass_nav.driving.driver import Driver
@@ -238,14 +237,14 @@ def test_a_search_that_it_does_not_drive_for_hears_of_it_once():
 
 
 @pytest.mark.long_run
-def test_a_search_that_cannot_follow_it_to_a_meetpoint_is_asked_to_begin_anew_and_then_hears_of_it():
+def test_a_search_hears_of_a_meetpoint_to_which_the_robot_came_along_no_edge():
     robot = Robot()
     robot.driver.search_reports(SearchState.TENTATIVE)
     robot.run(lambda: robot.phase == DriverPhase.ARRIVED)
-    assert len(robot.all(SearchRestart)) == 1 and not robot.all(MeetpointReport)
-    assert "the search cannot follow the robot to this meetpoint: it is asked to begin anew" in lines(robot.decided)
-    robot.driver.search_reports(SearchState.WAITING)
-    assert len(only(robot.run_for(0.2), MeetpointReport)) == 1
+    (edge,), (meetpoint,) = robot.all(TraversalReport), robot.all(MeetpointReport)
+    assert edge.arrival.traversal is not None and not edge.arrival.traversal.was_followed
+    assert edge.arrival.stamp_ns == meetpoint.arrival.stamp_ns
+    assert "it came to this meetpoint along no edge: the search goes on by dead reckoning" in lines(robot.decided)
 
 
 def test_without_an_atlas_to_search_in_it_says_so_and_stands_until_a_search_waits():
