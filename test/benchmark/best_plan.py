@@ -17,7 +17,7 @@ from glass_nav.topology.search import vote
 from glass_nav.topology.search.expected_views import ExpectedViews
 from glass_nav.topology.search.matching import Matcher
 
-_MAX_STATES = 3000  # of one set of places
+_MAX_STATES = 500  # of one set of places
 
 State = Tuple[int, ...]  # darts, one of each place, along which the robot came
 Plan = Dict[int, int]  # place -> edges
@@ -36,6 +36,7 @@ class BestPlan:
         """
         self._matcher, self._views, self._poses = matcher, views, poses
         self._plans: Dict[Tuple[Tuple[int, ...], State], Plan] = {}
+        self._apart: Dict[Tuple[int, int], np.ndarray] = {}
         self._plan = self._best(tuple(range(len(dart))), tuple(dart.tolist()))
 
     def edges(self, place: int) -> int:
@@ -78,20 +79,26 @@ class BestPlan:
     def _told_apart(self, places: Tuple[int, ...], after: State) -> List[Tuple[int, ...]]:
         """The sets of places that are still alike where the robot has come to."""
         degree = self._matcher.atlas.degree[self._matcher.atlas.darts.node[list(after)]]
-        there = self._views.at(np.array(after))
         left = list(range(len(places)))
         groups: List[Tuple[int, ...]] = []
         while left:
-            alike = [k for k in left if k == left[0] or not self._differs(left[0], k, places, there, degree)]
+            first = left[0]
+            alike = [
+                k
+                for k in left
+                if degree[k] == degree[first]
+                and not self._differs_at(places[first], after[first])[places[k]]
+                and not self._differs_at(places[k], after[k])[places[first]]
+            ]
             groups.append(tuple(places[k] for k in alike))
             left = [k for k in left if k not in alike]
         return groups
 
-    def _differs(self, a: int, b: int, places: Tuple[int, ...], there: np.ndarray, degree: np.ndarray) -> bool:
-        if degree[a] != degree[b]:
-            return True
-        pairs = ((a, b), (b, a))
-        here, other = (self._poses[[places[pair[side]] for pair in pairs]] for side in (0, 1))
-        ends = there[[first for first, _ in pairs]]
-        self._views.arrive(np.zeros((0, 3)))  # as many comparisons as it takes
-        return bool(self._views.differ(ends, vote.carried(here, ends, other)).any())
+    def _differs_at(self, place: int, dart: int) -> np.ndarray:
+        """(C,) bool: a robot from this place that comes along a dart sees that it did not come from the others."""
+        if (place, dart) not in self._apart:
+            there = np.repeat(self._views.at(np.array([dart])), len(self._poses), axis=0)
+            here = np.broadcast_to(self._poses[place], there.shape)
+            self._views.arrive(np.zeros((0, 3)))  # as many comparisons as it takes
+            self._apart[place, dart] = self._views.differ(there, vote.carried(here, there, self._poses))
+        return self._apart[place, dart]

@@ -20,6 +20,7 @@ from glass_nav.driving.decisions import (
     GoalEnd,
     MeetpointReport,
     TraversalReport,
+    VisitReport,
 )
 from glass_nav.driving.driver import Driver
 from glass_nav.driving.driver_params import DriveParams, DriverRules
@@ -421,6 +422,9 @@ def test_a_place_of_the_map_is_driven_to():
     assert end.action == Action.GOTO_NODE and end.ending == Ending(Outcome.SUCCEEDED, "it stands at the goal")
     assert np.hypot(*(end.map_from_base[:2] - atlas.nodes.position_m[node])) < 0.15
     assert end.stamp_ns > 0 and robot.phase == DriverPhase.IDLE
+    (report,) = robot.all(VisitReport)
+    junction = int(np.hypot(*(atlas.nodes.position_m - [6.0, 1.0]).T).argmin())
+    assert [visit.node for visit in report.visits] == [junction] and report.stamp_ns > 0
 
 
 def test_a_goal_in_the_map_needs_a_pose_there_but_waits_for_a_localization_that_fell_silent():

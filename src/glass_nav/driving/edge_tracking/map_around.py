@@ -48,14 +48,18 @@ class MapAround:
         fine_m = self._fine.params.resolution_m
         return 0.0 if self._wide is None else self._wide.params.resolution_m - fine_m
 
-    def grid_around(self, point_m: np.ndarray) -> GridMap:
-        """A square around a point (2,) that shows the ways out of the room it is in."""
+    def fit(self, point_m: np.ndarray) -> None:
+        """Map as much from now on as the room around a point (2,) needs: early, so that scans have filled it."""
         if self._fine.shows_room(point_m):
             self._wide = None
-            return self._fine.grid_around(point_m)
+            return
         coarsest_m = _COARSEST * self._fine.params.resolution_m - 1e-9
         if self._wide is None:
             self._wide = self._fine.coarser(_COARSER)
         elif not self._wide.shows_room(point_m) and self._wide.params.resolution_m < coarsest_m:
             self._wide = self._wide.coarser(_COARSER)
-        return self._wide.grid_around(point_m)
+
+    def grid_around(self, point_m: np.ndarray) -> GridMap:
+        """A square around a point (2,) that shows the ways out of the room it is in."""
+        self.fit(point_m)
+        return (self._wide or self._fine).grid_around(point_m)

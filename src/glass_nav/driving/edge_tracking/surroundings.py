@@ -79,6 +79,7 @@ class Surroundings:
     def renew_walls(self) -> None:
         """Only the walls: no graph is needed now."""
         self._renewed_ns = self.stamp_ns
+        self._map.fit(self.pose[:2])
         walls = self._map.walls()
         self._at.know(walls)
         self._note_walls(walls)

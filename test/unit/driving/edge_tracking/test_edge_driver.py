@@ -11,7 +11,8 @@ import pytest
 from made_buildings import CONTROL_S, T_MEETPOINT, T_R_M, Drive, glass_t, t_corridor, turned_to, walled
 
 from glass_nav.driving.edge_tracking import edge_driver
-from glass_nav.driving.edge_tracking.edge_driver import EdgeDriver
+from glass_nav.driving.edge_tracking.edge_driver import EdgeDriver, EdgeDriverParams
+from glass_nav.driving.edge_tracking.local_map import LocalMapParams
 from glass_nav.geometry import se2
 from glass_nav.simulation import building_file, lidar, shipped_buildings
 from glass_nav.simulation.building import Building, Pane, Person, Thing, box
@@ -306,11 +307,13 @@ def test_somebody_who_walks_at_a_decimetre_a_second_is_no_meetpoint(way_m):
 @pytest.mark.long_run
 def test_in_a_hall_wider_than_its_window_it_drives_to_the_middle():
     """The graph of a rectangle is the line where the long walls are nearest; a robot at a wall is far from it."""
-    drive = Drive(walled(np.array([[0.0, 0.0], [24.0, 0.0], [24.0, 21.0], [0.0, 21.0]])), (11.0, 1.0, 0.5))
+    window = EdgeDriverParams(local_map=LocalMapParams(window_m=9.0, narrow_window_m=6.0))
+    hall = walled(np.array([[0.0, 0.0], [16.0, 0.0], [16.0, 10.0], [0.0, 10.0]]))
+    drive = Drive(hall, (5.5, 0.8, 1.5), p=window)
     drive.driver.seek()
     arrival = drive.arrival()
-    assert arrival.meetpoint.r_m == pytest.approx(10.5, abs=0.3)
-    assert drive.where(arrival)[1] == pytest.approx(10.5, abs=0.4)
+    assert arrival.meetpoint.r_m == pytest.approx(5.0, abs=0.2)
+    assert drive.where(arrival)[1] == pytest.approx(5.0, abs=0.3)
 
 
 @pytest.mark.long_run
