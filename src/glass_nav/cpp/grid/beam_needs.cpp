@@ -36,7 +36,8 @@ Ends ends_at(const SeenSurfaces& seen, std::size_t path, std::size_t beam, const
 /// What lies along the beams beside each beam of a scan.
 class Neighbourhoods {
  public:
-  Neighbourhoods(const SeenSurfaces& seen, const PoseSpread& spread, const EndGate& gate) : seen_(seen), spread_(spread) {
+  Neighbourhoods(const SeenSurfaces& seen, const PoseSpread& spread, const EndGate& gate)
+      : seen_(seen), spread_(spread) {
     for (std::size_t path = 0; path < kPathCount; ++path) {
       ends_[path].reserve(seen.beams);
       for (std::size_t b = 0; b < seen.beams; ++b) ends_[path].push_back(ends_at(seen, path, b, spread, gate));
@@ -59,9 +60,7 @@ class Neighbourhoods {
       }
     }
     end.reach = std::min(end.reach, reach);
-    PathChoice choice{may_end[kThird] ? 3 : may_end[kSecond] ? 2 : 1, may_end[kMirrored]};
-    if (choice.surfaces > 1 && may_be_missed(from, to)) choice.surfaces = 3;
-    return choice;
+    return {may_end[kThird] ? 3 : may_end[kSecond] ? 2 : 1, may_end[kMirrored]};
   }
 
  private:
@@ -75,17 +74,6 @@ class Neighbourhoods {
       if (to + 1 == seen_.beams) return false;
     }
     return true;
-  }
-
-  /// Whether a surface has no normal, so that the one behind it may stand for it.
-  bool may_be_missed(std::size_t from, std::size_t to) const {
-    for (const std::size_t path : {kFirst, kSecond}) {
-      for (std::size_t b = from; b <= to; ++b) {
-        const SeenSurface& surface = seen_.at[path][b];
-        if (std::isfinite(surface.range) && !surface.line.straight) return true;
-      }
-    }
-    return false;
   }
 
   const SeenSurfaces& seen_;

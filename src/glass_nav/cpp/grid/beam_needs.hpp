@@ -51,8 +51,8 @@ struct BeamEnd {
 };
 
 /// What each beam needs, by what the pose sees along it and along the beams beside it, as far as the spread turns and
-/// moves it: paths to surfaces that may have ended it, and the first surface; none if it did not return. Where less than
-/// its reach is enough, the reach is shortened.
+/// moves it: paths to surfaces that may have ended it, and the first surface; none if it did not return. Where less
+/// than its reach is enough, the reach is shortened.
 std::vector<PathChoice> needs_of(const SeenSurfaces& seen, const PoseSpread& spread, const EndGate& gate,
                                  std::vector<BeamEnd>& ends);
 

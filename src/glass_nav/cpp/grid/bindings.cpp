@@ -38,8 +38,8 @@ py::array_t<T> result_for(const RayBatch& rays) {
   return py::array_t<T>({rays.pose_count, rays.angle_count});
 }
 
-/// Memory for several arrays, from the widest element to the narrowest. The allocator keeps one block for the next scan;
-/// several it gives back to the system, and getting their pages again takes as long as the rays.
+/// Memory for several arrays, from the widest element to the narrowest. The allocator keeps one block for the next
+/// scan; several it gives back to the system, and getting their pages again takes as long as the rays.
 class ArrayBlock {
  public:
   explicit ArrayBlock(std::size_t bytes) : bytes_(static_cast<py::ssize_t>(bytes)) {}

@@ -69,13 +69,7 @@ class ExpectedRanges {
     RayBatch rays = wanted_.rays;
     rays.pose_count = 1;
     const std::vector<double> reach_m(beams_, rays.max_range_m);
-    std::vector<PathChoice> choices(beams_);
-    if (std::isfinite(wanted_.gate_m)) {
-      for (std::size_t b = 0; b < beams_; ++b) {
-        if (!std::isfinite(wanted_.measured_m[b])) choices[b] = {1, false};  // nothing behind can have ended it
-      }
-    }
-    grid_.cast_paths(rays, reach_m.data(), choices.data(), wanted_.limits, paths_of(0));
+    grid_.cast_paths(rays, reach_m.data(), nullptr, wanted_.limits, paths_of(0));
     const double cell_m = grid_.resolution_m();
     seen_.beams = beams_;
     seen_.angles = rays.angles;

@@ -33,7 +33,7 @@ struct SurfaceLimits {
 
 /// Which of the paths along a ray are looked for.
 struct PathChoice {
-  int surfaces = 3;      // so many, the nearest first
+  int surfaces = 3;      // so many with a normal, the nearest first, at most 3 in all
   bool mirrored = true;  // the path mirrored at the first one
 };
 

@@ -72,22 +72,27 @@ class SurfaceFinder {
         found(i, Surfaces{}, Ray{});
         return;
       }
+      searches.push_back(search());
+      const WallNormals::Normal normal = facing(normals_.at(met), searches.back().ray);
       const auto paths = choice(i);
+      // A beam may miss what has no normal; of a choice of one surface nothing behind matters.
+      wanted.push_back(paths.surfaces > 1 && !usable(normal) ? paths.surfaces + 1 : paths.surfaces);
       if (paths.surfaces > 1) going.push_back(meeting.size());
       if (paths.mirrored) mirrored.push_back(meeting.size());
-      wanted.push_back(paths.surfaces);
       meeting.push_back(i);
-      searches.push_back(search());
       surfaces.emplace_back();
       surfaces.back().cell[0] = met;
       surfaces.back().range[0] = t;
-      surfaces.back().normal = facing(normals_.at(met), searches.back().ray);
+      surfaces.back().normal = normal;
     });
     mirror(mirrored, searches, surfaces);
     for (std::size_t k = 1; k < 3 && !going.empty(); ++k) {
       pass_surface(k - 1, going, searches, surfaces);
       seek_surface(k, going, searches, surfaces);
-      const auto done = [&](std::size_t i) { return wanted[i] <= static_cast<int>(k) + 1; };
+      const auto done = [&](std::size_t i) {
+        const int found = static_cast<int>(k) + 1;
+        return wanted[i] <= found && (k == 2 || usable(normals_.at(surfaces[i].cell[k])));
+      };
       going.erase(std::remove_if(going.begin(), going.end(), done), going.end());
     }
     for (std::size_t j = 0; j < meeting.size(); ++j) found(meeting[j], surfaces[j], searches[j].ray);
