@@ -8,6 +8,8 @@ the filter's own covariance here, with a floor. N samples.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Tuple
 
 import numpy as np
 
@@ -58,12 +60,18 @@ def around(map_from_base: np.ndarray, covariance: np.ndarray, shape: Preliminary
     variance, axes = np.linalg.eigh(covariance[:2, :2])
     radii = np.clip(np.sqrt(np.maximum(variance, 0.0)), shape.sample_min_radius_m, shape.sample_max_radius_m)
     heading = np.clip(np.sqrt(max(covariance[2, 2], 0.0)), shape.sample_min_heading_rad, shape.sample_max_heading_rad)
-    count = shape.sample_count - 1
+    on_circle, turn = _around_origin(shape.sample_count - 1)
+    samples = np.tile(np.asarray(map_from_base, float), (shape.sample_count, 1))
+    samples[1:, :2] += (on_circle * radii) @ axes.T
+    samples[1:, 2] += turn * heading
+    samples[:, 2] = angles.wrap(samples[:, 2])
+    return samples
+
+
+@lru_cache(maxsize=8)
+def _around_origin(count: int) -> Tuple[np.ndarray, np.ndarray]:
+    """Places (count, 2) and headings (count,) of the samples but the first, in standard deviations; the same for all scans."""
     bearing = 2.0 * np.pi * np.arange(count) / max(count, 1)
     ring = np.resize(_RINGS, count)
     on_circle = np.stack([np.cos(bearing), np.sin(bearing)], axis=-1) * ring[:, None]
-    samples = np.tile(np.asarray(map_from_base, float), (shape.sample_count, 1))
-    samples[1:, :2] += (on_circle * radii) @ axes.T
-    samples[1:, 2] += _WIDEST * (2.0 * np.mod(_GOLDEN * np.arange(1, count + 1), 1.0) - 1.0) * heading
-    samples[:, 2] = angles.wrap(samples[:, 2])
-    return samples
+    return on_circle, _WIDEST * (2.0 * np.mod(_GOLDEN * np.arange(1, count + 1), 1.0) - 1.0)
