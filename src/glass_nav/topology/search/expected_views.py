@@ -17,7 +17,7 @@ from glass_nav.hypotheses.pose_belief import MapScans
 from glass_nav.topology.atlas.atlas import Atlas
 
 _COMPARED = 300  # new pairs for each step: 0.1 s
-_DIFFERENT = 3.0  # nats that tell two places apart
+_DIFFERENT = 3.0  # nats that tell two places apart; copies of a room that are drawn at another angle differ by less
 _DECISIVE = 8.0  # ... so surely that a robot drives there to see it
 _MAX_KEPT = 100_000  # pairs
 _SAME_M = 0.7  # a meetpoint nearer than this to one where the robot was is that
@@ -54,7 +54,7 @@ class ExpectedViews:
     def nats(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """(P,) log likelihood ratios of poses first (P, 3) to second (P, 3), by a scan seen at the first.
 
-        0 for pairs that there was no time to compare, and where the robot has been.
+        0 for pairs that hardly differ or that there was no time to compare, and where the robot has been.
         """
         pairs = [(_rounded(a), _rounded(b)) for a, b in zip(first, second)]
         been = self._has_been(first, second)
@@ -67,6 +67,7 @@ class ExpectedViews:
         for a, others in new.items():
             rows = list(others.values())
             found = pose_belief.expected_nats(self._scans, first[rows[0]], second[rows])
+            found = np.where(found < _DIFFERENT, 0.0, found)
             self._known.update(zip(((a, b) for b in others), found.tolist()))
         return np.where(been, 0.0, np.array([self._known.get(pair, 0.0) for pair in pairs]))
 

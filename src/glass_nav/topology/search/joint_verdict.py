@@ -12,6 +12,7 @@ from typing import Optional
 import numpy as np
 
 from glass_nav.geometry import angles, se2
+from glass_nav.hypotheses import pose_tracker
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.observations import Meetpoint
 from glass_nav.topology.search import ambiguity, vote
@@ -28,9 +29,8 @@ _MIN_DRIVEN_M = 1.0  # before a place is confirmed: odometry must agree with it
 _LOST_SEARCHES, _LOST_M = 3, 4.0  # of the whole map, and driven, before it is given up
 _PLACED = 8  # places, the likeliest first, whose node is looked up though it does not match
 _NODE_M, _EDGE_RAD = 0.7, 0.6  # from where a pose expects a meetpoint, and the directions of its edges in the mean
-_WORTH = (
-    0.2  # share of the doubt that a turn removes by itself; else it is better to drive to a difference farther away
-)
+_WORTH = 0.2  # share of the doubt that a turn removes by itself; else a difference farther away is the better goal
+_STILL_LIKELY = 0.3  # share of the likeliest place's probability
 _MAX_SHOWN = 0.9995  # of a probability in words
 
 
@@ -48,6 +48,7 @@ class JointVerdict:
         self._atlas = matcher.atlas
         self._matcher, self._forest, self._passed, self._params = matcher, forest, passed, params
         self._views = views
+        self._map_from_odom: Optional[np.ndarray] = None  # (3,) by the place that the last plan was for
 
     def final(self, belief: Belief, depth: int) -> Optional[SearchEstimate]:
         """CONFIRMED or LOST, wherever the robot is; None: not yet."""
@@ -95,7 +96,9 @@ class JointVerdict:
         voted = vote.expected(self._matcher, dart, share, self._views, poses)
         ranks = None
         if voted.removed < _WORTH and self._views is not None:
-            ranks = vote.towards_difference(self._matcher, self._views, int(dart[0]), poses[0], poses[1:])
+            lead = self._followed(belief, poses, share)
+            others = np.delete(poses, lead, axis=0)
+            ranks = vote.towards_difference(self._matcher, self._views, int(dart[lead]), poses[lead], others)
         if ranks is None and voted.splits:
             reason = f"{places}; next the turn that leaves the least doubt per metre"
             return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(voted.rank, here.degree))
@@ -124,6 +127,21 @@ class JointVerdict:
         pose: Optional[np.ndarray] = None,
     ) -> SearchEstimate:
         return SearchEstimate(state, reason, depth, dart, np.zeros(len(dart), np.int64), choice, pose)
+
+    def _followed(self, belief: Belief, poses: np.ndarray, share: np.ndarray) -> int:
+        """Index of the place for which the robot drives to a difference: the same as before as long as it is likely, or
+        else the robot would turn round whenever another one leads.
+        """
+        odom_from_base = belief.odom_from_base
+        if odom_from_base is None:
+            return 0
+        lead = 0
+        if self._map_from_odom is not None:
+            before = pose_tracker.same_place(poses, se2.compose(self._map_from_odom, odom_from_base))
+            likely = np.flatnonzero(before & (share > _STILL_LIKELY * share[0]))
+            lead = int(likely[0]) if len(likely) else 0
+        self._map_from_odom = se2.compose(poses[lead], se2.inverse(odom_from_base))
+        return lead
 
     def _place(self, belief: Belief) -> str:
         share = belief.share[0]
