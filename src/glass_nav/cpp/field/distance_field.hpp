@@ -55,6 +55,24 @@ class DistanceField {
       return field_.distance(field_.square_at(column_ + cos_ * x_m - sin_ * y_m, row_ + sin_ * x_m + cos_ * y_m));
     }
 
+    /// Whether all points that are at most so far from the frame's origin are inside of the grid.
+    bool is_inside(double reach_m) const {
+      const double reach = reach_m / field_.resolution_m_ + 1.0;
+      return column_ > reach && row_ > reach && column_ + reach < field_.width_ && row_ + reach < field_.height_;
+    }
+
+    /// The same distance, of a point that is inside.
+    double distance_inside(double x_m, double y_m) const {
+      const double column = column_ + cos_ * x_m - sin_ * y_m, row = row_ + sin_ * x_m + cos_ * y_m;
+      const int left = static_cast<int>(column), below = static_cast<int>(row);
+      const double right = column - left, up = row - below;
+      const float* corner = &field_.distance_m_[static_cast<std::size_t>(below) * (field_.width_ + 2) + left];
+      const float* above = corner + field_.width_ + 2;
+      const double d00 = corner[0], d01 = corner[1], d10 = above[0], d11 = above[1];
+      const double lower = d00 + (d01 - d00) * right, upper = d10 + (d11 - d10) * right;
+      return lower + (upper - lower) * up;
+    }
+
    private:
     const DistanceField& field_;
     double column_, row_, cos_, sin_;
