@@ -140,19 +140,15 @@ class BeamClassifier:
 
     def surfaces(self, scan: Scan, cases: BeamCases, expected: ExpectedRanges, trusted: bool) -> SurfaceScan:
         """The scan cut at glass; `expected` is of the reported pose, which is trusted or not."""
-        across = np.maximum(expected.cos_incidence[0, 0], MIN_COS)
-        gate_m = case_votes.gate_m(self.residuals, self._params.vote) / across
-        cell = expected.cell[0, 0]
+        first = surface_scan.standing(expected, self._is_gone)
+        gate_m = case_votes.gate_m(self.residuals, self._params.vote) / np.maximum(first.cos_incidence, MIN_COS)
         return surface_scan.of(
-            scan.ranges_m,
-            cases.case,
-            expected,
-            self.glass_map.chances(cell),
-            self.glass_map.is_gone(cell, expected.axis_rad[0], (cell >= 0) & self._opaque[cell]),
-            gate_m,
-            scan.range_max_m,
-            trusted,
+            scan.ranges_m, cases.case, first, self.glass_map.chances(first.cell), gate_m, scan.range_max_m, trusted
         )
+
+    def _is_gone(self, cell: np.ndarray, axis_rad: np.ndarray) -> np.ndarray:
+        """(G,) bool, of cells (G,) with their axes (G,): the map shows what is no longer there."""
+        return self.glass_map.is_gone(cell, axis_rad, (cell >= 0) & self._opaque[cell])
 
     def evidence(
         self, scan: Scan, cases: BeamCases, expected: ExpectedRanges, map_from_base: np.ndarray
