@@ -279,7 +279,8 @@ class PaneFinder:
         held = sum(self._is_held(line, end_m, sign) for end_m, sign in zip(ends_m, (-1.0, 1.0)))
         share = 1.0 if held else min(1.0, pane.length_m / _LOOSE_M) ** 2
         scans = min(len(np.unique(returns.scan[stretch.members])), _SURE_SCANS)
-        beams = share * likelihoods.whole(own) / _SURE_SCANS + line.straightness(returns.points_m[stretch.members])
+        inner = own[1:-1]  # beams pass the edges of a thing
+        beams = share * likelihoods.whole(inner) / _SURE_SCANS + line.straightness(returns.points_m[stretch.members])
         intensity = wall_intensity.log_odds(returns.excess[stretch.members])
         log_odds = self._prior(before) + _HELD_LOG_ODDS[held] + scans * beams + intensity
         return replace(pane, probability=_probability(log_odds))
