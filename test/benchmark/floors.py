@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import functools
+import sys
 from pathlib import Path
 from typing import NamedTuple
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "support"))
 
 import twin_wings
 
@@ -42,14 +46,19 @@ def load(name: str, seed: int, opaque: bool) -> Floor:
         grid_map = building_map.draw(building)
         atlas = _built(grid_map, building.name)
     elif name.endswith(".yaml"):
-        grid_map = map_file.load(Path(name))
-        building = mapped_building.build(grid_map, Path(name).stem)
-        atlas = _built(grid_map, building.name)
+        building, grid_map, atlas = _of_map(name)
     else:
         building = building_file.load(shipped_buildings.find(name))
         grid_map = building_map.draw(building)
         atlas = atlas_file.load(shipped_atlases.find(name))
     return Floor(building.opaque() if opaque else building, grid_map, atlas)
+
+
+@functools.lru_cache(maxsize=2)
+def _of_map(path: str) -> Floor:
+    grid_map = map_file.load(Path(path))
+    building = mapped_building.build(grid_map, Path(path).stem)
+    return Floor(building, grid_map, _built(grid_map, building.name))
 
 
 def _built(grid_map: GridMap, name: str) -> Atlas:

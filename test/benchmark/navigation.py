@@ -11,7 +11,8 @@ that move_base says it reached and did not. `tf` counts move_base's lines about 
 share of asks for the newest map -> odom, ten times a second and without waiting, that had no answer. Glass is the share of
 it within 1.5 m, and from there to 2.25 m, that is in the local costmap, once it was in view; `phantom` the share of local
 costmaps with a cell more than 0.2 m from everything that is or was there, `outdated` with a cell where the map shows a
-closed door or furniture that is gone. Writes a JSON file per run to --out.
+closed door or furniture that is gone, `drifted` with one that was right when it was marked, before a wheel slipped: the
+local costmap moves with the odometry. Writes a JSON file per run to --out.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ LONGEST_RUN_S = 3600.0
 COLUMNS = {
     "reached": "reached", "said": "said", "wrong": "said_wrongly", "contacts": "contacts", "time, s": "time_s",
     "mean, m": "error_mean_m", "max, m": "error_max_m", "recoveries": "recoveries", "tf": "tf_errors",
-    "late": "unanswered", "glass": "glass_near", "far": "glass_far", "phantom": "phantoms", "outdated": "outdated", "CPU": "cpu",
+    "late": "unanswered", "glass": "glass_near", "far": "glass_far", "phantom": "phantoms", "outdated": "outdated", "drifted": "drifted", "CPU": "cpu",
 }  # fmt: skip
 
 

@@ -42,7 +42,8 @@ def test_no_linter_is_missing() -> None:
         "clang-format",
         "catkin-lint",
         "yamllint",
-        "bash",
+        "shellcheck",
+        "hadolint",
     ]
 
 
@@ -59,7 +60,7 @@ def test_scripts_may_be_executed(script: str) -> None:
 
 def test_the_workflow_runs_all_of_ci_on_every_platform() -> None:
     (job,) = WORKFLOW["jobs"].values()
-    assert job["strategy"]["matrix"]["image"] == ["debian:12", "debian:11", "ros:noetic"]
+    assert job["strategy"]["matrix"]["image"] == ["debian:12", "debian:11", "debian:13", "ros:noetic"]
     assert job["container"] == "${{ matrix.image }}"
     assert [step["run"] for step in job["steps"] if "run" in step] == [".ci/run"]
     assert job["steps"][0]["uses"].startswith("actions/checkout@")

@@ -16,7 +16,7 @@ import sys
 import threading
 import xmlrpc.client
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Any, Dict, Iterable, List, Optional, Tuple
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "support"))
 
@@ -46,6 +46,7 @@ TF_LINES = re.compile(
     r"xtrapolat|transform timeout|Could not transform the global plan|TF Error|Transform timeout", re.I
 )
 COSTMAP = "/move_base/local_costmap/costmap"
+KEPT = 40  # costmaps, two a second: a cell may have been marked so long ago
 
 
 class Ride:
@@ -60,8 +61,9 @@ class Ride:
         self.tf_lines: List[str] = []
         self.errors_m: List[float] = []
         self.scores: List[Any] = []
-        self.phantom_cells: List[List[float]] = []
+        self.phantom_cells: List[List[Any]] = []  # time, robot, cell, outdated, drifted
         self._unscored: List[OccupancyGrid] = []
+        self._past: List[np.ndarray] = []  # true map_from_odom (3,) of the last costmaps
         self._tf = tf2_ros.Buffer()
         self._listener = tf2_ros.TransformListener(self._tf, tcp_nodelay=True)
         rospy.Subscriber("ground_truth", PoseStamped, self._hear_truth, queue_size=1000, tcp_nodelay=True)
@@ -107,17 +109,25 @@ class Ride:
         while self._unscored and self._unscored[0].header.stamp.to_nsec() <= known_ns:
             msg = self._unscored.pop(0)
             stamp_ns = msg.header.stamp.to_nsec()
-            pose, odometry = _at(self._poses, stamp_ns), _at(self._odometry, stamp_ns)
-            map_from_odom = se2.compose(pose, se2.inverse(odometry))
+            pose, map_from_odom = _at(self._poses, stamp_ns), self._map_from_odom(stamp_ns)
             grid = se2.compose(map_from_odom, conversions.planar_from_pose(msg.info.origin))
             cells = np.array(msg.data, np.int8).reshape(msg.info.height, msg.info.width)
             score = self._truth.score(
-                occupied_cells(cells, msg.info.resolution, grid), pose, (stamp_ns - START_NS) * 1e-9
+                occupied_cells(cells, msg.info.resolution, grid),
+                pose,
+                (stamp_ns - START_NS) * 1e-9,
+                np.array([se2.compose(then, se2.inverse(map_from_odom)) for then in self._past]).reshape(-1, 3),
             )
+            self._past = [*self._past, map_from_odom][-KEPT:]
             self.scores.append(score)
             self.phantom_cells += [
-                [round(stamp_ns * 1e-9, 2), *np.round(pose, 2), *np.round(cell, 2)] for cell in score.phantoms.tolist()
+                [round(stamp_ns * 1e-9, 2), *np.round(pose, 2), *np.round(cell, 2), bool(old), bool(moved)]
+                for cell, old, moved in zip(score.phantoms.tolist(), score.outdated, score.drifted)
             ]
+
+    def _map_from_odom(self, stamp_ns: int) -> np.ndarray:
+        """(3,) true."""
+        return se2.compose(_at(self._poses, stamp_ns), se2.inverse(_at(self._odometry, stamp_ns)))
 
     def _hear_odometry(self, msg: Odometry) -> None:
         self._odometry.append((msg.header.stamp.to_nsec(), conversions.planar_from_pose(msg.pose.pose)))
@@ -207,13 +217,18 @@ def drive(ride: Ride, goals: np.ndarray, node: str) -> Dict[str, Any]:
         "unanswered": round(unanswered / max(asked, 1), 4),
         "glass_near": round(near_marked / near, 4) if near else None,
         "glass_far": round(far_marked / far, 4) if far else None,
-        "phantoms": round(float(np.mean([not score.outdated.all() for score in ride.scores])), 4),
-        "outdated": round(float(np.mean([score.outdated.any() for score in ride.scores])), 4),
+        "phantoms": _share(not (score.outdated | score.drifted).all() for score in ride.scores),
+        "outdated": _share((score.outdated & ~score.drifted).any() for score in ride.scores),
+        "drifted": _share(score.drifted.any() for score in ride.scores),
         "cpu": round((cpu_s(node) - cpu0_s) / driven_s, 3),
         "ends": ends,
         "lines": sorted({re.sub(r"[\d.]+", "#", line) for line in ride.tf_lines}),
         "phantom_cells": ride.phantom_cells,
     }
+
+
+def _share(holds: Iterable[bool]) -> float:
+    return round(float(np.mean(list(holds))), 4)
 
 
 def main() -> None:

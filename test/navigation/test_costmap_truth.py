@@ -78,6 +78,13 @@ def test_a_person_who_walked_on_explains_nothing_any_more():
     assert len(score(room(people=(person,)), (0.9, 1.5), time_s=14.5).phantoms) == 1
 
 
+@pytest.mark.parametrize("slipped_m, drifted", [(0.3, True), (1.0, False)])
+def test_what_was_at_a_wall_when_it_was_marked_has_drifted(slipped_m, drifted):
+    truth = CostmapTruth(room(), np.pi)
+    found = truth.score(np.array([[0.3, 1.5]]), ROBOT, 0.0, np.array([[0.0, 0.0, 0.0], [-slipped_m, 0.0, 0.0]]))
+    assert found.phantoms.tolist() == [[0.3, 1.5]] and found.drifted.tolist() == [drifted]
+
+
 def test_cells_of_a_turned_costmap_are_where_they_are_in_the_map():
     cells = np.zeros((4, 6), np.int8)
     cells[1, 3] = 100

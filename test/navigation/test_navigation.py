@@ -1,6 +1,6 @@
-"""Stock move_base drives the simulated robot over the bridge of glass, localized by this package.
+"""Stock move_base drives the simulated robot, localized by this package and sent by the driver.
 
-It is skipped where move_base is not installed: it is not part of Debian, and on Noetic it is ros-noetic-move-base. Built
+They are skipped where move_base is not installed: it is not part of Debian, and on Noetic it is ros-noetic-move-base. Built
 from its public source, its workspace goes into ROS_PACKAGE_PATH, CMAKE_PREFIX_PATH and LD_LIBRARY_PATH.
 """
 
@@ -13,6 +13,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+import rostest_file
 
 REPO = Path(__file__).resolve().parents[2]
 
@@ -43,3 +44,7 @@ def test_move_base_reaches_its_goals_and_has_the_glass_in_its_costmap(tmp_path):
     assert (row["reached"], row["said"], row["said_wrongly"], row["contacts"]) == (3, 3, 0, 0), row
     assert row["error_mean_m"] < 0.05 and row["glass_near"] >= 0.98, row
     assert row["recoveries"] == 0, row
+
+
+def test_the_driver_has_move_base_drive_and_notices_what_hangs_or_was_killed(tmp_path):
+    rostest_file.run(REPO / "test" / "navigation" / "driver_with_move_base.test", tmp_path)

@@ -41,20 +41,7 @@ def test_setup_installs_what_rosdep_would() -> None:
     assert {package for package in needed if not re.search(rf"\b{package}\b", script)} == {"python3-rospkg-modules"}
 
 
-def instructions() -> "list[tuple[str, str]]":
-    text = (REPO / "doc" / "Dockerfile").read_text(encoding="utf-8")
-    lines = re.sub(r"\\\n\s*", "", "\n".join(line for line in text.splitlines() if not line.startswith("#")))
-    return [(line.split(" ", 1)[0], line.split(" ", 1)[1]) for line in lines.splitlines() if line.strip()]
-
-
-def test_the_container_recipe_keeps_the_rules_of_dockerfile_linters() -> None:
-    """A version for the image, absolute paths, pipes that fail, no lists of apt left behind, commands that exist."""
-    found = instructions()
-    assert [name for name, _ in found] == ["FROM", "SHELL", "COPY", "WORKDIR", "RUN", "CMD"]
-    given = dict(found)
-    assert re.fullmatch(r"debian:\d+", given["FROM"])
-    assert "pipefail" in given["SHELL"]
-    assert given["COPY"].split()[-1] == given["WORKDIR"] and given["WORKDIR"].startswith("/")
-    assert "/var/lib/apt/lists" in given["RUN"] and "sudo" not in given["RUN"] and "cd " not in given["RUN"]
-    for script in re.findall(r"scripts/\w+", given["RUN"] + given["CMD"]):
-        assert (REPO / script).is_file()
+def test_the_container_recipe_runs_scripts_that_exist() -> None:
+    """What hadolint (test/lint) cannot see; test/platforms/cases runs the recipe's commands."""
+    scripts = re.findall(r"scripts/\w+", (REPO / "doc" / "Dockerfile").read_text(encoding="utf-8"))
+    assert len(scripts) >= 2 and all((REPO / script).is_file() for script in scripts)

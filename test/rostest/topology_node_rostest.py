@@ -315,7 +315,7 @@ class TopologyNode(unittest.TestCase):
             (Meetpoint(degree=0, r=1.0), "meetpoint refused: meetpoint: degree must be >= 1, got 0"),
             (Meetpoint(degree=3, r=float("nan")), "meetpoint refused: meetpoint: r must be finite and > 0 m"),
             (Meetpoint(degree=3, r=1.0, bearings=[0.0, 1.0]), "3 edges need 3 bearings or none, got 2"),
-            (EdgeTraversal(rank=1, length=-1.0), "length must be finite and > 0 m, got -1.0"),
+            (EdgeTraversal(rank=1, length=-1.0), "length must be finite and > 0 m, or NaN, got -1.0"),
             (EdgeTraversal(rank=1, length=1.0, segments=[1.0, 2.0]), "segments need 4 numbers each, got 2"),
         ]:
             (self.meetpoints if isinstance(msg, Meetpoint) else self.traversals).publish(msg)

@@ -34,6 +34,7 @@ class Score(NamedTuple):
     far_marked: int
     phantoms: np.ndarray  # (P, 2) centres in the map of cells where nothing is
     outdated: np.ndarray  # (P,) bool: but the map shows something there, which is gone
+    drifted: np.ndarray  # (P,) bool: it was right when it was marked; odometry has drifted since
 
 
 class CostmapTruth:
@@ -73,12 +74,20 @@ class CostmapTruth:
             free_m = self._rays.cast_first(map_from_laser[None], bearing[asked], FAR_M + 1.0).range_m[0]
             self._in_view[asked] = free_m > range_m[asked] - SEEN_SLACK_M
 
-    def score(self, occupied_m: np.ndarray, map_from_robot: np.ndarray, time_s: float) -> Score:
+    def score(
+        self,
+        occupied_m: np.ndarray,
+        map_from_robot: np.ndarray,
+        time_s: float,
+        then_from_now: np.ndarray = np.zeros((0, 3)),
+    ) -> Score:
         """
         Args:
             occupied_m: (C, 2) centres of the costmap's lethal cells, in the map, by the true pose.
             map_from_robot: (3,) the true pose.
             time_s: since the start of the simulation; people are where they are at that time.
+            then_from_now: (D, 3) for a costmap that moves with the odometry: where its cells were in the map some time ago,
+                from where they are.
         """
         range_m = np.hypot(*(self._glass_m - map_from_robot[:2]).T)
         near = self._in_view & (range_m < NEAR_M)
@@ -91,7 +100,15 @@ class CostmapTruth:
             int(self._marked(self._glass_m[far], occupied_m).sum()),
             phantoms,
             self._drawn.distance(*phantoms.T) <= PHANTOM_M,
+            self._drifted(phantoms, then_from_now),
         )
+
+    def _drifted(self, phantoms_m: np.ndarray, then_from_now: np.ndarray) -> np.ndarray:
+        """(P,) bool."""
+        found = np.zeros(len(phantoms_m), bool)
+        for earlier in then_from_now:
+            found |= self._distance.distance(*se2.transform_points(earlier, phantoms_m).T) <= PHANTOM_M
+        return found
 
     def _phantoms(self, occupied_m: np.ndarray, map_from_robot: np.ndarray) -> np.ndarray:
         """Those on the floor that the robot can reach."""

@@ -18,72 +18,34 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Iterator, List
+from typing import List
 
+import numpy as np
 import rosgraph
 import rospy
+import twin_wings
 from rosgraph_msgs.msg import Clock
 
-from glass_nav.simulation import building_file, building_map
+from glass_nav.geometry import se2
+from glass_nav.simulation import building_map
 from glass_nav.topology.atlas import atlas_builder, atlas_file
 
 REPO = Path(__file__).resolve().parents[2]
 PORT = 11731
 SIZE = "1400x900"
 START_LIMIT_S = 60.0  # of the wall clock, until the simulator runs
-WINGS_AT_M = (0.0, 17.0)  # y of their corridors
-ROOM_M, ROOMS, DEPTH_M, HALF_M = 5.0, 4, 5.0, 1.1  # along the corridor, their number, across, half of the corridor
-DOOR_M = (1.6, 2.6)  # of a room, from its left wall
-START = (7.0, 0.2, 0.3)
-
-
-def twin_wings() -> str:
-    """A building.yaml: two copies of a wing off one corridor; the third room of the second is furnished otherwise."""
-    length, outer = ROOM_M * ROOMS, HALF_M + DEPTH_M
-    top = WINGS_AT_M[-1]
-    walls: List[List[List[float]]] = [[[0, top + HALF_M], [-2.4, top + HALF_M], [-2.4, -HALF_M], [0, -HALF_M]]]
-    walls += [[[0, HALF_M], [0, top - HALF_M]]]
-    panes: List[List[List[float]]] = []
-    furniture: List[List[float]] = []
-    for wing, y in enumerate(WINGS_AT_M):
-        walls.append(
-            [[0, y + HALF_M], [0, y + outer], [length, y + outer], [length, y - outer], [0, y - outer], [0, y - HALF_M]]
-        )
-        for side in (1, -1):
-            near, far = y + side * HALF_M, y + side * outer
-            for room in range(ROOMS):
-                x = ROOM_M * room
-                panes += [[[x, near], [x + DOOR_M[0], near]], [[x + DOOR_M[1], near], [x + ROOM_M, near]]]
-                if room:
-                    walls.append([[x, near], [x, far]])
-                furniture += _furniture(x, y, side, room, other=(wing, side, room) == (1, 1, 2))
-    lines = ["placed: [0, 0, 0]", "walls:"]
-    lines += [f"  - {{line: {wall}, thickness: 0.15}}" for wall in walls]
-    lines += ["panes:", *(f"  - {{line: {pane}, thickness: 0.012}}" for pane in panes), "furniture:"]
-    lines += [
-        f"  - {{box: [{x:.2f}, {y:.2f}, {w:.2f}, {h:.2f}], yaw_deg: {turn:.0f}}}" for x, y, w, h, turn in furniture
-    ]
-    lines += ["paths:", f"  along: [[1, {WINGS_AT_M[0]}], [{length - 1}, {WINGS_AT_M[0]}]]"]
-    return "\n".join(lines) + "\n"
-
-
-def _furniture(x: float, y: float, side: int, room: int, other: bool) -> Iterator[List[float]]:
-    """Boxes of one room: x, y, width, height [m] and yaw [deg]; the same in each wing, but for one room."""
-    turn = 17.0 * room * side
-    if other:
-        yield [x + 1.2, y + side * 4.6, 1.6, 0.8, 0.0]
-        yield [x + 3.9, y + side * 2.4, 0.5, 1.5, 0.0]
-        return
-    yield [x + 3.4 - 0.3 * room, y + side * (4.0 + 0.2 * room), 1.4, 0.7, turn]
-    yield [x + 1.0 + 0.2 * room, y + side * 4.9, 0.5, 0.5, -turn]
+FLOOR_SEED = 3
+START = (9.0, 0.2, 0.3)  # x, y from the hall into the first wing, yaw
 
 
 def shots(at_s: List[float], folder: Path, seed: int, speed: float) -> None:
     """One wake-up, with a picture at each simulated time [s]."""
     with tempfile.TemporaryDirectory() as made:
+        floor = twin_wings.build(twin_wings.TWIN_WINGS, FLOOR_SEED)
+        start = se2.compose(floor.start, np.array(START))
         building = Path(made) / "building.yaml"
-        building.write_text(twin_wings(), encoding="utf-8")
-        grid_map = building_map.draw(building_file.load(building))
+        building.write_text(twin_wings.as_file(floor), encoding="utf-8")
+        grid_map = building_map.draw(floor)
         atlas_file.save(atlas_builder.build(grid_map, "twin wings", "twin wings")[0], Path(made) / "atlas.json")
         processes: List["subprocess.Popen[bytes]"] = []
         environment = {**os.environ, **_display(processes), "ROS_LOG_DIR": f"{made}/log"}
@@ -91,7 +53,7 @@ def shots(at_s: List[float], folder: Path, seed: int, speed: float) -> None:
             launch = [
                 *("roslaunch", "-p", str(PORT), str(REPO / "launch" / "wakeup.launch"), "demo:=false"),
                 *(f"building:={building}", f"atlas:={made}/atlas.json", f"seed:={seed}", f"speed_factor:={speed}"),
-                "start:=" + " ".join(map(str, START)),
+                "start:=" + " ".join(map(str, start)),
             ]
             with open(folder / "wakeup.log", "wb") as log:
                 processes.append(subprocess.Popen(launch, env=environment, stdout=log, stderr=log))

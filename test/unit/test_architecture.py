@@ -60,7 +60,9 @@ FOR_ALL = {
 }
 ONLY_BY = {  # compiled modules, each behind its face; and what is heavy, where it is needed
     "glass_nav._beam_vote": "localization",
+    "glass_nav._integrity": "localization",
     "glass_nav._particles": "localization",
+    "glass_nav._poses": "geometry",
     "glass_nav._distance_field": "hypotheses sensing",
     "glass_nav._grid": "hypotheses sensing",
     "glass_nav._mrpt_io": "recording world",

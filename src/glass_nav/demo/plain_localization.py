@@ -13,6 +13,7 @@ from typing import Dict, NamedTuple, Optional, Protocol
 import numpy as np
 
 from glass_nav.geometry import angles, se2
+from glass_nav.localization import initial_pose
 from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.localization.particle_filter import motion, pose_estimate, resampling
 from glass_nav.localization.particle_filter.resampling import ParticleCount
@@ -130,7 +131,9 @@ class PlainMcl:
 
     def set_pose(self, map_from_base: np.ndarray, covariance: np.ndarray) -> None:
         """Start over around a pose (3,) with a covariance (3, 3)."""
-        self._particles = self._rng.multivariate_normal(map_from_base, covariance, self._count.max_particles)
+        # not rng.multivariate_normal: the signs of its singular vectors depend on the LAPACK of the machine
+        pose, _, deviations = initial_pose.checked(map_from_base, covariance)
+        self._particles = pose + self._rng.standard_normal((self._count.max_particles, 3)) @ deviations.T
         self._odom_from_base = None
 
     def request_update(self) -> None:
@@ -146,7 +149,7 @@ class PlainMcl:
             weights = resampling.normalised(self._model.log_weights(self._particles, scan))
             best = pose_estimate.of(self._particles, weights)
             drawn = resampling.low_variance(weights, self._count.max_particles, self._rng)
-            enough = resampling.enough_particles(self._particles[np.unique(drawn)], self._count)
+            enough = resampling.enough_particles(self._particles[drawn], self._count)
             self._particles = self._particles[resampling.low_variance(weights, enough, self._rng)]
             self._map_from_odom = se2.compose(best.map_from_base, se2.inverse(odom_from_base))
             self._odom_from_base, self._update_due = np.array(odom_from_base, float), False

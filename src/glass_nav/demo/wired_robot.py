@@ -65,12 +65,12 @@ class WiredRobot:
             decisions.Command: self._hear_command,
             decisions.TraversalReport: self._hear_traversal,
             decisions.MeetpointReport: self._hear_meetpoint,
-            decisions.SearchRestart: lambda _: self.restart_search(),
             decisions.DriveStatus: self._hear_driver,
             decisions.GoalEnd: self.ends.append,
             search_session.SearchStatus: self._hear_search,
             search_session.Turn: self._hear_turn,
             search_session.InitialPose: self._hear_pose,
+            decisions.VisitReport: self._hear_visits,
             decisions.Feedback: lambda _: None,
             LogLine: lambda _: None,
         }
@@ -165,6 +165,10 @@ class WiredRobot:
         scan = self._scans.get(arrival.stamp_ns) if self.session.uses_scans else None
         meetpoint = replace(arrival.meetpoint, odom_from_base=arrival.odom_from_base, scan=scan)
         self._tell(self.session.meetpoint(meetpoint))
+
+    def _hear_visits(self, report: decisions.VisitReport) -> None:
+        node, r_m = ([getattr(visit, name) for visit in report.visits] for name in ("node", "r_m"))
+        self._tell(self.session.node_visits(np.array(node), np.array(r_m)))
 
     def _hear_driver(self, status: decisions.DriveStatus) -> None:
         if status.phase == DriverPhase.FAILED:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import Optional, Union
+from typing import Optional, Tuple, Union
 
 import numpy as np
 
 from glass_nav.driving.edge_tracking.edge_driver import Arrival
+from glass_nav.driving.node_visits import NodeVisit
 from glass_nav.driving.tasks import Ending
 from glass_nav.log_line import LogLine
 from glass_nav.vocabulary import DriverPhase
@@ -31,7 +32,7 @@ class Command:
 
 @dataclass(frozen=True)
 class TraversalReport:
-    """The edge by which the robot came to a meetpoint; the report of that follows."""
+    """The edge by which the robot came to a meetpoint, or that it came along none; the report of that follows."""
 
     arrival: Arrival  # its traversal is not None
 
@@ -76,8 +77,11 @@ class GoalEnd:
 
 
 @dataclass(frozen=True)
-class SearchRestart:
-    """The search is to begin anew: it cannot follow the robot to where it stands."""
+class VisitReport:
+    """What the robot saw of the nodes that it passed on the way to a goal."""
+
+    visits: Tuple[NodeVisit, ...]
+    stamp_ns: int  # of the last scan
 
 
-Decision = Union[Command, TraversalReport, MeetpointReport, DriveStatus, Feedback, GoalEnd, SearchRestart, LogLine]
+Decision = Union[Command, TraversalReport, MeetpointReport, DriveStatus, Feedback, GoalEnd, VisitReport, LogLine]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import logging
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import List, Optional
 
 import numpy as np
@@ -23,14 +23,15 @@ from glass_nav.driving.decisions import (
     Feedback,
     GoalEnd,
     MeetpointReport,
-    SearchRestart,
     TraversalReport,
+    VisitReport,
 )
 from glass_nav.driving.driver_params import DriveParams
 from glass_nav.driving.edge_names import rank_from_words
 from glass_nav.driving.edge_tracking.edge_driver import Arrival, EdgeDriver
 from glass_nav.driving.input_watch import InputNames, InputWatch, Odometry
 from glass_nav.driving.meetpoint_stay import MeetpointStay
+from glass_nav.driving.node_visits import VisitWatch
 from glass_nav.driving.place_goals import PlaceGoal, PlaceTasks, TaskTo
 from glass_nav.driving.seek_policy import SeekPolicy
 from glass_nav.driving.tasks import EdgeTask, Ending, GoTask, Moment, Task
@@ -38,6 +39,7 @@ from glass_nav.health import Health, Level
 from glass_nav.log_line import LogLine
 from glass_nav.sensing.scan import Scan
 from glass_nav.topology.atlas.atlas import Atlas
+from glass_nav.topology.observations import NOT_FOLLOWED
 from glass_nav.vocabulary import SEARCH_IS_OVER, DriverPhase, LocalizationState, Outcome, SearchState
 from glass_nav.world.grid_map import GridMap
 
@@ -86,6 +88,7 @@ class Driver:
         self._edge = EdgeDriver(p.edge)
         self._places = PlaceTasks(p, self._edge, names.map_frame, atlas, backend)
         self._inputs = InputWatch(p.rules, names)
+        self._visits = None if atlas is None or not p.rules.report_visits else VisitWatch(atlas)
         self._stay = MeetpointStay()
         self._seeking = SeekPolicy(p.rules.seek_attempts)
         self._search: Optional[SearchState] = None
@@ -166,6 +169,10 @@ class Driver:
         if not self._inputs.take_scan(scan.stamp_ns):
             return False
         self._edge.see(scan, odom_from_base)
+        if self._visits is not None and self._job is not None and isinstance(self._job.task, GoTask):
+            map_from_base = self._inputs.map_from_base_at(odom_from_base)
+            if map_from_base is not None and self._inputs.localization == LocalizationState.LOCALIZED:
+                self._visits.see(scan, odom_from_base, map_from_base)
         return True
 
     def search_reports(self, state: SearchState) -> List[Decision]:
@@ -391,6 +398,9 @@ class Driver:
             self._say(DriverPhase.FAILED, f"{job.name}: {ending.reason}")
         if job.action is not None:
             self._end_goal(job.action, ending, job.travelled_m, arrival)
+        visits = [] if self._visits is None else self._visits.take()
+        if visits:
+            self._decisions.append(VisitReport(tuple(visits), self._inputs.scan_ns))
 
     def _end_goal(
         self, action: Action, ending: Ending, travelled_m: float = 0.0, arrival: Optional[Arrival] = None
@@ -408,11 +418,8 @@ class Driver:
         if arrival.traversal is not None:
             self._decisions.append(TraversalReport(arrival))
         elif self._search_is(*IN_SEARCH):
-            self._log(
-                "the search cannot follow the robot to this meetpoint: it is asked to begin anew", logging.WARNING
-            )
-            self._decisions.append(SearchRestart())
-            return  # it will wait for a meetpoint then
+            self._log("it came to this meetpoint along no edge: the search goes on by dead reckoning", logging.WARNING)
+            self._decisions.append(TraversalReport(replace(arrival, traversal=NOT_FOLLOWED)))
         self._report(arrival)
 
     def _report(self, arrival: Arrival) -> None:

@@ -94,6 +94,10 @@ class InputWatch:
             return None
         return se2.compose(self._map_from_odom, self.odometry.odom_from_base)
 
+    def map_from_base_at(self, odom_from_base: np.ndarray) -> Optional[np.ndarray]:
+        """(3,) where the robot is in the map where odometry has it at that pose (3,); None: not localized."""
+        return None if self._map_from_odom is None else se2.compose(self._map_from_odom, odom_from_base)
+
     def prefers_surfaces(self, now_s: float) -> bool:
         """Whether scan_surfaces is to be used in place of scan: only a robot that knows its pose sees glass in it.
 

@@ -8,7 +8,9 @@ field is the likelihood field of sensing/distance_field.py.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import List, Sequence
 
 import numpy as np
 
@@ -94,12 +96,17 @@ def median_distance(field: DistanceField, points_m: np.ndarray, pose: np.ndarray
 
 def distinct(aligned: Alignment) -> Alignment:
     """At most 4 different places that fit about as well as the best, best first."""
-    chosen: "list[int]" = []
-    for index in np.argsort(-aligned.fit):
-        off = aligned.poses[chosen] - aligned.poses[index]
-        same = (np.hypot(off[:, 0], off[:, 1]) < _SAME_M) & (np.abs(angles.wrap(off[:, 2])) < _SAME_RAD)
-        if not same.any() and aligned.fit[index] > _AS_GOOD * aligned.fit.max():
-            chosen.append(int(index))
-        if len(chosen) == _KEEP:
+    poses, fits = aligned.poses.tolist(), aligned.fit.tolist()
+    least = _AS_GOOD * max(fits, default=0.0)
+    chosen: List[int] = []
+    for index in np.argsort(-aligned.fit).tolist():
+        if not fits[index] > least or len(chosen) == _KEEP:
             break
+        if not any(_is_same_place(poses[index], poses[other]) for other in chosen):
+            chosen.append(index)
     return Alignment(aligned.poses[chosen], aligned.information[chosen], aligned.fit[chosen])
+
+
+def _is_same_place(pose: Sequence[float], other: Sequence[float]) -> bool:
+    apart_m = math.hypot(pose[0] - other[0], pose[1] - other[1])
+    return apart_m < _SAME_M and abs(angles.wrap(pose[2] - other[2])) < _SAME_RAD

@@ -159,7 +159,7 @@ class DocumentLocalizer:
     def _resample(self) -> None:
         limits = self._params.count
         drawn = resampling.low_variance(self._weights, limits.max_particles, self._rng)
-        count = resampling.enough_particles(self._particles[np.unique(drawn)], limits)
+        count = resampling.enough_particles(self._particles[drawn], limits)
         self._particles = self._particles[resampling.low_variance(self._weights, count, self._rng)]
         self._weights = np.full(count, 1.0 / count)
 

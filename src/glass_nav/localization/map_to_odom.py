@@ -2,8 +2,8 @@
 
 Navigation asks tf for "now" and does not wait. So the last correction is sent again the moment a scan arrives, before the
 filter has worked on it, and the new correction follows when it is computed. Each transform is stamped ahead of its scan
-by `transform_tolerance`, as AMCL's are, and by more while scans arrive later than that: on a busy machine, or from a slow
-lidar. A stamp is never sent twice, so a correction holds from the time on up to which transforms were sent already, and
+by `transform_tolerance`, as AMCL's are, and by more where that ends before the next scan has arrived and its transform
+has reached the listeners: at ten scans a second and a tolerance of 0.1 s, on a busy machine, or from a slow lidar. A stamp is never sent twice, so a correction holds from the time on up to which transforms were sent already, and
 never moves one that somebody may have used.
 """
 
@@ -16,9 +16,9 @@ import numpy as np
 
 _STEP_NS = 1_000  # between two stamps: Python's tf2 reads them as doubles, whose steps are 240 ns wide today
 _JUMP_NS = 1_000_000_000  # stamps that go back by more are of a clock that was set back
-_LATE_NS = 20_000_000  # scans that arrive so long after the last transform ended leave tf without an answer
-_LATEST_NS = 500_000_000  # later ones are not expected again: the scans had stopped
-_LATE_KEPT = 0.998  # how much of what was added is left at the next scan
+_MARGIN_NS = 50_000_000  # wanted from the arrival of a scan to the end of the last transform: the next may be late
+_LATEST_NS = 500_000_000  # scans that come later than that are not expected again: they had stopped
+_ADDED_KEPT = 0.998  # how much of what was added is left at the next scan
 _AHEAD_NS = 500_000_000  # a scan stamped further in the future has a wrong clock, and tf would keep its stamp
 
 
@@ -37,7 +37,7 @@ class MapToOdom:
         self._map_from_odom: Optional[np.ndarray] = None
         self._last_scan_ns = 0
         self._last_sent_ns = 0
-        self._extra_ns = 0.0  # added to the tolerance
+        self._added_ns = 0.0  # added to the tolerance
 
     def start_over(self) -> None:
         """The pose is no longer known, and the clock may have been set back."""
@@ -48,11 +48,10 @@ class MapToOdom:
         """A scan has come: the last correction again, if there is one. Not for a scan older than another."""
         if self._map_from_odom is None or not self._last_scan_ns < scan_ns <= now_ns + _AHEAD_NS:
             return None
-        self._extra_ns *= _LATE_KEPT
-        late_ns = now_ns - self._last_sent_ns
-        least_ns = 0 if self._extra_ns > _LATE_NS else _LATE_NS
-        if least_ns < late_ns < _LATEST_NS:
-            self._extra_ns += late_ns + _LATE_NS
+        self._added_ns *= _ADDED_KEPT
+        left_ns = self._last_sent_ns - now_ns
+        if -_LATEST_NS < left_ns < _MARGIN_NS // 2:
+            self._added_ns += _MARGIN_NS - left_ns
         return self._stamped(scan_ns, tolerance_ns, self._map_from_odom)
 
     def corrected(self, scan_ns: int, map_from_odom: np.ndarray, tolerance_ns: int) -> Optional[StampedTransform]:
@@ -66,6 +65,6 @@ class MapToOdom:
         if self._last_scan_ns == 0 and scan_ns + tolerance_ns < self._last_sent_ns - _JUMP_NS:
             self._last_sent_ns = 0
         self._last_scan_ns = max(scan_ns, self._last_scan_ns)
-        ahead_ns = tolerance_ns + min(round(self._extra_ns), _LATEST_NS)
+        ahead_ns = tolerance_ns + min(round(self._added_ns), _LATEST_NS)
         self._last_sent_ns = max(scan_ns + ahead_ns, self._last_sent_ns + _STEP_NS)
         return StampedTransform(self._last_sent_ns, map_from_odom)

@@ -171,4 +171,5 @@ def spread_evenly(usable: np.ndarray, count: int) -> np.ndarray:
     beams = np.flatnonzero(usable > 0)
     if len(beams) <= count:
         return beams
-    return beams[np.linspace(0, len(beams) - 1, count).round().astype(int)]
+    steps = np.arange(count) * ((len(beams) - 1) / max(count - 1, 1))
+    return beams[np.rint(steps).astype(int)]

@@ -76,7 +76,7 @@ class Traversal:
     """An edge that the robot followed from one meetpoint to the next; by dead reckoning. NaN: not measured."""
 
     rank: int  # of the edge at the meetpoint that it left
-    length_m: float  # travelled
+    length_m: float  # travelled; NaN: along no edge, as after one that was blocked
     chord_m: float  # in a straight line
     sigma_length_m: float = 0.0  # 0: as the tolerances say
     sigma_chord_m: float = 0.0
@@ -88,8 +88,8 @@ class Traversal:
     def __post_init__(self) -> None:
         if self.rank < 0:
             raise ObservationError(f"edge traversal: rank must be >= 0, got {self.rank}")
-        if not (math.isfinite(self.length_m) and self.length_m > 0.0):
-            raise ObservationError(f"edge traversal: length must be finite and > 0 m, got {self.length_m}")
+        if not (math.isnan(self.length_m) or 0.0 < self.length_m < math.inf):
+            raise ObservationError(f"edge traversal: length must be finite and > 0 m, or NaN, got {self.length_m}")
         if not (math.isnan(self.chord_m) or (math.isfinite(self.chord_m) and self.chord_m >= 0.0)):
             raise ObservationError(f"edge traversal: chord must be >= 0 m, or NaN, got {self.chord_m}")
         for name in ("sigma_length", "sigma_chord"):
@@ -105,6 +105,14 @@ class Traversal:
             raise ObservationError(
                 f"edge traversal: segments must be finite rows of x1 y1 x2 y2, got shape {self.segments_m.shape}"
             )
+
+    @property
+    def was_followed(self) -> bool:
+        """Whether the robot came along an edge; else only dead reckoning knows its path from the last meetpoint."""
+        return not math.isnan(self.length_m)
+
+
+NOT_FOLLOWED = Traversal(0, UNKNOWN, UNKNOWN)
 
 
 def turn_name(rank: int, degree: int) -> str:

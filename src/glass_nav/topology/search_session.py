@@ -272,6 +272,25 @@ class SearchSession:
         self._unpaired_traversal = traversal, stamp_ns
         return self._pair("edge_traversal")
 
+    def node_visits(self, node: np.ndarray, r_m: np.ndarray) -> List[Decision]:
+        """A robot that knows its pose passed nodes (K,), and saw them at these distances (K,) from the obstacles.
+
+        Args:
+            node: of the atlas.
+            r_m: NaN where it passed a node without seeing it.
+        """
+        if self._localizer is None or not len(node):
+            return []
+        if node.min() < 0 or node.max() >= len(self._localizer.atlas.nodes):
+            text = (
+                f"node_visits refused: nodes must be 0 to {len(self._localizer.atlas.nodes) - 1}, got {node.tolist()}"
+            )
+            return [LogLine(text, logging.WARNING, often=True)]
+        missed, visits = np.isnan(r_m), self._localizer.atlas.visits
+        visits.add_nodes(node[~missed], r_m[~missed])
+        visits.add_misses(node[missed])
+        return self._save_visits(self._localizer)
+
     def map_served(self, grid_map: GridMap, name: str) -> List[Decision]:
         """A map is served: it explains scans from now on, and the atlas must be made from it.
 
@@ -487,6 +506,9 @@ class SearchSession:
     def _count_visits(self, localizer: AtlasLocalizer) -> List[Decision]:
         """What was measured on the path that is confirmed, into the statistics of the atlas and its file."""
         localizer.count_visits(localizer.atlas.visits)
+        return self._save_visits(localizer)
+
+    def _save_visits(self, localizer: AtlasLocalizer) -> List[Decision]:
         if not self._p.visits_file:
             return []
         try:

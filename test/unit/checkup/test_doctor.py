@@ -74,8 +74,11 @@ def named(tmp_path):
     return found
 
 
-def short(records: List[faults.Record], count: int = 45) -> List[faults.Record]:
-    """The records until so many scans: enough for what every message shows."""
+FOR_MESSAGES, FOR_A_DRIVE = 45, 350  # scans: enough for what every message shows, and for what a drive shows
+
+
+def short(records: List[faults.Record], count: int = FOR_MESSAGES) -> List[faults.Record]:
+    """The records until so many scans."""
     seen = np.cumsum([record[0] == "/scan" for record in records])
     return [record for record, scan in zip(records, seen) if scan <= count]
 
@@ -262,7 +265,7 @@ def test_a_fault_that_every_message_shows_is_named(request, named, which, name, 
 @pytest.mark.parametrize("name, change, also", ON_THE_WAY, ids=[name for name, _, _ in ON_THE_WAY])
 def test_a_fault_that_the_drive_shows_is_named(good, named, name, change, also):
     records, grid_map = good
-    found = named(change()(records), grid_map if name in NEED_A_MAP else None)
+    found = named(change()(short(records, FOR_A_DRIVE)), grid_map if name in NEED_A_MAP else None)
     assert name in found
     assert found <= {name} | also
 

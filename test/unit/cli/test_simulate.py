@@ -216,7 +216,8 @@ def test_bad_input_is_one_line_and_exit_code_3(run, hall, tmp_path):
 def test_wrong_usage_is_exit_code_2(run, tmp_path, options, text):
     code, _, err = run(*options)
     assert code == 2
-    assert err.splitlines()[-1] == f"glass_nav simulate: {text}"
+    told = err.splitlines()[-1].replace("'", "")  # argparse quotes the choices of an option before Python 3.12 only
+    assert told == f"glass_nav simulate: {text}".replace("'", "")
     assert not (tmp_path / "run.bag").exists()
 
 

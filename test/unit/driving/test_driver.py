@@ -19,8 +19,8 @@ from glass_nav.driving.decisions import (
     Feedback,
     GoalEnd,
     MeetpointReport,
-    SearchRestart,
     TraversalReport,
+    VisitReport,
 )
 from glass_nav.driving.driver import Driver
 from glass_nav.driving.driver_params import DriveParams, DriverRules
@@ -238,14 +238,14 @@ def test_a_search_that_it_does_not_drive_for_hears_of_it_once():
 
 
 @pytest.mark.long_run
-def test_a_search_that_cannot_follow_it_to_a_meetpoint_is_asked_to_begin_anew_and_then_hears_of_it():
+def test_a_search_hears_of_a_meetpoint_to_which_the_robot_came_along_no_edge():
     robot = Robot()
     robot.driver.search_reports(SearchState.TENTATIVE)
     robot.run(lambda: robot.phase == DriverPhase.ARRIVED)
-    assert len(robot.all(SearchRestart)) == 1 and not robot.all(MeetpointReport)
-    assert "the search cannot follow the robot to this meetpoint: it is asked to begin anew" in lines(robot.decided)
-    robot.driver.search_reports(SearchState.WAITING)
-    assert len(only(robot.run_for(0.2), MeetpointReport)) == 1
+    (edge,), (meetpoint,) = robot.all(TraversalReport), robot.all(MeetpointReport)
+    assert edge.arrival.traversal is not None and not edge.arrival.traversal.was_followed
+    assert edge.arrival.stamp_ns == meetpoint.arrival.stamp_ns
+    assert "it came to this meetpoint along no edge: the search goes on by dead reckoning" in lines(robot.decided)
 
 
 def test_without_an_atlas_to_search_in_it_says_so_and_stands_until_a_search_waits():
@@ -422,6 +422,9 @@ def test_a_place_of_the_map_is_driven_to():
     assert end.action == Action.GOTO_NODE and end.ending == Ending(Outcome.SUCCEEDED, "it stands at the goal")
     assert np.hypot(*(end.map_from_base[:2] - atlas.nodes.position_m[node])) < 0.15
     assert end.stamp_ns > 0 and robot.phase == DriverPhase.IDLE
+    (report,) = robot.all(VisitReport)
+    junction = int(np.hypot(*(atlas.nodes.position_m - [6.0, 1.0]).T).argmin())
+    assert [visit.node for visit in report.visits] == [junction] and report.stamp_ns > 0
 
 
 def test_a_goal_in_the_map_needs_a_pose_there_but_waits_for_a_localization_that_fell_silent():

@@ -55,10 +55,10 @@ def cross() -> Building:
 def drive(simulation: Simulation, driver: EdgeDriver, task: EdgeTask) -> None:
     """Until the task is over."""
     command = np.zeros(3)
-    for _ in range(1500):
+    for _ in range(750):
         frame = simulation.look()
         driver.see(frame.scan, frame.odom_from_base)
-        for _ in range(2):
+        for _ in range(4):
             command = task.step(Moment(simulation.reading.odom_from_base, None, command, CONTROL_S))
             simulation.move(CONTROL_S, command)
             assert not simulation.blocked, "it ran into a wall"
@@ -73,7 +73,7 @@ def test_a_robot_in_a_cross_of_four_equal_arms_is_ambiguous_and_lists_the_four_p
     building = cross()
     grid_map = building_map.draw(building)
     atlas, _ = atlas_builder.build(grid_map, "cross", "cross")
-    simulation = Simulation(building, lidar.preset("sensitive"), seed=3)
+    simulation = Simulation(building, lidar.preset("sensitive"), seed=3, scan_rate_hz=5.0)
     driver, limits = EdgeDriver(), BaseLimits()
     localizer = AtlasLocalizer(atlas, SearchParams(), ScanExplanation(grid_map))
     rank: Optional[int] = None

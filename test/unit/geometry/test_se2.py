@@ -39,3 +39,22 @@ def test_one_pose_composes_with_many():
     one = np.array([1.0, 2.0, 0.3])
     np.testing.assert_allclose(se2.compose(one, many)[7], se2.compose(one, many[7]))
     np.testing.assert_allclose(se2.compose(many, one)[7], se2.compose(many[7], one))
+
+
+@pytest.mark.parametrize("shapes", [((4, 1), (5,)), ((5,), (4, 1)), ((2, 1, 3), (4, 1)), ((4, 5), (4, 5)), ((), (0,))])
+def test_leading_axes_broadcast_as_numpys_do(shapes):
+    rng = np.random.default_rng(0)
+    poses, points = rng.normal(0.0, 2.0, (*shapes[0], 3)), rng.normal(0.0, 2.0, (*shapes[1], 2))
+    shape = np.broadcast(poses[..., 0], points[..., 0]).shape
+    found = se2.transform_points(poses, points)
+    assert found.shape == (*shape, 2)
+    for index in np.ndindex(shape):
+        pose, point = np.broadcast_to(poses, (*shape, 3))[index], np.broadcast_to(points, (*shape, 2))[index]
+        np.testing.assert_allclose(found[index], (as_matrix(pose) @ [*point, 1.0])[:2], atol=1e-12)
+
+
+def test_shapes_that_do_not_fit_are_refused():
+    with pytest.raises(ValueError, match="broadcast"):
+        se2.compose(np.zeros((2, 3)), np.zeros((4, 3)))
+    with pytest.raises(ValueError, match="last axis must have 3"):
+        se2.inverse(np.zeros(2))

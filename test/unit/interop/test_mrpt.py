@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import sys
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
@@ -12,6 +14,8 @@ from glass_nav.interop import mrpt as interop
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import GridMap
+
+REPO = Path(__file__).parents[3]
 
 
 class Grid:
@@ -71,10 +75,9 @@ STAND_IN = SimpleNamespace(
 )
 
 
-def stand_in(monkeypatch, found=True):
+def stand_in(monkeypatch):
     package, module = ModuleType("mrpt"), ModuleType("mrpt.pymrpt")
-    if found:
-        module.mrpt = STAND_IN
+    module.mrpt = STAND_IN
     monkeypatch.setitem(sys.modules, "mrpt", package)
     monkeypatch.setitem(sys.modules, "mrpt.pymrpt", module)
 
@@ -133,14 +136,14 @@ def test_a_pose_comes_back(bindings):
 
 
 def test_who_lacks_the_bindings_is_told_what_to_install(monkeypatch):
-    stand_in(monkeypatch, found=False)
+    monkeypatch.setitem(sys.modules, "mrpt.pymrpt", None)  # as if it could not be found
     with pytest.raises(ImportError, match=r"apt install python3-pymrpt \(Debian 13\) or ros-noetic-python-mrpt"):
         interop.bindings()
 
 
 @pytest.mark.parametrize("backend", ["exact", "mrpt"])
 def test_mrpt_simulates_the_scan_that_we_cast(backend):
-    """The tutorial of doc/mrpt.md; their scan holds samples up to one step late."""
+    """Their scan holds samples up to one step late."""
     pytest.importorskip("mrpt.pymrpt", reason="the official bindings are not installed")
     mrpt, world, pose = interop.bindings(), room(), np.array([1.0, 3.5, 0.3])
     observation = mrpt.obs.CObservation2DRangeScan()
@@ -149,3 +152,12 @@ def test_mrpt_simulates_the_scan_that_we_cast(backend):
     theirs = interop.scan_from_mrpt(observation, 0)
     ours_m = RayCaster(world, backend).cast(pose[None], theirs.angles_rad, 16.0)[0]
     assert np.median(np.abs(theirs.ranges_m - ours_m)) < 0.05
+
+
+def test_the_tutorial_prints_what_it_says(capsys, monkeypatch):
+    pytest.importorskip("mrpt.pymrpt", reason="the official bindings are not installed")
+    monkeypatch.chdir(REPO)
+    (code,) = re.findall(r"```python\n(.*?)```", (REPO / "doc" / "mrpt.md").read_text(encoding="utf-8"), re.DOTALL)
+    exec(code, {})
+    beams, median_m = capsys.readouterr().out.split()
+    assert int(beams) == 177 and float(median_m) == pytest.approx(0.024, abs=0.0005)

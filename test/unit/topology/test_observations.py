@@ -63,7 +63,7 @@ def test_a_meetpoint_that_cannot_be_is_refused(fields: Dict[str, Any], line: str
     "fields, line",
     [
         ({"rank": -1}, "rank must be >= 0, got -1"),
-        ({"length_m": 0.0}, "length must be finite and > 0 m, got 0.0"),
+        ({"length_m": 0.0}, "length must be finite and > 0 m, or NaN, got 0.0"),
         ({"chord_m": -0.5}, "chord must be >= 0 m, or NaN, got -0.5"),
         ({"chord_m": math.inf}, "chord must be >= 0 m, or NaN, got inf"),
         ({"sigma_length_m": math.nan}, "sigma_length must be finite and >= 0 m, got nan"),

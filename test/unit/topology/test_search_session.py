@@ -290,6 +290,20 @@ def test_the_statistics_of_the_atlas_are_saved(tmp_path: Path) -> None:
     assert atlas_file.load(path).visits.node_count.tolist() == [2, 1, 0, 0]
 
 
+def test_nodes_passed_on_the_way_to_a_goal_go_into_the_statistics(tmp_path: Path) -> None:
+    path = tmp_path / "visits.json"
+    session = started(visits_file=str(path))
+    assert session.node_visits(np.array([2, 0, 2]), np.array([1.4, np.nan, 1.6])) == []
+    visits = atlas_file.load(path).visits
+    assert visits.node_count[2] == 2 and visits.node_r_mean_m[2] == pytest.approx(1.5)
+    assert visits.node_missed[0] == 1 and visits.node_missed[2] == 0
+    assert session.node_visits(np.zeros(0, np.int64), np.zeros(0)) == []
+    assert texts(session.node_visits(np.array([99]), np.ones(1))) == [
+        "node_visits refused: nodes must be 0 to 3, got [99]"
+    ]
+    assert made().node_visits(np.array([0]), np.ones(1)) == []  # it has no atlas yet
+
+
 def test_the_statistics_that_were_saved_are_used_again(tmp_path: Path) -> None:
     path = tmp_path / "visits.json"
     for count in (1, 2, 3):

@@ -1,20 +1,27 @@
-/// Which particles are one hypothesis? The formulation is in localization/particle_filter/pose_estimate.py.
+/// Particles -> the cluster with the most weight. The formulation is in localization/particle_filter/pose_estimate.py.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
+
+#include "../poses/matrix3.hpp"
+#include "pose_bins.hpp"
 
 namespace glass_nav {
 
-/// Bins of a histogram over poses: x, y and yaw [m, m, rad]. Yaw goes round in so many bins.
-struct PoseBins {
-  double x_m, y_m, yaw_rad;
-  int yaw_bins;
+struct Moments {
+  Vector3 mean;
+  Matrix3 covariance;  // over x [m], y [m], yaw [rad]
 };
 
-/// Writes the cluster of each pose: filled bins that touch, also at a corner, are one cluster.
-/// @param poses  count * 3, row by row: x [m], y [m], yaw [rad], all finite
-/// @param label  count; clusters are numbered by their first bins in x, then y, then yaw
-void label_clusters(const double* poses, std::size_t count, const PoseBins& bins, std::int32_t* label);
+/// Of weighted poses, yaw on the circle. members: those that count; null: all.
+Moments moments_of(const double* poses, const double* weights, std::size_t count, const bool* members);
+
+/// Marks the members of the cluster with the most weight, and returns the weight. Bins that touch are one cluster; those
+/// of yaw go round.
+double mark_best_cluster(const double* poses, const double* weights, std::size_t count, const BinSize& size,
+                         std::int64_t yaw_bins, bool* members);
 
 }  // namespace glass_nav

@@ -146,6 +146,8 @@ class EdgeDriver:
         """Take in a scan, with odometry's pose (3,) at its stamp; in any phase."""
         near = self._near
         near.see(scan, odom_from_base)
+        if self._leg.looking and self._stands:
+            self._leg.scans.append(scan)
         if self._leg.phase in _DRIVING and self._leg.sweep_rad <= 0.0 and (near.is_due or near.graph is None):
             self._think(near.renew_graph())
         elif near.is_due:
@@ -261,11 +263,15 @@ class EdgeDriver:
 
     # -- phases
 
+    @property
+    def _stands(self) -> bool:
+        return float(np.abs(self._velocity).max()) < 0.02
+
     def _think(self, graph: LocalGraph) -> None:
         """Once for each graph."""
         leg = self._leg
         if leg.looking:
-            if float(np.abs(self._velocity).max()) < 0.02:
+            if self._stands:
                 node = homing.look_again(leg, self._near, graph)
                 if node is not None:
                     self._arrive(node)

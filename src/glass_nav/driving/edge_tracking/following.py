@@ -15,7 +15,7 @@ from glass_nav.driving.edge_tracking.surroundings import Surroundings
 from glass_nav.vocabulary import DriverPhase
 
 LOOKAHEAD_M = 0.35
-_TO_GRAPH_M = 4.0  # the graph may be so far away at the beginning
+_TO_GRAPH_M = 15.0  # the graph may be so far away at the beginning, beside the wall of a hall
 _LOST_LINE_S = 3.0  # driven on along the last line, without a graph that has it
 
 
@@ -28,6 +28,9 @@ def follow(leg: Leg, near: Surroundings, graph: LocalGraph) -> Optional[str]:
             if _join_graph(leg, near, graph)
             else _without_line(leg, near, "no edge is near that can be reached straight on")
         )
+    if leg.way.nearest(here) < leg.join_m - LOOKAHEAD_M:
+        return None
+    leg.join_m = 0.0
     found = line_now(leg, graph, leg.way, here)
     if found is None:
         return _without_line(leg, near, "the edge is no longer seen")
@@ -60,6 +63,7 @@ def _join_graph(leg: Leg, near: Surroundings, graph: LocalGraph) -> bool:
         doubtful = graph.graph.doubt_m[node] > DOUBT_M
         ways.append((doubtful, len(way), way))  # its points are evenly apart
     leg.way = line(np.concatenate([here[None], min(ways, key=lambda found: found[:2])[2]]))
+    leg.join_m = float(np.hypot(*(graph.point(foot) - here)))
     leg.reason = "to the nearest meetpoint"
     return True
 

@@ -11,16 +11,19 @@ from typing import Optional
 import numpy as np
 from scipy.spatial import cKDTree
 
-from glass_nav.driving.edge_tracking import edge_report
+from glass_nav.driving.edge_tracking import edge_report, moving_things
 from glass_nav.driving.edge_tracking.edge_line import line_now
 from glass_nav.driving.edge_tracking.edge_report import Node
 from glass_nav.driving.edge_tracking.leg import BEHIND_M, DOUBT_M, SAME_NODE_M, Leg, line
 from glass_nav.driving.edge_tracking.local_graph import LocalGraph
 from glass_nav.driving.edge_tracking.surroundings import Surroundings
+from glass_nav.geometry import angles, se2
 from glass_nav.vocabulary import DriverPhase
 
 _LOOKS = 4  # graphs that must agree on a meetpoint: over a second, people walk on
 _MAX_LOOKS = 9  # then it is none
+_SAME_WAY_RAD = 0.2  # an obstacle that is not seen any more was what moves now, if it moves behind it
+_OBSTACLE_M = 0.3  # what is no farther away than r and this is one of the obstacles of a node
 
 
 def begin(leg: Leg, near: Surroundings, target_m: np.ndarray, way_m: np.ndarray) -> None:
@@ -31,12 +34,12 @@ def begin(leg: Leg, near: Surroundings, target_m: np.ndarray, way_m: np.ndarray)
     if leg.way is None:
         leg.way = line(np.stack([near.pose[:2], target_m]))
     leg.blocked_s = 0.0
-    leg.looking, leg.looks, leg.nodes = False, 0, []
+    leg.looking, leg.looks, leg.nodes, leg.scans = False, 0, [], []
 
 
 def begin_looking(leg: Leg) -> None:
     """The robot is there: brake, and look."""
-    leg.looking, leg.looks, leg.nodes = True, 0, []
+    leg.looking, leg.looks, leg.nodes, leg.scans = True, 0, [], []
     leg.reason = "looking whether this is a meetpoint"
 
 
@@ -69,7 +72,7 @@ def look_again(leg: Leg, near: Surroundings, graph: LocalGraph) -> Optional[Node
     if node is not None:
         leg.nodes.append(_node_of(leg, near, graph, node))
         latest = [found for found in leg.nodes if found.degree == leg.nodes[-1].degree]
-        if len(latest) >= _LOOKS:
+        if len(latest) >= _LOOKS and not _something_moves_at(leg, near, latest[-1]):
             if graph.graph.doubt_m[node] > DOUBT_M and not leg.swept:
                 leg.swept = True
                 leg.look_around()
@@ -79,6 +82,18 @@ def look_again(leg: Leg, near: Surroundings, graph: LocalGraph) -> Optional[Node
     if leg.looks >= _MAX_LOOKS and not _turn_back_to_end(leg, near, graph):
         _dismiss(leg)
     return None
+
+
+def _something_moves_at(leg: Leg, near: Surroundings, node: Node) -> bool:
+    """Whether one of the obstacles that make the node was seen to move, or to leave: somebody walks there."""
+    moved = se2.transform_points(near.pose, moving_things.moved_m(leg.scans)) - node.position_m
+    reach_m = node.r_m + _OBSTACLE_M
+    if (np.hypot(*moved.T) < reach_m).any():
+        return True
+    left = near.unseen_walls_m(near.pose) - node.position_m  # the map forgets slowly
+    left = left[np.hypot(*left.T) < reach_m]
+    off_rad = angles.wrap(np.arctan2(left[:, 1], left[:, 0])[:, None] - np.arctan2(moved[:, 1], moved[:, 0]))
+    return bool((np.abs(off_rad) < _SAME_WAY_RAD).any())
 
 
 def _turn_back_to_end(leg: Leg, near: Surroundings, graph: LocalGraph) -> bool:
@@ -113,6 +128,6 @@ def _node_of(leg: Leg, near: Surroundings, graph: LocalGraph, node: int) -> Node
     return Node(
         position,
         float(found.r_m[node]),
-        edge_report.sigma_r_m(float(found.spread_m[node]), float(found.doubt_m[node])),
+        edge_report.sigma_r_m(float(found.spread_m[node]), math.hypot(float(found.doubt_m[node]), near.coarse_m)),
         edge_report.ranked(branches, past),
     )

@@ -11,6 +11,7 @@ from glass_nav.driving.edge_tracking.edge_report import Node, Trace
 from glass_nav.driving.edge_tracking.local_graph import LocalGraph
 from glass_nav.geometry import polyline
 from glass_nav.geometry.polyline import Polyline
+from glass_nav.sensing.scan import Scan
 from glass_nav.vocabulary import DriverPhase, Outcome
 
 SAME_NODE_M = 0.3  # a node moves by no more from one graph to the next
@@ -32,6 +33,7 @@ class Leg:
     way: Optional[Polyline] = None  # that it drives along; None: none known yet
     trace: Optional[Trace] = None  # of the edge so far; None: no edge that began at a meetpoint
     rank: int = 0  # by which the edge left
+    join_m: float = 0.0  # so much of the way leads to the graph, along no edge
     near_start_m: float = SAME_NODE_M  # nodes so near to its beginning are that
     swept: bool = False  # it has turned round once to see more
     sweep_rad: float = 0.0  # what is left of that turn
@@ -42,6 +44,7 @@ class Leg:
     looking: bool = False  # it stands there, or brakes, and looks
     looks: int = 0  # graphs since then
     nodes: List[Node] = field(default_factory=list)  # what was there in these
+    scans: List[Scan] = field(default_factory=list)  # seen while it stands there
     dismissed_m: List[np.ndarray] = field(default_factory=list)  # (2,) places that turned out to be no nodes
 
     def follow(self, node: Node, rank: int) -> None:

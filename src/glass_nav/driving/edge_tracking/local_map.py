@@ -15,11 +15,12 @@ The window is bound to the robot and moves in whole cells; poses are odom_from_b
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Iterator, List, Optional, Tuple
 
 import numpy as np
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from glass_nav.geometry import angles, se2
 from glass_nav.params import number
@@ -30,6 +31,9 @@ FREE, OCCUPIED = 0, 100
 _FORGET_AT = 60  # beams counted in a cell from one direction: halved, so that what is new counts
 _BEFORE_M = 0.05  # so near in front of where a beam ended it proves nothing: noise, and the cell's own size
 _MIN_PIECE = 4  # cells of a pane that give a line
+_LOOK_PAST_MIDDLE = 1.2  # times r from the middle of a room, r from its walls: these, and a little more
+_SHOWS_PAST_MIDDLE = 1.6  # times r: the ways out as well
+_CLIMB_M, _CLIMBS, _CLIMB_GAIN = 0.5, 60, 0.2  # towards the middle of a room: steps, and what each gains
 _LOOK_PER_ROOM = 1.9  # of a meetpoint r from its obstacles all ways show that are longer than 1.6 r, and a little more
 
 
@@ -99,13 +103,12 @@ class LocalMap:
         edges = (np.arange(self._size) + 0.5) * cell_m
         x = self._first[0] * cell_m + edges[None, :] - laser[0]
         y = self._first[1] * cell_m + edges[:, None] - laser[1]
-        ended = self._ends(scan, laser)
-        passed = self._passes(scan, laser, x, y)
-        passed[ended[1]] = False
-        self._count(self._ended, *ended)
-        cells = np.flatnonzero(passed)
-        direction = np.arctan2(y[cells // self._size, 0], x[0, cells % self._size])
-        self._count(self._passed, self._direction(direction), cells)
+        ends = self._ends(scan, laser)
+        self._count(self._ended, np.unique(ends))
+        passes = self._passes(scan, laser, x, y)
+        ended = np.zeros(self._size**2, bool)
+        ended[ends % self._size**2] = True
+        self._count(self._passed, passes[~ended[passes % self._size**2]])
         body = (x + laser[0] - odom_from_base[0]) ** 2 + (y + laser[1] - odom_from_base[1]) ** 2
         self._stood |= body <= self._p.robot_radius_m**2
 
@@ -160,10 +163,8 @@ class LocalMap:
         and no larger, for what lies far away is known badly, behind glass worst of all.
         """
         whole, cell_m = self.grid(), self._p.resolution_m
-        rows, columns = np.nonzero(whole.occupied)
         at = np.asarray(point_m) / cell_m - self._first
-        room_m = float(np.hypot(columns + 0.5 - at[0], rows + 0.5 - at[1]).min(initial=np.inf)) * cell_m
-        reach_m = min(max(0.5 * self._p.narrow_window_m, _LOOK_PER_ROOM * room_m), 0.5 * self._p.window_m)
+        reach_m = min(self._reach_m(point_m), 0.5 * self._p.window_m)
         low = np.maximum(np.rint(at - reach_m / cell_m), 0).astype(np.int64)
         high = np.rint(at + reach_m / cell_m).astype(np.int64)
         return GridMap(
@@ -171,6 +172,70 @@ class LocalMap:
             cell_m,
             np.append((self._first + low) * cell_m, 0.0),
         )
+
+    def shows_room(self, point_m: np.ndarray) -> bool:
+        """Whether the window reaches as far around a point (2,) as its graph needs; also where nothing is known yet."""
+        if not self._seen:
+            return True
+        away_m, room_m = self._middle_of_room(np.asarray(point_m, float))[1:]
+        return away_m + _SHOWS_PAST_MIDDLE * room_m <= 0.5 * self._p.window_m
+
+    def _reach_m(self, point_m: np.ndarray) -> float:
+        """From a point (2,) to the edge of the square that grid_around() should show; inf: no wall is in the window.
+
+        It is that of the room and not only that of the point: beside the wall of a hall the middle matters, too.
+        """
+        here_m, away_m, room_m = self._middle_of_room(np.asarray(point_m, float))
+        return max(0.5 * self._p.narrow_window_m, _LOOK_PER_ROOM * here_m, away_m + _LOOK_PAST_MIDDLE * room_m)
+
+    def _middle_of_room(self, point_m: np.ndarray) -> Tuple[float, float, float]:
+        """Distance of a point (2,) from the walls, from the middle of the room that it is in, and of that from the walls."""
+        rows, columns = np.nonzero(self.occupied())
+        if not len(rows):
+            return math.inf, 0.0, math.inf
+        cell_m, at = self._p.resolution_m, point_m
+        walls = cKDTree((np.column_stack([columns, rows]) + self._first + 0.5) * cell_m)
+        room_m = here_m = float(walls.query(at)[0])
+        around = 2.0 * np.pi / 16 * np.arange(16)
+        steps = _CLIMB_M * np.column_stack([np.cos(around), np.sin(around)])
+        for _ in range(_CLIMBS):
+            ring = at + steps
+            rooms_m = np.where(self._is_free(ring), walls.query(ring)[0], -math.inf)
+            best = int(rooms_m.argmax())
+            if rooms_m[best] < room_m + _CLIMB_GAIN * _CLIMB_M:
+                break
+            at, room_m = ring[best], float(rooms_m[best])
+        return here_m, float(np.hypot(*(at - point_m))), room_m
+
+    def _is_free(self, points_m: np.ndarray) -> np.ndarray:
+        """(K,) bool: beams passed there, and nothing stands there; points (K, 2)."""
+        columns, rows = (np.floor(points_m / self._p.resolution_m).astype(np.int64) - self._first).T
+        inside = (columns >= 0) & (columns < self._size) & (rows >= 0) & (rows < self._size)
+        columns, rows = np.where(inside, columns, 0), np.where(inside, rows, 0)
+        known = self._passed[:, rows, columns].any(axis=0) | self._stood[rows, columns]
+        return inside & known & ~self.occupied()[rows, columns]
+
+    def coarser(self, factor: int) -> LocalMap:
+        """A window of as many cells, each as large as factor x factor of these, that knows what this one knows."""
+        p = replace(self._p, window_m=factor * self._p.window_m, resolution_m=factor * self._p.resolution_m)
+        wide = LocalMap(p)
+        first = self._first // factor
+        count = (self._first + self._size - 1) // factor - first + 1  # of its cells, that these are in
+        offset = (self._size - count) // 2
+        wide._first, wide._seen = first - offset, self._seen
+        low = self._first - first * factor
+        high = count * factor - self._size - low
+        columns, rows = (slice(int(begin), int(begin + length)) for begin, length in zip(offset, count))
+        for to, cells, whole in (
+            (wide._ended, self._ended, np.max),
+            (wide._passed, self._passed, np.min),  # a cell with a wall in it was not passed
+            (wide._stood, self._stood, np.min),
+        ):
+            beside = [(0, 0)] * (cells.ndim - 2)
+            padded = np.pad(cells, [*beside, (int(low[1]), int(high[1])), (int(low[0]), int(high[0]))], "edge")
+            blocks = padded.reshape(*cells.shape[:-2], int(count[1]), factor, int(count[0]), factor)
+            to[..., rows, columns] = whole(blocks, axis=(-3, -1))
+        return wide
 
     def _as_map(self, occupancy: np.ndarray) -> GridMap:
         return GridMap(occupancy, self._p.resolution_m, np.append(self._first * self._p.resolution_m, 0.0))
@@ -196,13 +261,13 @@ class LocalMap:
                 moved[..., to_y, to_x] = cells[..., from_y, from_x]
             cells[...] = moved
 
-    def _direction(self, angle_rad: np.ndarray) -> np.ndarray:
-        """(...) which of the directions an angle in odom belongs to."""
+    def _counters(self, angle_rad: np.ndarray, cell: np.ndarray) -> np.ndarray:
+        """(K,) flat indices of counts: of the directions that angles (K,) in odom belong to, at flat cells (K,)."""
         turn = self._p.directions / (2.0 * np.pi)
-        return np.floor(np.mod(angle_rad * turn + 0.5, self._p.directions)).astype(np.int64) % self._p.directions
+        return np.floor(angle_rad * turn + 0.5).astype(np.int64) % self._p.directions * self._size**2 + cell
 
-    def _ends(self, scan: Scan, laser: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Direction (K,) and cell (K,) in the window of all beams that came back."""
+    def _ends(self, scan: Scan, laser: np.ndarray) -> np.ndarray:
+        """(K,) counters of all beams that came back."""
         answered = scan.answered
         bearing = scan.angles_rad[answered] + laser[2]
         ranges_m = scan.ranges_m[answered]
@@ -210,31 +275,30 @@ class LocalMap:
         column_row = np.floor(points / self._p.resolution_m).astype(np.int64) - self._first
         inside = ((column_row >= 0) & (column_row < self._size)).all(axis=1)
         cell = column_row[inside, 1] * self._size + column_row[inside, 0]
-        return self._direction(bearing[inside]), cell
+        return self._counters(bearing[inside], cell)
 
     def _passes(self, scan: Scan, laser: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """(n * n,) bool: a beam passed this cell."""
+        """(K,) counters of the cells that a beam passed, each cell once."""
         count = len(scan)
         step = float(scan.angles_rad[1] - scan.angles_rad[0]) if count > 1 else 2.0 * np.pi
         ranges_m = np.where(np.isposinf(scan.ranges_m), min(self._p.unanswered_m, scan.range_max_m), scan.ranges_m)
         ranges_m = np.where(np.isfinite(ranges_m), ranges_m, 0.0) - _BEFORE_M
         around = ndimage.minimum_filter1d(ranges_m, 3, mode="nearest")  # a beam beside it counts as well
-        away = np.hypot(x, y)
-        passed = (away < around.max()).ravel()  # may be: the angle takes longest
-        cells = np.flatnonzero(passed)
-        relative = np.arctan2(y[cells // self._size, 0], x[0, cells % self._size]) - laser[2] - scan.angles_rad[0]
+        away = np.sqrt(x * x + y * y).ravel()
+        cells = np.flatnonzero(away < around.max())  # may be passed: the angle takes longest
+        bearing = np.arctan2(y[cells // self._size, 0], x[0, cells % self._size])
         middle = 0.5 * step * (count - 1)
-        beam = np.rint((angles.wrap(relative - middle) + middle) / step).astype(np.int64)
+        relative = angles.wrap(bearing - laser[2] - scan.angles_rad[0] - middle) + middle
+        beam = np.rint(relative / step).astype(np.int64)
         looked = (beam >= 0) & (beam < count)
-        passed[cells] = looked & (away.ravel()[cells] < around[np.where(looked, beam, 0)])
-        return passed
+        passed = looked & (away[cells] < around[np.where(looked, beam, 0)])
+        return self._counters(bearing[passed], cells[passed])
 
-    def _count(self, counts: np.ndarray, direction: np.ndarray, cell: np.ndarray) -> None:
-        """One more for each pair of direction and cell, once; both counts are halved where there are many."""
-        flat = np.unique(direction * self._size**2 + cell)
+    def _count(self, counts: np.ndarray, counters: np.ndarray) -> None:
+        """One more at each of these counters (K,), no two the same; both counts are halved where there are many."""
         counts = counts.reshape(-1)
-        counts[flat] += 1
-        many = flat[counts[flat] >= _FORGET_AT]
+        counts[counters] += 1
+        many = counters[counts[counters] >= _FORGET_AT]
         if len(many):
             for of_all in (self._ended, self._passed):
                 of_all.reshape(-1)[many] >>= 1

@@ -19,8 +19,9 @@ import numpy as np
 
 from glass_nav.driving.edge_tracking import edge_report, local_graph
 from glass_nav.driving.edge_tracking.local_graph import LocalGraph
-from glass_nav.driving.edge_tracking.local_map import LocalMap, LocalMapParams
+from glass_nav.driving.edge_tracking.local_map import LocalMapParams
 from glass_nav.driving.edge_tracking.local_pose import LocalPose
+from glass_nav.driving.edge_tracking.map_around import MapAround
 from glass_nav.geometry import se2
 from glass_nav.sensing.scan import Scan
 from glass_nav.topology.atlas.voronoi_graph import VoronoiParams
@@ -123,7 +124,7 @@ class PassingObserver:
 
     def __init__(self, p: PassingParams = PassingParams()) -> None:
         self._p = p
-        self._map, self._at = LocalMap(p.local_map), LocalPose()
+        self._map, self._at = MapAround(p.local_map), LocalPose()
         self._graph_params = local_graph.params_beside(p.graph)
         self._open: List[_Track] = []  # nodes that the robot is about
         self._graphs = 0

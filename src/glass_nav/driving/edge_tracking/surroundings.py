@@ -14,8 +14,9 @@ from scipy.spatial import cKDTree
 
 from glass_nav.driving.edge_tracking import local_graph
 from glass_nav.driving.edge_tracking.local_graph import LocalGraph
-from glass_nav.driving.edge_tracking.local_map import LocalMap, LocalMapParams
+from glass_nav.driving.edge_tracking.local_map import LocalMapParams
 from glass_nav.driving.edge_tracking.local_pose import LocalPose
+from glass_nav.driving.edge_tracking.map_around import MapAround
 from glass_nav.geometry import se2
 from glass_nav.sensing.scan import Scan
 from glass_nav.topology.atlas.voronoi_graph import VoronoiParams
@@ -30,7 +31,7 @@ class Surroundings:
     """Take in every scan by see(); renew the graph, or only the walls, whenever is_due."""
 
     def __init__(self, map_params: LocalMapParams, graph_params: VoronoiParams) -> None:
-        self._map, self._at = LocalMap(map_params), LocalPose()
+        self._map, self._at = MapAround(map_params), LocalPose()
         self._graph_params = local_graph.params_beside(graph_params)
         self.clear()
 
@@ -57,6 +58,11 @@ class Surroundings:
         self._points_m = _steady_points(scan, self.pose)
 
     @property
+    def coarse_m(self) -> float:
+        """By how much the cells of the last graph's map were larger than usual."""
+        return self._map.coarse_m
+
+    @property
     def is_due(self) -> bool:
         """Whether the next graph is."""
         return self.stamp_ns - self._renewed_ns >= _GRAPH_PERIOD_NS
@@ -73,6 +79,7 @@ class Surroundings:
     def renew_walls(self) -> None:
         """Only the walls: no graph is needed now."""
         self._renewed_ns = self.stamp_ns
+        self._map.fit(self.pose[:2])
         walls = self._map.walls()
         self._at.know(walls)
         self._note_walls(walls)
@@ -90,12 +97,15 @@ class Surroundings:
 
     def obstacles_m(self, pose: np.ndarray) -> np.ndarray:
         """(K, 2) what stands near the robot at a pose (3,), in its frame: the last scan, the walls of the map."""
-        points, walls = (
-            among[np.abs(among - pose[:2]).max(axis=1) < _NEAR_M] for among in (self._points_m, self._walls_m)
-        )
-        if len(points) and len(walls):  # what the scan shows now it shows better than the cells do
-            walls = walls[cKDTree(points).query(walls, distance_upper_bound=_SEEN_M)[0] > _SEEN_M]
-        return se2.transform_points(se2.inverse(pose), np.concatenate([points, walls]))
+        points = self._points_m[np.abs(self._points_m - pose[:2]).max(axis=1) < _NEAR_M]
+        return se2.transform_points(se2.inverse(pose), np.concatenate([points, self.unseen_walls_m(pose)]))
+
+    def unseen_walls_m(self, pose: np.ndarray) -> np.ndarray:
+        """(K, 2) walls of the map near a pose (3,) that the last scan does not show: it shows better where the others are."""
+        walls = self._walls_m[np.abs(self._walls_m - pose[:2]).max(axis=1) < _NEAR_M]
+        if not len(self._points_m) or not len(walls):
+            return walls
+        return walls[cKDTree(self._points_m).query(walls, distance_upper_bound=_SEEN_M)[0] > _SEEN_M]
 
 
 def _steady_points(scan: Scan, local_from_base: np.ndarray) -> np.ndarray:

@@ -32,7 +32,7 @@ from glass_nav.sensing import wall_thickness
 from glass_nav.sensing.known_area import KnownArea
 from glass_nav.sensing.raycast import RayCaster, changed_box
 from glass_nav.sensing.scan import Scan
-from glass_nav.world import drawn_panes
+from glass_nav.world import drawn_panes, free_standing
 from glass_nav.world.grid_map import GridMap
 from glass_nav.world.pane import Pane
 
@@ -61,6 +61,7 @@ class BeamClassifier:
         self.caster = RayCaster(grid_map, params.raycast_backend, params.raycast_threads)
         self.known_area = KnownArea(grid_map)
         self.thickness_m = wall_thickness.wall_thickness(grid_map)  # (H * W,)
+        self._opaque = free_standing.walls(grid_map, params.vote.glass_max_thickness_m).ravel()  # (H * W,) bool
         self.residuals = RangeResiduals(_DEPTH_SHARE, params.min_sigma_m)
         self.glass_map = GlassMap(grid_map, params.glass)
         self._coatings = UNKNOWN_COATINGS
@@ -139,18 +140,15 @@ class BeamClassifier:
 
     def surfaces(self, scan: Scan, cases: BeamCases, expected: ExpectedRanges, trusted: bool) -> SurfaceScan:
         """The scan cut at glass; `expected` is of the reported pose, which is trusted or not."""
-        across = np.maximum(expected.cos_incidence[0, 0], MIN_COS)
-        gate_m = case_votes.gate_m(self.residuals, self._params.vote) / across
+        first = surface_scan.standing(expected, self._is_gone)
+        gate_m = case_votes.gate_m(self.residuals, self._params.vote) / np.maximum(first.cos_incidence, MIN_COS)
         return surface_scan.of(
-            scan.ranges_m,
-            cases.case,
-            expected,
-            self.glass_map.chances(expected.cell[0, 0]),
-            self.glass_map.is_gone(expected.cell[0, 0], expected.axis_rad[0]),
-            gate_m,
-            scan.range_max_m,
-            trusted,
+            scan.ranges_m, cases.case, first, self.glass_map.chances(first.cell), gate_m, scan.range_max_m, trusted
         )
+
+    def _is_gone(self, cell: np.ndarray, axis_rad: np.ndarray) -> np.ndarray:
+        """(G,) bool, of cells (G,) with their axes (G,): the map shows what is no longer there."""
+        return self.glass_map.is_gone(cell, axis_rad, (cell >= 0) & self._opaque[cell])
 
     def evidence(
         self, scan: Scan, cases: BeamCases, expected: ExpectedRanges, map_from_base: np.ndarray

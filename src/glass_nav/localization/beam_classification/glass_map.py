@@ -26,6 +26,7 @@ _GONE_RETURNS = 0.06  # share by chance; that of a pane at oblique incidence, wh
 _THERE = 0.95  # prior probability that what is seen through is glass and not gone
 _OPENING_M = 0.5  # from a cell to the ends of the opening that it is in, at most
 _GONE = 0.05  # probability of being there below which it is gone: a pane taken for an open door is run into
+_OPAQUE_THERE, _OPAQUE_GONE = 0.05, 0.5  # prior and limit for what cannot be glass: if beams pass, it was moved
 
 
 def crossings(
@@ -131,20 +132,23 @@ class GlassMap:
         log_odds[:, found] = self._log_odds[:, at[found]]
         return _chance(self._prior + log_odds).reshape(2, *cell.shape)
 
-    def is_gone(self, cell: np.ndarray, axis_rad: np.ndarray) -> np.ndarray:
-        """Whether beams passed head on along a piece of wall so often that it is neither glass nor wall: an open door.
+    def is_gone(self, cell: np.ndarray, axis_rad: np.ndarray, opaque: np.ndarray) -> np.ndarray:
+        """Whether what the map shows is no longer there, so that a beam behind it passed nothing.
+
+        A door is open if beams passed head on along a piece of wall so often that it is neither glass nor wall.
 
         The opening is the piece of wall around the cell that speaks most for one, since a door opens as a whole: a robot
         that drives past meets each cell head on in a scan or two.
 
         Args:
             cell: (B,) flat cells of the map, -1: none.
-            axis_rad: (B,) of the normals of the wall there in map; NaN: none, which is never gone.
+            axis_rad: (B,) of the normals of the wall there in map; NaN: none, and then it is no door.
+            opaque: (B,) bool: it cannot be glass, by its shape: it is gone unless beams returned from it.
         """
         walls, at = self._numbers(np.where(cell >= 0, self._bordered(cell), -1))
         own = np.where(walls, self._log_odds[1, at], 0.0) if len(self._wall) else np.zeros(len(cell))
-        gone = np.zeros(len(cell), bool)
-        known = np.flatnonzero((own < 0.0) & np.isfinite(axis_rad))  # only few: the rest costs milliseconds
+        gone = opaque & (_chance(np.log(_OPAQUE_THERE / (1.0 - _OPAQUE_THERE)) + own) < _OPAQUE_GONE)
+        known = np.flatnonzero((own < 0.0) & ~gone & np.isfinite(axis_rad))  # only few: the rest costs milliseconds
         if not len(known):
             return gone
         normal_rad = (axis_rad[known] - self._grid_yaw_rad)[:, None, None]

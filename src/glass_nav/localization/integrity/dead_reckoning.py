@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glass_nav import _integrity
 from glass_nav.geometry import angles, se2
 from glass_nav.localization.particle_filter import motion
 from glass_nav.localization.particle_filter.motion import OdometryNoise
@@ -35,13 +36,10 @@ class DeadReckoning:
             noise: of odometry.
             noise_scale: (3,) factors of its variances along, across and of the heading.
         """
-        _, _, yaw = self.map_from_base
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        turned = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])  # robot's axes before the step, in map
-        along_x, along_y, _ = turned @ step
-        by_pose = np.array([[1.0, 0.0, -along_y], [0.0, 1.0, along_x], [0.0, 0.0, 1.0]])
-        added = motion.covariance(step, noise) * np.sqrt(np.outer(noise_scale, noise_scale))
-        grown = by_pose @ self.covariance @ by_pose.T + turned @ added @ turned.T
+        added = motion.covariance(step, noise)
+        if noise_scale is not _AS_IT_IS:
+            added = added * np.sqrt(np.outer(noise_scale, noise_scale))
+        grown = _integrity.carried(self.map_from_base[2], self.covariance, step, added)
         distance_m, _ = se2.travelled(step)
         return DeadReckoning(se2.compose(self.map_from_base, step), grown, self.distance_m + distance_m)
 

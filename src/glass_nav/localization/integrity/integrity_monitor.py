@@ -11,6 +11,7 @@ from typing import Dict, Optional, Tuple
 
 import numpy as np
 
+from glass_nav import _integrity
 from glass_nav.geometry import angles
 from glass_nav.localization.integrity.fit_information import FitInformation, ScanFit
 from glass_nav.localization.integrity.pose_covariance import PoseCovariance, widened_by
@@ -125,4 +126,4 @@ class IntegrityMonitor:
 
 def _beside(fit: FitInformation, covariance: np.ndarray) -> float:
     """Distance of the best fit from a pose with that covariance (3, 3), in deviations of both."""
-    return float(np.sqrt(fit.offset @ np.linalg.solve(fit.covariance + covariance, fit.offset)))
+    return _integrity.mahalanobis(fit.offset, fit.covariance + covariance)

@@ -15,6 +15,7 @@ from typing import Optional
 
 import numpy as np
 
+from glass_nav import _integrity
 from glass_nav.geometry import angles
 from glass_nav.localization.integrity.dead_reckoning import DeadReckoning
 from glass_nav.localization.integrity.fit_information import FitInformation
@@ -22,8 +23,6 @@ from glass_nav.localization.particle_filter.motion import OdometryNoise
 
 _MEMORY = 0.95  # weight of the past per update, of the scale of odometry's noise
 _MIN_SCALE = 0.01  # of the variances of the model of odometry
-_ALIKE = 1.5  # ratio of variances up to which the scan is as good as the carried pose
-_FAR = 4.0  # ratio of variances from which the spread of the particles counts
 _MAX_CORRECTION = 6.0  # deviations: a larger one is an event of its own
 
 
@@ -84,12 +83,7 @@ class PoseCovariance:
 
 def better_of(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """(3, 3): in each direction the smaller of two covariances."""
-    root = np.linalg.cholesky(first + 1e-12 * np.eye(3))
-    half = np.linalg.solve(root, second)
-    values, axes = np.linalg.eigh(np.linalg.solve(root, half.T))
-    mixed = root @ axes
-    ratio = np.where(values > 1.0, 1.0 + (values - 1.0) * np.exp(-(values - 1.0) / _ALIKE), values)
-    return (mixed * ratio) @ mixed.T
+    return _integrity.better_of(first, second)
 
 
 def widened_by(covariance: np.ndarray, spread: np.ndarray) -> np.ndarray:
@@ -97,11 +91,7 @@ def widened_by(covariance: np.ndarray, spread: np.ndarray) -> np.ndarray:
 
     Particles spread as their proposal does, whatever the scan determines: only far beyond, they are in doubt themselves.
     """
-    root = np.linalg.cholesky(covariance + 1e-12 * np.eye(3))
-    half = np.linalg.solve(root, spread)
-    values, axes = np.linalg.eigh(np.linalg.solve(root, half.T))
-    mixed = root @ axes
-    return (mixed * np.maximum(values * -np.expm1(-((values / _FAR) ** 2)), 1.0)) @ mixed.T
+    return _integrity.widened_by(covariance, spread)
 
 
 def _turned(yaw: float) -> np.ndarray:

@@ -7,8 +7,9 @@ elsewhere (kidnap_detector.py).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Optional
+from typing import Optional, Tuple
 
 import numpy as np
 
@@ -85,7 +86,7 @@ class PoseQuality:
             judged_share: of the beams that returned, the share that says something; the fewer, the less it counts.
         """
         if np.isfinite(inlier_ratio):
-            past = inlier_ratio if np.isnan(self._inlier_ratio) else self._inlier_ratio
+            past = inlier_ratio if math.isnan(self._inlier_ratio) else self._inlier_ratio
             self._inlier_ratio = past + (1.0 - self._MEMORY) * judged_share * (inlier_ratio - past)
 
     def follow_search(self, candidates: Candidates) -> None:
@@ -113,8 +114,7 @@ class PoseQuality:
                 _possible(self._candidates),
             )
         limits = self._limits
-        position_sigma_m = float(np.sqrt(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
-        heading_sigma_rad = float(np.sqrt(covariance[2, 2]))
+        position_sigma_m, heading_sigma_rad = _deviations(covariance)
         wide = (
             position_sigma_m > limits.localized_max_position_sigma_m
             or heading_sigma_rad > limits.localized_max_heading_sigma_rad
@@ -122,9 +122,9 @@ class PoseQuality:
         )
         spread = (
             f"{best.share:.0%} of the weight in one place, sigma {position_sigma_m:.2f} m, "
-            f"{np.degrees(heading_sigma_rad):.1f} deg"
+            f"{math.degrees(heading_sigma_rad):.1f} deg"
         )
-        if np.isnan(self._inlier_ratio):
+        if math.isnan(self._inlier_ratio):
             return Judgement(LocalizationState.UNCERTAIN, f"no scan has been used yet; {spread}", 0.0)
         explained = f"the map explains {self._inlier_ratio:.0%} of the beams that it covers"
         confidence = _confidence(self._inlier_ratio, self._verdict, best)
@@ -179,6 +179,13 @@ def _elsewhere(verdict: Optional[Verdict]) -> Optional[str]:
     return None
 
 
+def _deviations(covariance: np.ndarray) -> Tuple[float, float]:
+    """Largest of the position [m], and that of the heading [rad], of a covariance (3, 3)."""
+    (xx, xy, _), (_, yy, _), (_, _, yaw) = covariance.tolist()
+    longest = 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy)
+    return math.sqrt(max(longest, 0.0)), math.sqrt(max(yaw, 0.0))
+
+
 def _confidence(inlier_ratio: float, verdict: Optional[Verdict], best: PoseEstimate) -> float:
     """Chance that the pose is right.
 
@@ -186,11 +193,11 @@ def _confidence(inlier_ratio: float, verdict: Optional[Verdict], best: PoseEstim
     test/benchmark/reliability.py, seeds 20 to 22), in which robots were kidnapped, started wrong, or were right;
     the constant from 4400 poses of all tracks (seed 200).
     """
-    sigma_m = float(np.clip(np.sqrt(np.trace(best.covariance[:2, :2])), 0.005, 2.0))
-    logit = -2.1 - 6.8 * (1.0 - inlier_ratio) - 1.9 * np.log(sigma_m)
-    if verdict is not None and np.isfinite(verdict.fit):
+    sigma_m = min(max(math.sqrt(best.covariance[0, 0] + best.covariance[1, 1]), 0.005), 2.0)
+    logit = -2.1 - 6.8 * (1.0 - inlier_ratio) - 1.9 * math.log(sigma_m)
+    if verdict is not None and math.isfinite(verdict.fit):
         vouched, counts = _KEPT if verdict.kept else (0.0, 1.0)
         logit += vouched - counts * 22.8 * max(0.0, verdict.usual - verdict.fit)
         if verdict.candidates is not None:
-            logit += 2.4 - 0.95 * (float(np.clip(verdict.log_ratio, -8.0, 8.0)) + 3.0)
-    return float(min(best.share, 1.0) / (1.0 + np.exp(-logit)))
+            logit += 2.4 - 0.95 * (min(max(verdict.log_ratio, -8.0), 8.0) + 3.0)
+    return min(best.share, 1.0) / (1.0 + math.exp(-logit))

@@ -10,6 +10,7 @@ walls of one direction may be drawn off to the same side: the level of 99.9 % is
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +25,7 @@ def _multiple(probability: float) -> float:
     return float(special.stdtrit(_FREEDOM, 0.5 + 0.5 * probability) * np.sqrt((_FREEDOM - 2.0) / _FREEDOM))
 
 
-_MULTIPLES = np.array([_multiple(each) for each in PROBABILITIES])
+_MULTIPLES = [_multiple(each) for each in PROBABILITIES]
 
 
 @dataclass(frozen=True)
@@ -40,9 +41,14 @@ UNKNOWN = ProtectionLevels(np.full(3, np.nan), np.full(3, np.nan))
 
 def of(map_from_base: np.ndarray, covariance: np.ndarray, resolution_m: float) -> ProtectionLevels:
     """Levels of a pose (3,) in a map of cells so wide, with a covariance (3, 3) over x [m], y [m], yaw [rad] in map."""
-    cos, sin = np.cos(map_from_base[2]), np.sin(map_from_base[2])
-    axes = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    deviations = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", axes, covariance, axes), 0.0))
-    p95, p999 = np.minimum(_MULTIPLES[:, None] * deviations, [np.inf, np.inf, np.pi])
+    cos, sin = math.cos(map_from_base[2]), math.sin(map_from_base[2])
+    (xx, xy, _), (_, yy, _), (_, _, yaw) = covariance.tolist()
+    along, across = (
+        cos * cos * xx + 2.0 * cos * sin * xy + sin * sin * yy,
+        sin * sin * xx - 2.0 * cos * sin * xy + cos * cos * yy,
+    )
+    deviations = [math.sqrt(max(variance, 0.0)) for variance in (along, across, yaw)]
+    p95, p999 = (np.array([multiple * each for each in deviations]) for multiple in _MULTIPLES)
+    p95[2], p999[2] = min(p95[2], math.pi), min(p999[2], math.pi)
     p999[:2] = np.maximum(p999[:2], 0.5 * resolution_m)
     return ProtectionLevels(p95, p999)

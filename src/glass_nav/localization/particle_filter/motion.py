@@ -10,6 +10,7 @@ odometry and error modelling for a mobile robot, 1997). P particles.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Tuple
 
@@ -108,7 +109,7 @@ def covariance(before_from_after: np.ndarray, noise: OdometryNoise) -> np.ndarra
         by_error = np.array([[cos, 0.0, -sin], [sin, 0.0, cos], [0.0, 1.0, 0.0]])  # of distance, turn, sideways
     else:
         (turn_1, distance, _), deviations = _diff(before_from_after, noise)
-        cos, sin = np.cos(turn_1), np.sin(turn_1)
+        cos, sin = math.cos(turn_1), math.sin(turn_1)
         by_error = np.array([[-distance * sin, cos, 0.0], [distance * cos, sin, 0.0], [1.0, 0.0, 1.0]])
     scaled = by_error * deviations
     return scaled @ scaled.T
@@ -121,14 +122,14 @@ def _wheels(step: np.ndarray, noise: OdometryNoise) -> Tuple[np.ndarray, np.ndar
 
 
 def _deviation(variance: float, noise: OdometryNoise) -> float:
-    return float(np.sqrt(variance)) if noise.odom_model_type.endswith("corrected") else variance
+    return math.sqrt(variance) if noise.odom_model_type.endswith("corrected") else variance
 
 
 def _diff(step: np.ndarray, noise: OdometryNoise) -> Tuple[np.ndarray, np.ndarray]:
     """Mean (3,) and deviations (3,) of first turn [rad], distance [m], second turn [rad]."""
     distance, _ = se2.travelled(step)
-    turn_1 = float(np.arctan2(step[1], step[0])) if distance >= _ON_THE_SPOT_M else 0.0
-    turn_2 = float(angles.wrap(step[2] - turn_1))
+    turn_1 = math.atan2(step[1], step[0]) if distance >= _ON_THE_SPOT_M else 0.0
+    turn_2 = float(angles.wrap(float(step[2]) - turn_1))
     square_1, square_2 = _turn_either_way(turn_1) ** 2, _turn_either_way(turn_2) ** 2
     a1, a2, a3, a4 = noise.odom_alpha1, noise.odom_alpha2, noise.odom_alpha3, noise.odom_alpha4
     variances = (
@@ -141,7 +142,7 @@ def _diff(step: np.ndarray, noise: OdometryNoise) -> Tuple[np.ndarray, np.ndarra
 
 def _turn_either_way(turn: float) -> float:
     """A robot that backs up turned little, although its direction of travel turned by pi."""
-    return min(abs(float(angles.wrap(turn))), abs(float(angles.wrap(turn - np.pi))))
+    return min(abs(float(angles.wrap(turn))), abs(float(angles.wrap(turn - math.pi))))
 
 
 def _omni(step: np.ndarray, noise: OdometryNoise) -> Tuple[float, np.ndarray, np.ndarray]:

@@ -231,7 +231,7 @@ class ParticleFilter:
             return
         limits = self._params.count
         drawn = resampling.low_variance(self._weights, limits.max_particles, self._rng)
-        count = resampling.enough_particles(self.particles[np.unique(drawn)], limits)
+        count = resampling.enough_particles(self.particles[drawn], limits)
         self.particles = self.particles[resampling.low_variance(self._weights, count, self._rng)]
         self._weights = np.full(count, 1.0 / count)
 

@@ -14,6 +14,7 @@ from typing import Tuple
 
 import numpy as np
 
+from glass_nav import _particles
 from glass_nav.geometry import angles
 from glass_nav.hypotheses.scan_alignment import Alignment
 from glass_nav.localization.particle_filter import resampling
@@ -80,25 +81,15 @@ def draw(
     drawn[:, 2] = angles.wrap(drawn[:, 2])
     kept = resampling.low_variance(weights, len(predicted) - count, rng)
     poses = np.concatenate([predicted[kept], drawn])
-    by_odometry = _log_normal(poses, best.map_from_base, near)
-    by_slip = _log_normal(poses, best.map_from_base, slipped)
-    by_scan = np.logaddexp.reduce(
-        [_log_normal(poses, pose, spread) for pose, spread in zip(aligned.poses, around)]
-    ) - np.log(len(aligned.poses))
-    share = proposal.proposal_scan_share
-    eps = proposal.odom_slip_probability
-    target = np.logaddexp(np.log1p(-eps) + by_odometry, np.log(eps + 1e-300) + by_slip)
-    source = np.logaddexp(np.log1p(-share) + by_odometry, np.log(share) + by_scan)
-    log_ratio = target - source
-    # What odometry itself put there, in another cluster or in a tail that is fatter than normal, has its density.
-    log_ratio[: len(kept)] = np.minimum(log_ratio[: len(kept)], -np.log1p(-share))
+    log_ratio = _particles.proposal_log_ratio(
+        poses,
+        len(kept),
+        best.map_from_base,
+        near,
+        slipped,
+        aligned.poses,
+        around,
+        proposal.odom_slip_probability,
+        proposal.proposal_scan_share,
+    )
     return poses, log_ratio
-
-
-def _log_normal(poses: np.ndarray, mean: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """(P,) log density of a normal distribution over planar poses."""
-    off = poses - mean
-    off[:, 2] = angles.wrap(off[:, 2])
-    root = np.linalg.cholesky(covariance)
-    z = np.linalg.solve(root, off.T)
-    return -0.5 * np.sum(z**2, axis=0) - np.log(np.diag(root)).sum() - 1.5 * np.log(2.0 * np.pi)

@@ -6,13 +6,15 @@ particles: KLD sampling, Fox, Adapting the Sample Size in Particle Filters (2003
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from glass_nav import _particles
 from glass_nav.params import number
 
-BIN = np.array([0.5, 0.5, np.radians(10.0)])  # AMCL's: m, m, rad
+BIN = np.array([0.5, 0.5, np.radians(10.0)])  # of the histogram over poses, AMCL's: m, m, rad
 
 
 @dataclass(frozen=True)
@@ -70,13 +72,7 @@ def tempered(log_w: np.ndarray, min_effective: float = 20.0) -> np.ndarray:
 
 def low_variance(weights: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
     """(count,) indices of the particles drawn: one random number, then equal strides."""
-    strides = (np.arange(count) + rng.uniform()) / count
-    return np.minimum(np.searchsorted(np.cumsum(weights), strides, side="right"), len(weights) - 1)
-
-
-def bins(poses: np.ndarray) -> np.ndarray:
-    """(P, 3) int cells of the histogram over poses: 0.5 m, 0.5 m, 10 degrees."""
-    return np.floor(poses / BIN).astype(np.int64)
+    return _particles.low_variance(weights, count, rng.uniform())
 
 
 def enough_particles(poses: np.ndarray, limits: ParticleCount) -> int:
@@ -85,12 +81,9 @@ def enough_particles(poses: np.ndarray, limits: ParticleCount) -> int:
     Args:
         poses: (P, 3) particles with equal weights; only how many bins they fill counts.
     """
-    cells = bins(poses)
-    off = cells - cells.min(axis=0)
-    span = off.max(axis=0) + 1
-    filled = len(np.unique((off[:, 0] * span[1] + off[:, 1]) * span[2] + off[:, 2]))
+    filled = _particles.count_bins(poses, BIN)
     if filled <= 1:
         return limits.min_particles
     share = 2.0 / (9.0 * (filled - 1))
-    needed = (filled - 1) / (2.0 * limits.kld_err) * (1.0 - share + np.sqrt(share) * limits.kld_z) ** 3
-    return int(np.clip(np.ceil(needed), limits.min_particles, limits.max_particles))
+    needed = (filled - 1) / (2.0 * limits.kld_err) * (1.0 - share + math.sqrt(share) * limits.kld_z) ** 3
+    return min(max(math.ceil(needed), limits.min_particles), limits.max_particles)

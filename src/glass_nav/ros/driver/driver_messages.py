@@ -8,10 +8,10 @@ from typing import Optional
 import numpy as np
 from geometry_msgs.msg import PoseStamped, Twist
 
-from glass_nav.driving.decisions import DriveStatus, GoalEnd
+from glass_nav.driving.decisions import DriveStatus, GoalEnd, VisitReport
 from glass_nav.driving.edge_tracking.edge_driver import Arrival
 from glass_nav.driving.place_goals import PlaceGoal
-from glass_nav.msg import DriverStatus, GotoNodeGoal, GotoNodeResult, TopologyStatus, TraverseEdgeResult
+from glass_nav.msg import DriverStatus, GotoNodeGoal, GotoNodeResult, NodeVisits, TopologyStatus, TraverseEdgeResult
 from glass_nav.msg import EdgeTraversal as EdgeTraversalMsg
 from glass_nav.msg import Meetpoint as MeetpointMsg
 from glass_nav.ros import conversions
@@ -56,6 +56,15 @@ def traversal_msg(arrival: Arrival, frame: str) -> Optional[EdgeTraversalMsg]:
         chord_bearing=driven.chord_bearing_rad if known else 0.0,
         turn=driven.turn_rad if known else 0.0,
         segments=driven.segments_m.ravel().tolist(),
+    )
+
+
+def visits_msg(report: VisitReport, frame: str) -> NodeVisits:
+    """Nodes passed on the way to a goal."""
+    return NodeVisits(
+        header=conversions.header(report.stamp_ns, frame),
+        node=[visit.node for visit in report.visits],
+        r=[visit.r_m for visit in report.visits],
     )
 
 

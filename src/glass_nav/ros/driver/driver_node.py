@@ -7,12 +7,10 @@ Subscribes: scan (LaserScan); scan_surfaces (LaserScan), in its place while the 
     (TurnChoice), the answer to the last meetpoint; topology_status (TopologyStatus) and localization_status
     (LocalizationStatus), which launch/driver.launch remaps to those of the two nodes; map (OccupancyGrid): where it is
     free to drive straight to the nearest edge; tf odom <- base <- laser, and map <- odom for goals in the map.
-Publishes: cmd_vel (Twist); meetpoint (Meetpoint) and edge_traversal (EdgeTraversal) with the same stamp; ~status
-    (DriverStatus, latched); ~markers (MarkerArray): see driver_displays.py; /diagnostics.
+Publishes: cmd_vel (Twist); meetpoint (Meetpoint) and edge_traversal (EdgeTraversal) with the same stamp; node_visits
+    (NodeVisits) at the end of a goal of goto_node; ~status (DriverStatus, latched); ~markers (MarkerArray): see driver_displays.py; /diagnostics.
 Actions: traverse_edge (TraverseEdge), goto_node (GotoNode). There is one robot: a goal of either ends what is on, and a
     turn_choice waits for neither.
-Calls: restart_search (Trigger; launch/driver.launch remaps it to ~restart of the topology node) when it stands at a
-    meetpoint that the search cannot follow it to: it was restarted, or carried.
 Parameters: DriverParams, read once; explained in config/driver.yaml.
 """
 
@@ -29,7 +27,6 @@ import rospy
 import tf2_ros
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import OccupancyGrid
-from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 from glass_nav import params
@@ -46,6 +43,7 @@ from glass_nav.msg import (
     GotoNodeFeedback,
     LocalizationStatus,
     Meetpoint,
+    NodeVisits,
     TopologyStatus,
     TraverseEdgeAction,
     TraverseEdgeFeedback,
@@ -68,7 +66,6 @@ from glass_nav.topology.atlas.atlas import AtlasError
 from glass_nav.vocabulary import LocalizationState, Outcome
 
 MARKERS_PERIOD_S = 0.5
-RESTART_WAIT_S = 2.0  # for the service, by the wall clock
 ODOMETRY_GRACE_S = (
     1.0  # by the wall clock, without odometry, before the log says so: at the start it may come a little later
 )
@@ -104,7 +101,7 @@ class DriverNode:
             decisions.DriveStatus: self._send_status,
             decisions.Feedback: self._send_feedback,
             decisions.GoalEnd: self._end_goal,
-            decisions.SearchRestart: self._restart_search,
+            decisions.VisitReport: self._send_visits,
             LogLine: self._log.write,
         }
         self._tf = tf2_ros.Buffer()
@@ -113,6 +110,7 @@ class DriverNode:
         self._commands = rospy.Publisher("cmd_vel", Twist, queue_size=1, tcp_nodelay=True)
         self._meetpoints = rospy.Publisher("meetpoint", Meetpoint, queue_size=5)
         self._traversals = rospy.Publisher("edge_traversal", EdgeTraversal, queue_size=5)
+        self._visits = rospy.Publisher("node_visits", NodeVisits, queue_size=5)
         self._status = rospy.Publisher("~status", DriverStatus, queue_size=10, latch=True)
         self._markers = rospy.Publisher("~markers", MarkerArray, queue_size=2)
         self._diagnostics = Diagnostics("driver")
@@ -274,6 +272,9 @@ class DriverNode:
     def _send_meetpoint(self, report: decisions.MeetpointReport) -> None:
         self._meetpoints.publish(driver_messages.meetpoint_msg(report.arrival, self._p.base_frame_id))
 
+    def _send_visits(self, report: decisions.VisitReport) -> None:
+        self._visits.publish(driver_messages.visits_msg(report, self._p.base_frame_id))
+
     def _send_status(self, status: decisions.DriveStatus) -> None:
         self._status.publish(driver_messages.status_msg(status, self._p.base_frame_id))
 
@@ -291,9 +292,6 @@ class DriverNode:
             result = driver_messages.place_result(end, self._p.global_frame_id)
         finish = {Outcome.SUCCEEDED: server.set_succeeded, Outcome.PREEMPTED: server.set_preempted}
         finish.get(end.ending.outcome, server.set_aborted)(result, end.ending.reason)
-
-    def _restart_search(self, _request: decisions.SearchRestart) -> None:
-        threading.Thread(target=_call_restart_search, daemon=True).start()
 
     # -- what people see
 
@@ -325,17 +323,6 @@ class DriverNode:
         health, counts = self._driver.health, vars(self._scans.counts)
         values = {**health.values, **{f"scans {name}": count for name, count in counts.items()}}
         self._diagnostics.publish({"driver": replace(health, values=values)})
-
-
-def _call_restart_search() -> None:
-    name = rospy.resolve_name("restart_search")
-    try:
-        rospy.wait_for_service(name, RESTART_WAIT_S)
-        answer = rospy.ServiceProxy(name, Trigger)()
-        if not answer.success:
-            rospy.logwarn(f"the search does not begin anew: {answer.message}")
-    except (rospy.ROSException, rospy.ServiceException) as err:
-        rospy.logwarn(f"the search does not begin anew, call ~restart of the topology node: {err}")
 
 
 def main() -> None:

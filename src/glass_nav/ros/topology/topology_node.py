@@ -5,7 +5,7 @@ Wiring only: SearchSession decides. Callbacks store, one loop works: nothing els
 Subscribes: meetpoint (Meetpoint), edge_traversal (EdgeTraversal): of the driver, or by hand; in either order, the
     traversal and the meetpoint at its end belong together. map (OccupancyGrid, if ~check_map): the atlas must be made
     from it. scan (LaserScan), tf ~odom_frame_id <- ~base_frame_id <- laser, and map, if ~use_scans: scans from
-    anywhere, at meetpoints and between them, are evidence.
+    anywhere, at meetpoints and between them, are evidence. node_visits (NodeVisits): for the statistics of the atlas.
 Publishes: turn_choice (TurnChoice): the answer to each meetpoint while there is something to find out;
     initialpose (PoseWithCovarianceStamped) once when CONFIRMED, with the stamp of the meetpoint or scan;
     ~candidates (TopologyCandidates, latched), ~status (TopologyStatus, latched), ~markers (MarkerArray, latched):
@@ -43,6 +43,7 @@ from glass_nav.msg import (
     LocalizeGloballyFeedback,
     LocalizeGloballyResult,
     Meetpoint,
+    NodeVisits,
     TopologyCandidates,
     TopologyStatus,
     TurnChoice,
@@ -112,6 +113,7 @@ class TopologyNode:
         for topic, kind, take in (
             ("meetpoint", Meetpoint, self._take_meetpoint),
             ("edge_traversal", EdgeTraversal, self._take_traversal),
+            ("node_visits", NodeVisits, self._take_visits),
         ):
             rospy.Subscriber(topic, kind, self._put_report, callback_args=take, queue_size=10, tcp_nodelay=True)
         if p.session.check_map or self._session.takes_scans or made:
@@ -182,6 +184,12 @@ class TopologyNode:
             self._log.warn(f"edge_traversal refused: {err}")
             return
         self._carry_out(self._session.edge_traversal(traversal, conversions.ns_from_stamp(msg.header.stamp)))
+
+    def _take_visits(self, msg: NodeVisits) -> None:
+        if len(msg.node) != len(msg.r):
+            self._log.warn(f"node_visits refused: {len(msg.node)} nodes need as many r, got {len(msg.r)}")
+            return
+        self._carry_out(self._session.node_visits(np.array(msg.node, np.int64), np.array(msg.r, float)))
 
     def _take_map(self, msg: OccupancyGrid) -> None:
         topic = rospy.resolve_name("map")

@@ -14,6 +14,7 @@ from typing import List, Optional, Tuple
 
 import numpy as np
 
+from glass_nav.geometry import angles, se2
 from glass_nav.hypotheses.pose_belief import MapScans
 from glass_nav.sensing.scan import Scan
 from glass_nav.topology.atlas.atlas import Atlas, Visits
@@ -29,6 +30,9 @@ from glass_nav.topology.search.passed_edges import PassedEdges
 from glass_nav.topology.search.search_estimate import SearchEstimate
 from glass_nav.topology.search.search_forest import SearchForest
 from glass_nav.topology.search.search_params import SearchParams
+
+_CARRIED_M, _CARRIED_SHARE, _CARRIED_RAD = 0.7, 0.1, np.radians(25.0)  # a candidate carried by dead reckoning is off
+# by less; per metre of the chord, since the robot wandered
 
 
 class AtlasLocalizer:
@@ -108,9 +112,16 @@ class AtlasLocalizer:
     def update(self, traversal: Traversal, meetpoint: Meetpoint) -> SearchEstimate:
         """Take in an edge and the meetpoint at its end.
 
+        Where the robot came along no edge the forest begins anew, with what dead reckoning still knows.
+
         Raises:
             ObservationError: the meetpoint it left has no such edge; nothing is changed.
         """
+        if not traversal.was_followed:
+            among = self._carried(meetpoint)
+            self._begin_forest(meetpoint, among if len(among) else None)
+            self._passed.jump(meetpoint)
+            return self._judged(meetpoint)
         self._forest.step(traversal, meetpoint)
         self._passed.add(traversal.rank, meetpoint, traversal.length_m)
         return self._judged(meetpoint)
@@ -189,6 +200,25 @@ class AtlasLocalizer:
 
     # -- judgement
 
+    def _begin_forest(self, meetpoint: Meetpoint, among: Optional[np.ndarray] = None) -> None:
+        """Anew in the same search."""
+        self._edges_before += self._forest.depth
+        self._by_graph.begin()
+        self._forest.begin(meetpoint, among)
+
+    def _carried(self, meetpoint: Meetpoint) -> np.ndarray:
+        """(D,) darts at a meetpoint to which dead reckoning leads from the candidates at the last one."""
+        left, candidates = self._forest.meetpoints[-1], self._forest.candidates()[0]
+        dart = self._matcher.all_at(meetpoint)
+        if left.odom_from_base is None or meetpoint.odom_from_base is None or not len(candidates):
+            return dart
+        step = se2.compose(se2.inverse(left.odom_from_base), meetpoint.odom_from_base)
+        carried = se2.compose(poses_at(self._atlas, candidates, left), step)
+        near_m = _CARRIED_M + _CARRIED_SHARE * float(np.hypot(*step[:2]))
+        off = poses_at(self._atlas, dart, meetpoint)[:, None] - carried
+        near = (np.hypot(off[..., 0], off[..., 1]) < near_m) & (np.abs(angles.wrap(off[..., 2])) < _CARRIED_RAD)
+        return dart[near.any(axis=1)]
+
     def _judged(self, meetpoint: Meetpoint) -> SearchEstimate:
         by_graph = self._by_graph.estimate()
         estimate = replace(by_graph, depth=self._edges_before + self._forest.depth)
@@ -197,9 +227,7 @@ class AtlasLocalizer:
             belief = self._joint.belief
             if belief is not None:
                 if by_graph.done and not len(by_graph.dart):  # the graph is wrong somewhere: the forest begins anew
-                    self._edges_before += self._forest.depth
-                    self._by_graph.begin()
-                    self._forest.begin(meetpoint)
+                    self._begin_forest(meetpoint)
                 estimate = self._by_both.at_meetpoint(belief, estimate.depth)
         self._estimate = estimate
         return estimate

@@ -1,13 +1,14 @@
-"""Darts, the map -> would the scan at a meetpoint tell a robot there from one at another?
+"""Places, the map -> would the scan at a meetpoint tell a robot at one of them from one at another?
 
 Places that the graph cannot tell apart may look different: a room of one wing is furnished otherwise. So a scan is
-simulated in the map from where the robot would stand, and looked at from the other place: what the map does not explain
-there is evidence against it. Views are compared once, and only so many for each step of a search. P pairs of darts.
+simulated in the map from where the robot would stand, and looked at from where it would stand if it were at the other
+place: what the map does not explain there is evidence against that. Views are compared once, and only so many for each
+step of a search. P pairs of poses.
 """
 
 from __future__ import annotations
 
-from typing import Dict, Set, Tuple
+from typing import Dict, List, Tuple
 
 import numpy as np
 
@@ -17,7 +18,12 @@ from glass_nav.topology.atlas.atlas import Atlas
 
 _COMPARED = 300  # new pairs for each step: 0.1 s
 _DIFFERENT = 3.0  # nats that tell two places apart
+_DECISIVE = 8.0  # ... so surely that a robot drives there to see it
 _MAX_KEPT = 100_000  # pairs
+_SAME_M = 0.7  # a meetpoint nearer than this to one where the robot was is that
+_ROUNDED = np.array([0.05, 0.05, 0.02])  # poses in one such cell look the same
+
+Pose = Tuple[int, ...]
 
 
 class ExpectedViews:
@@ -25,18 +31,17 @@ class ExpectedViews:
 
     def __init__(self, atlas: Atlas, scans: MapScans) -> None:
         self._atlas, self._scans = atlas, scans
-        self._known: Dict[Tuple[int, int], float] = {}
-        self._seen: Set[Tuple[int, int]] = set()  # pairs of nodes
+        self._known: Dict[Tuple[Pose, Pose], float] = {}
+        self._seen: List[np.ndarray] = []  # (C, 2) where the robot would have been, at each arrival
         self._left = _COMPARED
 
     def forget(self) -> None:
         """Another search: nothing was seen."""
         self._seen.clear()
 
-    def arrive(self, dart: np.ndarray) -> None:
-        """The robot has come along one of darts (C,): what is seen there is known now, and told them apart or not."""
-        node = self._atlas.darts.node[dart].tolist()
-        self._seen.update((a, b) for a in node for b in node)
+    def arrive(self, poses: np.ndarray) -> None:
+        """The robot is at one of poses (C, 3): what is seen there is known now, and told them apart or not."""
+        self._seen.append(poses[:, :2].copy())
         self._left = _COMPARED  # pairs for the next step
         if len(self._known) > _MAX_KEPT:
             self._known.clear()
@@ -47,32 +52,50 @@ class ExpectedViews:
         return self._left < 0
 
     def nats(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """(P,) log likelihood ratios of arrival darts first (P,) to second (P,), by a scan seen at the first.
+        """(P,) log likelihood ratios of poses first (P, 3) to second (P, 3), by a scan seen at the first.
 
         0 for pairs that there was no time to compare, and where the robot has been.
         """
-        node = self._atlas.darts.node
-        pairs = list(zip(first.tolist(), second.tolist()))
-        new: Dict[int, "list[int]"] = {}
-        for a, b in pairs:
-            seen = (int(node[a]), int(node[b])) in self._seen
-            if a != b and not seen and (a, b) not in self._known and b not in new.get(a, []):
+        pairs = [(_rounded(a), _rounded(b)) for a, b in zip(first, second)]
+        been = self._has_been(first, second)
+        new: Dict[Pose, Dict[Pose, int]] = {}
+        for index, (a, b) in enumerate(pairs):
+            if a != b and not been[index] and (a, b) not in self._known and b not in new.get(a, {}):
                 self._left -= 1
                 if self._left >= 0:
-                    new.setdefault(a, []).append(b)
+                    new.setdefault(a, {})[b] = index
         for a, others in new.items():
-            found = pose_belief.expected_nats(self._scans, self._pose(a), np.stack([self._pose(b) for b in others]))
+            rows = list(others.values())
+            found = pose_belief.expected_nats(self._scans, first[rows[0]], second[rows])
             self._known.update(zip(((a, b) for b in others), found.tolist()))
-        nats = np.array([self._known.get(pair, 0.0) for pair in pairs])
-        seen_nodes = np.array([(a, b) in self._seen for a, b in zip(node[first].tolist(), node[second].tolist())], bool)
-        return np.where(seen_nodes, 0.0, nats)
+        return np.where(been, 0.0, np.array([self._known.get(pair, 0.0) for pair in pairs]))
 
     def alike(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """(P,) bool: neither would look different from the other."""
-        return np.maximum(self.nats(first, second), self.nats(second, first)) < _DIFFERENT
+        """(P,) bool: neither of arrival darts (P,) would look different from the other."""
+        a, b = self.at(first), self.at(second)
+        return np.maximum(self.nats(a, b), self.nats(b, a)) < _DIFFERENT
 
-    def _pose(self, dart: int) -> np.ndarray:
-        """(3,) of a robot that came along the dart to its meetpoint, looking away from it."""
-        pose = np.array(self._atlas.map_from_dart(np.array(dart)), float)
-        pose[2] += np.pi
-        return pose
+    def differ(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """(P,) bool: a scan at poses first (P, 3) would tell for certain that the robot is not at second (P, 3)."""
+        return self.nats(first, second) >= _DECISIVE
+
+    def at(self, dart: np.ndarray) -> np.ndarray:
+        """(C, 3) poses of a robot that came along darts (C,) to their meetpoints, looking away from them."""
+        poses = np.array(self._atlas.map_from_dart(dart), float).reshape(-1, 3)
+        poses[:, 2] += np.pi
+        return poses
+
+    def _has_been(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """(P,) bool: the robot was at the first pose if the one hypothesis is right, at the second if the other is."""
+        been = np.zeros(len(first), bool)
+        for places in self._seen:
+            near = [
+                (np.hypot(*(poses[:, None, :2] - places).transpose(2, 0, 1)) < _SAME_M).any(axis=1)
+                for poses in (first, second)
+            ]
+            been |= near[0] & near[1]
+        return been
+
+
+def _rounded(pose: np.ndarray) -> Pose:
+    return tuple(np.round(pose / _ROUNDED).astype(int).tolist())

@@ -11,6 +11,8 @@ from typing import Optional
 
 import numpy as np
 
+from glass_nav.geometry import angles, se2
+from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.observations import Meetpoint
 from glass_nav.topology.search import ambiguity, vote
 from glass_nav.topology.search.belief import NO_DART, Belief
@@ -24,6 +26,11 @@ from glass_nav.vocabulary import SearchState
 
 _MIN_DRIVEN_M = 1.0  # before a place is confirmed: odometry must agree with it
 _LOST_SEARCHES, _LOST_M = 3, 4.0  # of the whole map, and driven, before it is given up
+_PLACED = 8  # places, the likeliest first, whose node is looked up though it does not match
+_NODE_M, _EDGE_RAD = 0.7, 0.6  # from where a pose expects a meetpoint, and the directions of its edges in the mean
+_WORTH = (
+    0.2  # share of the doubt that a turn removes by itself; else it is better to drive to a difference farther away
+)
 _MAX_SHOWN = 0.9995  # of a probability in words
 
 
@@ -38,6 +45,7 @@ class JointVerdict:
         params: SearchParams,
         views: Optional[ExpectedViews] = None,
     ) -> None:
+        self._atlas = matcher.atlas
         self._matcher, self._forest, self._passed, self._params = matcher, forest, passed, params
         self._views = views
 
@@ -68,8 +76,11 @@ class JointVerdict:
             return final
         here = self._forest.meetpoints[-1]
         left = belief.left(self._params.tolerances.risk)
-        known = left[belief.dart[left] != NO_DART]
-        dart, first = np.unique(belief.dart[known], return_index=True)
+        at = belief.dart[left].copy()
+        unmatched = np.flatnonzero(at == NO_DART)[:_PLACED]
+        at[unmatched] = darts_near(self._atlas, belief.poses[left[unmatched]], here)
+        known, at = left[at != NO_DART], at[at != NO_DART]
+        dart, first = np.unique(at, return_index=True)
         order = np.argsort(first)
         dart, share = dart[order], belief.share[known[first[order]]]
         places = f"{self._place(belief)}, {len(left)} place{'s' * (len(left) != 1)} left"
@@ -78,20 +89,26 @@ class JointVerdict:
             choice = TurnChoice(self._least_passed(here), here.degree)
             reason = f"{places}; next a new edge, as more walls are to confirm it"
             return self._estimate(state, reason, depth, dart, choice)
+        poses = belief.poses[known[first[order]]]
         if self._views is not None:
-            self._views.arrive(dart)
-        voted = vote.expected(self._matcher, dart, share, self._views)
-        if voted.splits:
+            self._views.arrive(poses)
+        voted = vote.expected(self._matcher, dart, share, self._views, poses)
+        ranks = None
+        if voted.removed < _WORTH and self._views is not None:
+            ranks = vote.towards_difference(self._matcher, self._views, int(dart[0]), poses[0], poses[1:])
+        if ranks is None and voted.splits:
             reason = f"{places}; next the turn that leaves the least doubt per metre"
             return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(voted.rank, here.degree))
-        proof = ambiguity.prove(self._matcher, dart, views=self._views)
-        if proof.ranks is not None:
-            reason = f"{places}; next towards the nearest difference, {len(proof.ranks)} edges away"
-            choice = TurnChoice(proof.ranks[0], here.degree)
-            return self._estimate(SearchState.SEARCHING, reason, depth, dart, choice)
+        proof = None
+        if ranks is None:
+            proof = ambiguity.prove(self._matcher, dart, views=self._views)
+            ranks = proof.ranks
+        if ranks is not None:
+            reason = f"{places}; next towards the nearest difference, {len(ranks)} edge{'s' * (len(ranks) != 1)} away"
+            return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(ranks[0], here.degree))
         rank = self._least_passed(here)
         listed = float(belief.share[known].sum())
-        if proof.indistinguishable and 1.0 - listed < self._params.tolerances.risk and depth > 0:
+        if proof is not None and proof.indistinguishable and 1.0 - listed < self._params.tolerances.risk and depth > 0:
             reason = f"{len(dart)} places match, and no turn can tell them apart"
             return self._estimate(SearchState.AMBIGUOUS, reason, depth, dart, None)
         reason = f"{places}; no turn is known to tell them apart, next a new edge"
@@ -125,3 +142,22 @@ class JointVerdict:
             return here.degree // 2
         least = np.flatnonzero(times == times.min())
         return int(least[len(least) // 2]) if least[0] > 0 or len(least) == 1 else int(least[-1])
+
+
+def darts_near(atlas: Atlas, poses: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
+    """(K,) the dart that is the reference edge of a meetpoint where a robot with pose (K, 3) stands, by its place and the
+    directions of its edges alone; NO_DART where no node of that degree is near.
+    """
+    bearings = meetpoint.bearings_rad if len(meetpoint.bearings_rad) else np.array([np.pi])
+    dart = np.full(len(poses), NO_DART, np.int64)
+    for k, pose in enumerate(poses):
+        off_m = np.hypot(*(atlas.nodes.position_m - se2.transform_points(pose, meetpoint.centre_m)).T)
+        node = int(off_m.argmin())
+        ring = atlas.rings[node]
+        if off_m[node] >= _NODE_M or len(ring) != meetpoint.degree:
+            continue
+        turned = ring[(np.arange(len(ring))[:, None] + np.arange(len(bearings))) % len(ring)]
+        off_rad = np.abs(angles.wrap(atlas.darts.bearing_rad[turned] - pose[2] - bearings)).mean(axis=1)
+        if off_rad.min() < _EDGE_RAD:
+            dart[k] = ring[off_rad.argmin()]
+    return dart

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Dict, Optional, Tuple
+from typing import Dict, List, Optional, Tuple
 
 import numpy as np
 
@@ -112,6 +112,13 @@ class Matcher:
         for _ in range(steps):
             dart = table[dart]
         return dart.astype(np.int64)
+
+    def ring_from(self, dart: int) -> List[int]:
+        """The darts at its node by rank: the dart itself, then clockwise."""
+        found = [dart]
+        while self._next[found[-1]] != dart:
+            found.append(int(self._next[found[-1]]))
+        return found
 
     def others(self, dart: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """All other darts (K,) at the nodes of darts (C,), and the index (K,) of the given dart at the same node."""

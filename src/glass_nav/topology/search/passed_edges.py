@@ -19,7 +19,7 @@ _SAME_RAD = 0.5
 
 
 class PassedEdges:
-    """begin() with a meetpoint, then add() each edge to the next."""
+    """begin() with a meetpoint, then add() each edge to the next, or jump() there."""
 
     def __init__(self) -> None:
         self._forget()
@@ -42,6 +42,10 @@ class PassedEdges:
             self._mark(self._last, rank)
         self._driven_m += length_m
         self._mark(meetpoint, 0)
+        self._last = meetpoint
+
+    def jump(self, meetpoint: Meetpoint) -> None:
+        """The robot came to this meetpoint along no edge."""
         self._last = meetpoint
 
     def times(self, meetpoint: Meetpoint) -> Optional[np.ndarray]:

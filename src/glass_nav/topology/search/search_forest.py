@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Dict, List, Tuple
+from typing import Dict, List, Optional, Tuple
 
 import numpy as np
 
@@ -97,6 +97,7 @@ class SearchForest:
         self._traversals: List[Traversal] = []  # the one at d leads from depth d to d + 1
         self._rows: Dict[Tuple[int, int], Row] = {}  # by depth and errors
         self._errors = 0
+        self._among: Optional[np.ndarray] = None  # darts, one of which is the first reference edge; None: any is
 
     @property
     def depth(self) -> int:
@@ -118,9 +119,15 @@ class SearchForest:
         """From each depth to the next."""
         return tuple(self._traversals)
 
-    def begin(self, meetpoint: Meetpoint) -> None:
-        """Start over at a meetpoint."""
+    def begin(self, meetpoint: Meetpoint, among: Optional[np.ndarray] = None) -> None:
+        """Start over at a meetpoint.
+
+        Args:
+            meetpoint: where the robot stands.
+            among: (D,) its reference edge is one of these darts; None: any.
+        """
         self._meetpoints, self._traversals, self._rows, self._errors = [meetpoint], [], {}, 0
+        self._among = among
         self._work_out_last_row()
 
     def step(self, traversal: Traversal, meetpoint: Meetpoint) -> None:
@@ -232,6 +239,7 @@ class SearchForest:
         found = _Found()
         if depth == 0 and errors == 0:
             dart = self._matcher.all_at(self._meetpoints[0])
+            dart = dart if self._among is None else np.intersect1d(dart, self._among)
             found.add(dart, np.full(len(dart), NO_PARENT), 0, 0)
         for spurious in range(min(errors, depth - 1) + 1 if depth else 0):
             for missed in range(errors - spurious + 1):

@@ -15,6 +15,7 @@ from typing import List, Optional, Tuple
 
 import numpy as np
 
+from glass_nav.geometry import se2
 from glass_nav.topology.search.expected_views import ExpectedViews
 from glass_nav.topology.search.matching import Matcher
 
@@ -22,6 +23,7 @@ _POLLED = 100  # candidates whose expectations are compared pairwise: 2 ms of a 
 _BACK = 0.999  # share of the gain of the way back
 _MIN_GAIN = 0.01  # share of the doubt that a turn must remove to be worth taking
 _LOOKED_AT = 8  # candidates whose views are compared pairwise
+_BY_GRAPH_ALONE = 0.8  # chance that a difference of the graph is none where scans would show none: it was drawn so
 _EQUAL = 1e-9  # survivors by which two turns differ only by rounding
 
 
@@ -34,6 +36,7 @@ class Vote:
     length_m: np.ndarray  # (R,) mean length of the edges
     rank: int  # of the turn that won
     splits: bool  # some turn leaves fewer candidates than there are
+    removed: float = 0.0  # share of the doubt that the turn is expected to remove; of expected() only
 
 
 def best(matcher: Matcher, dart: np.ndarray) -> Vote:
@@ -60,7 +63,13 @@ def best(matcher: Matcher, dart: np.ndarray) -> Vote:
     )
 
 
-def expected(matcher: Matcher, dart: np.ndarray, share: np.ndarray, views: Optional[ExpectedViews] = None) -> Vote:
+def expected(
+    matcher: Matcher,
+    dart: np.ndarray,
+    share: np.ndarray,
+    views: Optional[ExpectedViews] = None,
+    poses: Optional[np.ndarray] = None,
+) -> Vote:
     """The turn that is expected to leave the least probability outside the leading place per metre driven.
 
     Args:
@@ -68,9 +77,12 @@ def expected(matcher: Matcher, dart: np.ndarray, share: np.ndarray, views: Optio
         dart: (C,) candidates at a meetpoint of one degree, two or more of them, the likeliest first.
         share: (C,) probability of each, in any unit.
         views: scans at the next meetpoint are evidence, too; None: they are not.
+        poses: (C, 3) of the robot at each candidate; None: as it arrives along its dart.
     """
     most = _POLLED if views is None else _LOOKED_AT
     dart, share = dart[:most], share[:most] / share[:most].sum()
+    if views is not None:
+        poses = views.at(dart) if poses is None else poses[:most]
     degree = int(matcher.atlas.degree[matcher.atlas.darts.node[dart[0]]])
     now = 1.0 - float(share.max())
     outside, length = np.zeros(degree), np.zeros(degree)
@@ -78,15 +90,62 @@ def expected(matcher: Matcher, dart: np.ndarray, share: np.ndarray, views: Optio
         departure = matcher.departures(dart, rank)
         likelihood = _alike(matcher, departure).astype(float)  # (C, C) of the second if the first is true
         if views is not None:
-            first, second = np.nonzero(likelihood)
-            likelihood[first, second] = np.exp(-views.nats(departure[first] ^ 1, departure[second] ^ 1))
+            assert poses is not None
+            first, second = np.nonzero(np.ones_like(likelihood))
+            there = views.at(departure ^ 1)[first]
+            nats = views.nats(there, carried(poses[first], there, poses[second]))
+            likelihood = np.maximum(likelihood, _BY_GRAPH_ALONE) * np.exp(-nats.reshape(likelihood.shape))
         left = (likelihood * share).max(axis=1) / (likelihood @ share)
         outside[rank] = float(share @ (1.0 - left))
         length[rank] = float(share @ matcher.length_m[departure >> 1])
     gain = (now - outside) / length
     gain[0] *= _BACK  # of equal turns another one
     rank = int(gain.argmax())
-    return Vote(np.arange(degree), outside, length, rank, bool(now - outside[rank] > _MIN_GAIN * now))
+    removed = float(now - outside[rank]) / max(now, _EQUAL)
+    return Vote(np.arange(degree), outside, length, rank, removed > _MIN_GAIN, removed)
+
+
+def carried(here: np.ndarray, there: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(P, 3) where a robot ends that is at other (P, 3) and believes to drive from here (P, 3) to there (P, 3)."""
+    return se2.compose(other, se2.compose(se2.inverse(here), there))
+
+
+def towards_difference(
+    matcher: Matcher, views: ExpectedViews, dart: int, pose: np.ndarray, others: np.ndarray
+) -> Optional[List[int]]:
+    """Turns to the nearest meetpoint, by edges, where a robot would see that it is not at one of the other places.
+
+    Args:
+        matcher: of the atlas.
+        views: of its map.
+        dart: along which the robot came, if the leading place is right.
+        pose: (3,) of the robot there.
+        others: (C, 3) poses at the other places.
+
+    Returns:
+        Ranks; None: no difference was found, in as many comparisons as a step may take.
+    """
+    level: List[Tuple[int, List[int]]] = [(dart, [])]
+    known = {dart}
+    while level and not views.is_exhausted:
+        following = []
+        for at, ranks in level:
+            for rank, departure in enumerate(matcher.ring_from(at)):
+                arrival = departure ^ 1
+                if arrival not in known:
+                    known.add(arrival)
+                    following.append((arrival, [*ranks, rank]))
+        if not following:
+            return None
+        there = np.repeat(views.at(np.array([arrival for arrival, _ in following])), len(others), axis=0)
+        shape = (len(following), len(others))
+        of_others = np.tile(others, (len(following), 1))
+        differs = views.differ(there, carried(np.broadcast_to(pose, there.shape), there, of_others)).reshape(shape)
+        if differs.any():
+            most = int(differs.sum(axis=1).argmax())
+            return following[most][1]
+        level = following
+    return None
 
 
 def seed(matcher: Matcher, dart: np.ndarray) -> int:

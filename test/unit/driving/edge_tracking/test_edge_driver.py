@@ -11,10 +11,11 @@ import pytest
 from made_buildings import CONTROL_S, T_MEETPOINT, T_R_M, Drive, glass_t, t_corridor, turned_to, walled
 
 from glass_nav.driving.edge_tracking import edge_driver
-from glass_nav.driving.edge_tracking.edge_driver import EdgeDriver
+from glass_nav.driving.edge_tracking.edge_driver import EdgeDriver, EdgeDriverParams
+from glass_nav.driving.edge_tracking.local_map import LocalMapParams
 from glass_nav.geometry import se2
 from glass_nav.simulation import building_file, lidar, shipped_buildings
-from glass_nav.simulation.building import Building, Pane, Thing, box
+from glass_nav.simulation.building import Building, Pane, Person, Thing, box
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import twin
 from glass_nav.topology.observations import ObservationError
@@ -290,6 +291,29 @@ def test_what_bars_the_edge_ends_it_as_blocked_in_front_of_it_and_there_is_a_way
     drive.driver.go_back()
     drive.until(lambda: drive.driver.progress.phase == DriverPhase.ARRIVED)
     assert np.hypot(*(drive.simulation.map_from_base[:2] - began)) < 0.15
+
+
+@pytest.mark.long_run
+@pytest.mark.parametrize("way_m", [[[11.0, 0.3], [9.0, 0.3]], [[10.0, 0.2], [14.0, 0.2]]], ids=["here", "away"])
+def test_somebody_who_walks_at_a_decimetre_a_second_is_no_meetpoint(way_m):
+    faces = np.array([[0.0, -1.25], [16.0, -1.25], [16.0, 1.25], [0.0, 1.25]])
+    walker = Person(np.array(way_m), speed_m_s=0.1)
+    drive = Drive(Building(walled(faces).walls, people=(walker,)), (8.0, 0.0, 0.0))
+    drive.driver.seek()
+    drive.until(lambda: drive.driver.progress.reason == "what looked like a meetpoint is none", limit_s=15.0)
+    assert drive.driver.take_arrival() is None and drive.blocked == 0
+
+
+@pytest.mark.long_run
+def test_in_a_hall_wider_than_its_window_it_drives_to_the_middle():
+    """The graph of a rectangle is the line where the long walls are nearest; a robot at a wall is far from it."""
+    window = EdgeDriverParams(local_map=LocalMapParams(window_m=9.0, narrow_window_m=6.0))
+    hall = walled(np.array([[0.0, 0.0], [16.0, 0.0], [16.0, 10.0], [0.0, 10.0]]))
+    drive = Drive(hall, (5.5, 0.8, 1.5), p=window)
+    drive.driver.seek()
+    arrival = drive.arrival()
+    assert arrival.meetpoint.r_m == pytest.approx(5.0, abs=0.2)
+    assert drive.where(arrival)[1] == pytest.approx(5.0, abs=0.3)
 
 
 @pytest.mark.long_run

@@ -103,9 +103,10 @@ def driven_past(passed, columns, scans=3):
     return [[(flat(10, column), HEAD_ON, passed)] for column in columns for _ in range(scans)]
 
 
-def gone(found, columns, axis_rad=NORMAL_RAD):
+def gone(found, columns, axis_rad=NORMAL_RAD, opaque=False):
     columns = np.asarray(columns)
-    return found.is_gone(flat(np.full(len(columns), 10), columns), np.full(len(columns), axis_rad)).tolist()
+    cell, axes_rad = flat(np.full(len(columns), 10), columns), np.full(len(columns), axis_rad)
+    return found.is_gone(cell, axes_rad, np.full(len(columns), opaque)).tolist()
 
 
 def test_a_door_that_every_beam_passes_head_on_is_gone_and_the_panes_beside_it_stay():
@@ -126,12 +127,24 @@ def test_a_gap_that_a_beam_or_two_found_is_no_door():
 def test_what_has_no_normal_and_what_is_no_cell_is_never_gone():
     found = learnt(driven_past(True, range(30)))
     assert not any(gone(found, [15], axis_rad=np.nan))
-    assert found.is_gone(np.array([-1]), np.array([NORMAL_RAD])).tolist() == [False]
+    assert found.is_gone(np.array([-1]), np.array([NORMAL_RAD]), np.array([False])).tolist() == [False]
 
 
 def test_a_wall_along_the_border_of_the_map_is_asked_within_the_map():
     found = learnt([[(flat(0, column), HEAD_ON, True)] * 3 for column in range(30)] * 3, wall_map((0, slice(None))))
-    assert found.is_gone(np.array([0, 15, 29]), np.full(3, NORMAL_RAD)).tolist() == [True] * 3
+    assert found.is_gone(np.array([0, 15, 29]), np.full(3, NORMAL_RAD), np.zeros(3, bool)).tolist() == [True] * 3
+
+
+@pytest.mark.parametrize("passes", [0, 1, 20])
+@pytest.mark.parametrize("axis_rad", [NORMAL_RAD, np.nan])
+def test_what_cannot_be_glass_is_gone_when_beams_pass_from_any_side(passes, axis_rad):
+    found = learnt([[(flat(10, 15), SIDEWAYS, True)]] * passes)
+    assert gone(found, [15], axis_rad, opaque=True) == [True]
+
+
+def test_what_cannot_be_glass_by_its_shape_and_answers_head_on_like_glass_is_not_gone():
+    found = learnt(driven_past(False, [15]) + [[(flat(10, 15), SIDEWAYS, True)]] * 20)
+    assert gone(found, [15], opaque=True) == [False]
 
 
 def test_what_has_no_normal_can_be_seen_through_too():

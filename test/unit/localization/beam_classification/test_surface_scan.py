@@ -13,16 +13,15 @@ WALL, PANE, GONE, NEW = (0.01, 0.8), (0.99, 0.99), (0.99, 0.01), (0.3, 0.8)
 
 
 def cut(ranges_m, case, first=2.0, glass=WALL, gone=False, trusted=True, gate_m=0.15, max_range_m=20.0, **offered):
-    """glass: chances of every first surface, or (B, 2) of each."""
+    """glass: chances of every first surface, or (B, 2) of each; gone: whether all that is drawn is gone."""
     ranges_m = np.atleast_1d(np.asarray(ranges_m, float))
     beams = len(ranges_m)
     seen = expect(first=np.broadcast_to(np.asarray(first, float), beams), **offered)
     return surface_scan.of(
         ranges_m=ranges_m,
         case=np.broadcast_to(case, beams).astype(np.uint8),
-        expected=seen,
+        first=surface_scan.standing(seen, lambda cell, axis_rad: np.full(len(cell), gone)),
         glass=np.broadcast_to(np.reshape(np.transpose(glass), (2, -1)), (2, beams)),
-        gone=np.full(beams, gone),
         gate_m=np.full(beams, gate_m),
         max_range_m=max_range_m,
         trusted=trusted,
@@ -39,6 +38,35 @@ def test_a_beam_that_passed_or_was_mirrored_is_cut_at_the_pane(case, glass):
 @pytest.mark.parametrize("case", range(5))
 def test_where_a_door_is_open_by_now_nothing_is_cut(case):
     assert cut(5.0, case, glass=PANE, gone=True).ranges_m.tolist() == [5.0]
+
+
+THING, DOOR, PANE_BEHIND = 1, 2, 3  # cells
+
+
+def cut_behind(ranges_m, cells, case=3, lines=(2.0, 2.6, 3.0)):
+    """One beam and the surfaces along it, of which those with the cell of a thing are gone."""
+    offered = dict(zip(("first", "second", "third"), lines))
+    cell = np.zeros((4, 1, 1), int)
+    cell[[0, 2, 3], 0, 0] = cells
+    seen = expect(**offered, cell=cell)
+    first = surface_scan.standing(seen, lambda cell, axis_rad: cell == THING)
+    glass = np.reshape(PANE, (2, 1))
+    return surface_scan.of(np.array([ranges_m]), np.array([case]), first, glass, np.full(1, 0.15), 20.0, True)
+
+
+@pytest.mark.parametrize(
+    "cells, range_m, cut_m",
+    [
+        pytest.param((THING, THING, PANE_BEHIND), 5.0, 3.0, id="a pane behind a thing that is gone"),
+        pytest.param((THING, PANE_BEHIND, DOOR), 5.0, 2.6, id="a pane, and another one"),
+        pytest.param((THING, THING, PANE_BEHIND), 2.8, 2.8, id="something between them"),
+        pytest.param((THING, THING, PANE_BEHIND), 3.0, 3.0, id="the pane itself"),
+        pytest.param((THING, THING, THING), 5.0, 5.0, id="all of it is gone"),
+        pytest.param((DOOR, THING, PANE_BEHIND), 5.0, 2.0, id="in front of a thing that is gone"),
+    ],
+)
+def test_where_a_thing_is_gone_the_next_surface_that_stands_counts(cells, range_m, cut_m):
+    assert cut_behind(range_m, cells).ranges_m.tolist() == [cut_m]
 
 
 @pytest.mark.parametrize("range_m", [2.0, 2.1, 1.0, 0.3])

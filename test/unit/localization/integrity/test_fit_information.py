@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from slow_scan_fit import SlowScanFit
 
 from glass_nav.geometry import se2
 from glass_nav.localization.integrity.fit_information import FREE_M, ScanFit
@@ -121,3 +122,24 @@ def test_beams_that_end_at_no_wall_say_nothing():
     nowhere = ends_in_room(INSIDE, x=(7.0, 9.0), y=(7.0, 9.0))
     found = fit_of(ROOM, nowhere, INSIDE)
     assert found.share < 0.05 and np.all(deviations(found)[:2] > 0.5)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_compiled_fit_agrees_with_numpy(seed):
+    """Over scans that are learnt from, with noise, a pose beside the best one, and beams that end elsewhere."""
+    rng = np.random.default_rng(seed)
+    grid_map = ROOM if seed % 2 else CORRIDOR
+    field = DistanceField(grid_map)
+    compiled, slow = (kind(field, RESOLUTION_M) for kind in (ScanFit, SlowScanFit))
+    for matched in rng.uniform(size=12) < 0.7:
+        pose = INSIDE + rng.normal(0.0, [0.5, 0.3, 0.5])
+        points_m = ends_in_room(
+            pose, int(rng.integers(1, 91)), noise_m=0.03, rng=rng, y=(5.0, 11.0) if seed % 2 else (9.0, 11.0)
+        )
+        points_m[rng.uniform(size=len(points_m)) < 0.1] *= 0.6
+        pose = pose + rng.normal(0.0, [0.03, 0.03, 0.01])
+        laser_m, beam_share = rng.normal(0.0, 0.2, 2), float(rng.uniform(0.1, 1.0))
+        found, expected = (each.of(points_m, laser_m, pose, beam_share, matched) for each in (compiled, slow))
+        np.testing.assert_allclose(found.covariance, expected.covariance, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(found.offset, expected.offset, rtol=1e-6, atol=1e-9)
+        assert found.share == pytest.approx(expected.share)

@@ -103,3 +103,28 @@ def test_of_two_alike_the_scan_holds():
     better = pose_covariance.better_of(np.eye(3), 1.5 * np.eye(3))
     assert 1.2 < better[0, 0] < 1.5
     np.testing.assert_allclose(pose_covariance.better_of(np.eye(3), 100.0 * np.eye(3)), np.eye(3), atol=1e-9)
+
+
+def mixed(first, second, ratio):
+    """A second opinion in numpy: the first covariance, with a variance for each principal axis of the other one."""
+    root = np.linalg.cholesky(first + 1e-12 * np.eye(3))
+    values, axes = np.linalg.eigh(np.linalg.solve(root, np.linalg.solve(root, second).T))
+    turned = root @ axes
+    return (turned * ratio(values)) @ turned.T
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_compiled_covariances_agree_with_numpy(seed):
+    rng = np.random.default_rng(seed)
+    roots = rng.normal(0.0, 1.0, (2, 3, 3)) * 10.0 ** rng.uniform(-3.0, 1.0, (2, 1, 3))
+    first, second = roots @ roots.transpose(0, 2, 1)
+    better = mixed(first, second, lambda v: np.where(v > 1.0, 1.0 + (v - 1.0) * np.exp(-(v - 1.0) / 1.5), v))
+    wider = mixed(first, second, lambda v: np.maximum(v * -np.expm1(-((v / 4.0) ** 2)), 1.0))
+    scale = np.sqrt(np.outer(np.diag(first), np.diag(first)))
+    np.testing.assert_allclose(pose_covariance.better_of(first, second) / scale, better / scale, atol=1e-6)
+    np.testing.assert_allclose(pose_covariance.widened_by(first, second), wider, rtol=1e-6, atol=1e-6 * wider.max())
+
+
+def test_a_covariance_that_is_not_definite_is_refused():
+    with pytest.raises(ValueError, match="not positive definite"):
+        pose_covariance.better_of(-np.eye(3), np.eye(3))

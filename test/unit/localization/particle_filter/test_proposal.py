@@ -200,3 +200,29 @@ def test_wrong_values_are_refused_in_one_line(values, text):
     with pytest.raises(ValueError) as err:
         Proposal(**values)
     assert str(err.value) == text
+
+
+def log_normal(poses, mean, covariance):
+    off = poses - mean
+    off[:, 2] = angles.wrap(off[:, 2])
+    return stats.multivariate_normal(np.zeros(3), covariance).logpdf(off)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_compiled_ratio_is_that_of_the_densities(seed):
+    """Target over proposal, both mixtures, written out with scipy's normal distribution."""
+    rng = np.random.default_rng(seed)
+    predicted, weights = cloud(rng, count=400)
+    aligned = alignment(MEAN + [0.1, 0.0, 0.02], MEAN + [-0.3, 0.2, 0.1])
+    shares = Proposal(odom_slip_probability=0.01, proposal_scan_share=0.3)
+    poses, log_ratio = draw(predicted, weights, aligned, 2.0, shares, rng)
+    near = whole(predicted, weights).covariance + np.diag([0.01, 0.01, np.radians(0.2)]) ** 2
+    slipped = near + np.diag([0.3, 0.3, np.radians(30.0)]) ** 2
+    mean = whole(predicted, weights).map_from_base
+    around = np.linalg.inv(2.0 * aligned.information + np.linalg.inv(slipped))
+    by_odometry = log_normal(poses, mean, near)
+    by_scan = np.logaddexp(*[log_normal(poses, pose, each) for pose, each in zip(aligned.poses, around)]) - np.log(2.0)
+    expected = np.logaddexp(np.log(0.99) + by_odometry, np.log(0.01) + log_normal(poses, mean, slipped))
+    expected -= np.logaddexp(np.log(0.7) + by_odometry, np.log(0.3) + by_scan)
+    expected[:280] = np.minimum(expected[:280], -np.log(0.7))  # put there by odometry
+    np.testing.assert_allclose(log_ratio, expected, rtol=1e-9, atol=1e-9)

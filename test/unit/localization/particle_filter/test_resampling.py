@@ -97,3 +97,18 @@ def test_flattening_does_not_depend_on_the_offset():
 
 def test_if_nothing_is_possible_flattening_leaves_all_equal():
     np.testing.assert_allclose(resampling.tempered(np.full(30, -np.inf)), 1.0 / 30)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_compiled_draws_and_bins_agree_with_numpy(seed):
+    rng = np.random.default_rng(seed)
+    weights = rng.dirichlet(np.full(200, 0.1))
+    drawn = resampling.low_variance(weights, 150, np.random.default_rng(seed))
+    strides = (np.arange(150) + np.random.default_rng(seed).uniform()) / 150
+    np.testing.assert_array_equal(drawn, np.searchsorted(np.cumsum(weights), strides, side="right"))
+    poses = rng.normal(0.0, 2.0, (300, 3))
+    bins = len(np.unique(np.floor(poses / resampling.BIN), axis=0))
+    share = 2.0 / (9.0 * (bins - 1))
+    needed = (bins - 1) / 0.02 * (1.0 - share + np.sqrt(share) * 0.99) ** 3
+    limits = ParticleCount(min_particles=1, max_particles=10**6)
+    assert resampling.enough_particles(poses, limits) == np.ceil(needed)

@@ -13,7 +13,7 @@ from made_scans import MadeScans
 
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import Atlas
-from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
+from glass_nav.topology.observations import NOT_FOLLOWED, Meetpoint, ObservationError, Traversal
 from glass_nav.topology.search import wake_up_trials
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search.atlas_robot import AtlasRobot, Surroundings, TrialParams
@@ -207,6 +207,28 @@ def test_a_turn_that_no_dart_has_is_refused_and_the_search_goes_on() -> None:
         localizer.update(Traversal(7, 8.0, 8.0), Meetpoint(3, 1.5))
     assert localizer.estimate is before
     assert localizer.update(Traversal(0, 8.0, 8.0), Meetpoint(3, 1.5)).depth == 1
+
+
+def test_after_a_blocked_edge_dead_reckoning_carries_the_candidates_to_the_next_meetpoint() -> None:
+    """Two equal rows of five places each, 100 m apart; the robot drives from the second place to the fourth."""
+    xy = [(5.0 * i, y) for y in (0.0, 100.0) for i in range(5)]
+    atlas = made_atlases.corridors(
+        xy, [0.5, 1.0, 1.0, 1.0, 0.5] * 2, [(row + i, row + i + 1) for row in (0, 5) for i in range(4)]
+    )
+    localizer = AtlasLocalizer(atlas, SearchParams())
+    behind_ahead = np.array([np.pi, 0.0])
+    localizer.start(Meetpoint(1, 0.5, bearings_rad=np.array([0.0]), odom_from_base=np.zeros(3)))
+    first = Meetpoint(2, 1.0, bearings_rad=behind_ahead, odom_from_base=np.array([5.0, 0.0, 0.0]))
+    before = localizer.update(Traversal(0, 5.0, 5.0), first)
+    assert len(before.dart) == 4  # from either end of either row
+    estimate = localizer.update(NOT_FOLLOWED, replace(first, odom_from_base=np.array([15.1, 0.2, 0.0])))
+    assert (estimate.state, estimate.depth) == (SearchState.SEARCHING, 1)
+    assert sorted(atlas.darts.node[estimate.dart].tolist()) == [1, 3, 6, 8]
+    expected = [[5.0, 0.0], [5.0, 100.0], [15.0, 0.0], [15.0, 100.0]]
+    assert sorted(localizer.map_from_base(estimate.dart)[:, :2].round().tolist()) == expected
+    nowhere = localizer.update(NOT_FOLLOWED, replace(first, odom_from_base=np.array([15.1, 40.0, 0.0])))
+    assert len(nowhere.dart) == 12  # dead reckoning leads to no place of the atlas: any will do
+    assert localizer.update(NOT_FOLLOWED, replace(first, odom_from_base=None)).dart.size == 12
 
 
 def test_the_pose_is_where_the_robot_says_it_stands_at_the_meetpoint() -> None:

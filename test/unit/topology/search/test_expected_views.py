@@ -30,7 +30,9 @@ AT_THE_MIDDLE = np.array([1, 5])  # of both rows, come from the west
 @pytest.mark.parametrize("differ", [True, False])
 def test_places_that_only_look_different_are_told_apart_by_going_there(differ: bool) -> None:
     matcher, views = rows(differ)
-    np.testing.assert_allclose(views.nats(np.array([3]), np.array([7])), [0.5 * 40.0 * differ])  # half of 80 pieces
+    ends = views.at(np.array([3, 7]))
+    np.testing.assert_allclose(ends, [[12.0, 0.0, 2.0 * np.pi], [112.0, 0.0, 2.0 * np.pi]])
+    np.testing.assert_allclose(views.nats(ends[:1], ends[1:]), [0.5 * 40.0 * differ])  # half of 80 pieces
     assert views.alike(np.array([3, 1]), np.array([7, 5])).tolist() == [not differ, True]
     assert ambiguity.prove(matcher, AT_THE_MIDDLE).indistinguishable  # by the graph alone
     proof = ambiguity.prove(matcher, AT_THE_MIDDLE, views=views)
@@ -39,21 +41,31 @@ def test_places_that_only_look_different_are_told_apart_by_going_there(differ: b
     assert voted.splits == differ and (not differ or voted.rank == 1)
 
 
+@pytest.mark.parametrize("differ", [True, False])
+def test_the_nearest_difference_is_found_by_where_the_robot_would_stand(differ: bool) -> None:
+    matcher, views = rows(differ)
+    west = np.array([0, 4])  # at the west ends, come from the middle
+    pose, other = views.at(west)
+    ranks = vote.towards_difference(matcher, views, int(west[0]), pose, other[None])
+    assert ranks == ([0, 1] if differ else None)  # back, then straight on
+
+
 def test_what_was_seen_once_is_expected_to_tell_nothing_more_until_another_search() -> None:
     _, views = rows(True)
-    assert views.nats(np.array([3]), np.array([7]))[0] > 0.0
-    views.arrive(np.array([3, 7]))
-    assert views.nats(np.array([3]), np.array([7])).tolist() == [0.0]
+    first, second = views.at(np.array([3])), views.at(np.array([7]))
+    assert views.differ(first, second).all()
+    views.arrive(np.concatenate([first, second]))
+    assert views.nats(first, second).tolist() == [0.0]
     views.forget()
-    assert views.nats(np.array([3]), np.array([7]))[0] > 0.0
+    assert views.differ(first, second).all()
 
 
 def test_nothing_is_proved_where_there_was_no_time_to_compare_all(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(expected_views, "_COMPARED", 1)
     matcher, views = rows(False)
-    views.arrive(np.zeros(0, np.int64))
+    views.arrive(np.zeros((0, 3)))
     assert not ambiguity.prove(matcher, AT_THE_MIDDLE, views=views).indistinguishable and views.is_exhausted
     for _ in range(20):  # the next steps go on
-        views.arrive(np.zeros(0, np.int64))
+        views.arrive(np.zeros((0, 3)))
         proved = ambiguity.prove(matcher, AT_THE_MIDDLE, views=views).indistinguishable
     assert proved and not views.is_exhausted

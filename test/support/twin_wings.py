@@ -2,7 +2,7 @@
 
 A wing is a corridor with rooms along both sides. All copies have the same walls and furniture, except where the kind says
 so: one room of one wing is furnished otherwise; one cupboard breaks the symmetry; each floor of a tower has one room
-of its own. The same seed gives the same floor.
+of its own. The same seed gives the same floor. The wake-up benchmark and the screenshots of rviz build on it.
 """
 
 from __future__ import annotations
@@ -56,6 +56,27 @@ def build(kind: str, seed: int) -> Building:
         start=se2.compose(turned, start),
         seen_m=se2.transform_points(turned, seen),
         name=f"{kind}_{seed}",
+    )
+
+
+def as_file(building: Building) -> str:
+    """The building.yaml of such a floor, for what reads files only."""
+
+    def listed(points_m: np.ndarray) -> str:
+        return str(np.round(points_m, 6).tolist())
+
+    return "\n".join(
+        [
+            "walls:",
+            *(f"  - {{line: {listed(wall.line_m)}, thickness: {THICK_M}}}" for wall in building.walls),
+            "furniture:",
+            *(
+                f"  - {{outline: {listed(thing.outline_m)}, reflectance: {thing.reflectance}}}"
+                for thing in building.things
+            ),
+            f"start: {listed(building.start)}",
+            f"seen: {listed(building.seen_m)}\n",
+        ]
     )
 
 
