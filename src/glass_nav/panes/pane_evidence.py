@@ -34,7 +34,12 @@ _TEMPER = 0.5  # scans from places next to each other are not independent
 _HALF_RAD = np.radians([2.5, 4.0, 6.5, 10.0, 15.0, 20.0])
 _PANE_HEAD_ON = (0.99, 0.95, 0.85, 0.7)
 _PANE_OBLIQUE = {0.02: 1.0, 0.06: 1.0, 0.15: 1.0, 0.3: 0.7, 0.5: 0.4, 0.7: 0.2, 0.82: 0.1}  # with its weight
-_PANE_BEFORE_NOTHING = (None, 0.7, 0.85, 0.97)  # at oblique incidence where the map has nothing behind; None: as elsewhere
+_PANE_BEFORE_NOTHING = (
+    None,
+    0.7,
+    0.85,
+    0.97,
+)  # at oblique incidence where the map has nothing behind; None: as elsewhere
 _DIRT_RAD = np.radians(30.0)  # of the share at oblique incidence half is lost there, if it is of dust and prints
 _PASSER_BY_HEAD_ON = (0.4, 0.2)  # of what stood there for a moment
 _FLAT = (0.99, 0.95, 0.9, 0.8, 0.6, 0.35, 0.2, 0.1, 0.03, 0.01)  # things, with gaps or without, and chance
