@@ -130,7 +130,7 @@ def test_where_panes_were_found_scans_pull_that_the_filter_was_not_sure_of():
     without = smoother.smooth_sure()
     found = smoother.smooth_sure(with_panes=(DistanceField(room()), without))
     assert off_m(found.trajectory.poses, true)[15:25].max() < 0.02
-    assert found.deviation_m[20] < 0.5 * without.deviation_m[20]
+    assert found.deviation_m[20] < 0.7 * without.deviation_m[20]
 
 
 def test_the_covariance_is_that_of_the_whole_system():
