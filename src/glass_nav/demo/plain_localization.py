@@ -62,14 +62,16 @@ class LikelihoodField:
             np.stack(np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5), axis=-1) / self._parts_per_m,
         )
         distance_m = DistanceField(grid_map).at(points[..., 0], points[..., 1])[0]
-        self._fit = np.exp(-0.5 * (distance_m / settings.sigma_hit_m) ** 2).astype(np.float32)
+        self._fit = np.exp(-0.5 * (distance_m / settings.sigma_hit_m) ** 2)
         self._log_p: Dict[float, np.ndarray] = {}  # by the range of the lidar
 
     def log_weights(self, map_from_base: np.ndarray, scan: Scan) -> np.ndarray:
         """(P,) log likelihoods of the scan at poses (P, 3)."""
         settings = self._settings
         if scan.range_max_m not in self._log_p:
-            self._log_p[scan.range_max_m] = np.log(settings.z_hit * self._fit + settings.z_rand / scan.range_max_m)
+            # rounded at the end: numpy's logarithm of float32 is another one in each version and on each processor
+            log_p = np.log(settings.z_hit * self._fit + settings.z_rand / scan.range_max_m)
+            self._log_p[scan.range_max_m] = log_p.astype(np.float32)
         log_p = self._log_p[scan.range_max_m]
         beams = chosen_beams(scan, settings)
         grid_from_base = se2.compose(self._grid_from_map, map_from_base) * [self._parts_per_m, self._parts_per_m, 1.0]

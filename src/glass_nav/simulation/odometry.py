@@ -18,6 +18,9 @@ WHEEL_RADIUS_M = 0.1
 JOINTS = ("left_wheel_joint", "right_wheel_joint")
 SPIN_S = 0.2  # time until a slipping wheel regains its grip
 DRAWS = 7  # random numbers per step, used or not: the events of one step do not change the others
+LEAST_MOTION = (
+    1e-12  # m, rad in a step; less is rounding, which differs between machines, and its square root would not be small
+)
 
 
 @dataclass(frozen=True)
@@ -81,7 +84,9 @@ class Odometry:
         p = self._p
         draws = self._rng.random(DRAWS)
         normals = _normal(draws[:2], draws[2:4])  # 4 of them
-        way_m, turn_rad = math.hypot(twist[0], twist[1]), abs(float(twist[2]))
+        way_m, turn_rad = (
+            motion if motion > LEAST_MOTION else 0.0 for motion in (math.hypot(*twist[:2]), abs(twist[2]))
+        )
         reported = self._reported_by_made @ twist
         reported[0] += p.slip_m_per_sqrt_m * math.sqrt(way_m) * normals[0]
         if self._kind == "omni":

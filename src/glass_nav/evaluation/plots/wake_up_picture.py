@@ -64,7 +64,8 @@ def draw(path: Path, grid: GridMap, story: WakeUpStory, title: str) -> None:
         _draw_depth(axes, grid, story.depths[number], number, low, high)
     foot = figure.add_subplot(layout[-1, :])
     foot.axis("off")
-    foot.legend(handles=_marks(story), loc="center", ncol=4, fontsize=8, frameon=False)
+    legend = foot.legend(handles=_marks(story), loc="center", ncol=4, fontsize=8, frameon=False)
+    legend.set_in_layout(False)  # its place is LEGEND_IN high; matplotlib before 3.5 would squeeze the maps for it
     figure.savefig(path)
 
 
