@@ -131,6 +131,11 @@ class Localizer:
         self._params = params
 
     @property
+    def field(self) -> DistanceField:
+        """Distances to the walls of the map."""
+        return self._field
+
+    @property
     def glass_map(self) -> GlassMap:
         """Evidence since set_map() that each wall cell of the map is glass."""
         return self._classifier.glass_map
@@ -287,7 +292,8 @@ class Localizer:
 
     def _correct(self, scan: Scan, odom_from_base: np.ndarray, step: Optional[np.ndarray]) -> BeamCases:
         """The scan draws and weighs the particles, and the best cluster of them is the pose."""
-        registration = self._filter.register(scan, odom_from_base)
+        carried = self._integrity.carried(step, self._params.odometry)
+        registration = self._filter.register(scan, odom_from_base, self._classifier.residuals, carried)
         cases, expected = self._classifier.classify(scan, registration.map_from_base, registration.covariance)
         if registration.fits:
             self._classifier.learn(scan, expected)
