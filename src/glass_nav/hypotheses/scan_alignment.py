@@ -15,7 +15,7 @@ from typing import List, Sequence
 import numpy as np
 
 from glass_nav import _distance_field
-from glass_nav.geometry import angles, se2
+from glass_nav.geometry import angles
 from glass_nav.sensing.distance_field import DistanceField
 
 _FIT_SCALE_M = 0.1  # a beam that ends this far from a wall fits by one half
@@ -55,8 +55,13 @@ def align(
     aligned = _distance_field.slid(
         field.compiled, points_m, poses, np.zeros((3, 3)), damping, iterations, first_scale_m, last_scale_m
     )
-    information = _distance_field.information(field.compiled, points_m, aligned, last_scale_m)
-    return Alignment(aligned, information, fit(field, points_m, aligned))
+    return at(field, points_m, aligned, last_scale_m)
+
+
+def at(field: DistanceField, points_m: np.ndarray, poses: np.ndarray, scale_m: float) -> Alignment:
+    """Poses (K, 3) as they are, with the information of the scan there; scale_m of the kernel."""
+    information = _distance_field.information(field.compiled, points_m, poses, scale_m)
+    return Alignment(poses, information, fit(field, points_m, poses))
 
 
 def align_near(
@@ -86,12 +91,6 @@ def align_near(
 def fit(field: DistanceField, points_m: np.ndarray, poses: np.ndarray, scale_m: float = _FIT_SCALE_M) -> np.ndarray:
     """(K,) how well the scan fits at poses (K, 3), as Alignment.fit; a beam scale_m away from a wall by one half."""
     return _distance_field.fit(field.compiled, points_m, poses, scale_m)
-
-
-def median_distance(field: DistanceField, points_m: np.ndarray, pose: np.ndarray) -> float:
-    """Median distance [m] of the beams' end points from the walls at one pose (3,)."""
-    ends_m = se2.transform_points(pose, points_m)
-    return float(np.median(field.distance(ends_m[:, 0], ends_m[:, 1])))
 
 
 def distinct(aligned: Alignment) -> Alignment:

@@ -287,7 +287,8 @@ class Localizer:
 
     def _correct(self, scan: Scan, odom_from_base: np.ndarray, step: Optional[np.ndarray]) -> BeamCases:
         """The scan draws and weighs the particles, and the best cluster of them is the pose."""
-        registration = self._filter.register(scan, odom_from_base)
+        carried = self._integrity.carried(step, self._params.odometry)
+        registration = self._filter.register(scan, odom_from_base, self._classifier.residuals, carried)
         cases, expected = self._classifier.classify(scan, registration.map_from_base, registration.covariance)
         if registration.fits:
             self._classifier.learn(scan, expected)

@@ -173,3 +173,22 @@ def spread_evenly(usable: np.ndarray, count: int) -> np.ndarray:
         return beams
     steps = np.arange(count) * ((len(beams) - 1) / max(count - 1, 1))
     return beams[np.rint(steps).astype(int)]
+
+
+def spread_over_surfaces(scan: Scan, side_m: float, count: int) -> np.ndarray:
+    """Indices of at most count beams that returned, one for each square of the floor that any ended in.
+
+    Neighbouring beams that end at one thing are one piece of evidence. Evenly spread over the angles, most beams end at
+    what is close: a cabinet beside the robot would outvote all walls behind it.
+
+    Args:
+        scan: one revolution of a lidar.
+        side_m: of the squares.
+        count: chosen evenly from them if there are more.
+    """
+    beams = np.flatnonzero(scan.answered)
+    squares = np.floor(scan.points_in_base()[beams] / side_m).astype(np.int64)
+    _, first = np.unique(squares @ [1, 2**31], return_index=True)
+    usable = np.zeros(len(scan.ranges_m))
+    usable[beams[first]] = 1.0
+    return spread_evenly(usable, count)

@@ -155,10 +155,13 @@ def test_the_fit_is_best_where_the_scan_was_taken(l_room):
     assert fit.argmin() == len(fit) - 1
 
 
-def test_the_median_distance_is_that_of_the_middle_beam(l_room):
-    # Beams that end 0, 0.1 and 0.3 m before the wall x = 6 m.
-    points = np.array([[2.0, 0.0], [1.9, 0.1], [1.7, 0.2]])
-    assert scan_alignment.median_distance(l_room, points, np.array([4.0, 1.5, 0.0])) == pytest.approx(0.1, abs=1e-5)
+def test_an_aligned_pose_has_the_information_and_the_fit_of_where_it_ended(l_room):
+    true, starts = somewhere(np.random.default_rng(7))
+    points = L_ROOM.scan(true).points_in_base()
+    aligned = scan_alignment.align(l_room, points, starts, last_scale_m=0.06)
+    there = scan_alignment.at(l_room, points, aligned.poses, 0.06)
+    np.testing.assert_array_equal(there.information, aligned.information)
+    np.testing.assert_array_equal(there.fit, aligned.fit)
 
 
 def test_far_from_all_walls_nothing_moves(l_room):

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 _NEAR_M = 0.6  # a beam that ended farther from the wall met something else
+_SIGMAS = 3.0  # and so, most likely, did one that ended this far outside of the wall as it is drawn
 _MIN_BEAMS = 20
 _MEMORY = 0.95  # per scan that is taken in
 _MAD = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
@@ -35,13 +36,19 @@ class RangeResiduals:
             thickness_m: (B,) of the wall there, as drawn.
             min_sigma_m, max_sigma_m: limits of the spread.
         """
-        off = across_m - self.depth_share * thickness_m
-        near = np.abs(off) < _NEAR_M
+        off = np.abs(across_m - self.depth_share * thickness_m)
+        near = off < _NEAR_M
         if np.count_nonzero(near) < _MIN_BEAMS:
             return self
+        near = _unless_few(near & (off < _SIGMAS * self.sigma_m + thickness_m), near)
         share = float(np.clip(np.median(across_m[near] / thickness_m[near]), 0.0, 1.0))
-        sigma = _MAD * float(np.median(np.abs(off[near])))
+        at_wall = _unless_few(near & (off < _SIGMAS * self.sigma_m), near)
+        sigma = _MAD * float(np.median(off[at_wall]))
         return RangeResiduals(
             _MEMORY * self.depth_share + (1.0 - _MEMORY) * share,
             float(np.clip(_MEMORY * self.sigma_m + (1.0 - _MEMORY) * sigma, min_sigma_m, max_sigma_m)),
         )
+
+
+def _unless_few(chosen: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
+    return chosen if np.count_nonzero(chosen) >= _MIN_BEAMS else otherwise

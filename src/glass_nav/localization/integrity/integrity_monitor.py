@@ -91,6 +91,10 @@ class IntegrityMonitor:
             self._other = suspect - map_from_base
             self._other[2] = angles.wrap(self._other[2])
 
+    def carried(self, step: Optional[np.ndarray], noise: OdometryNoise) -> Optional[np.ndarray]:
+        """(3, 3) covariance after a step (3,) of odometry since the last update, before a scan; None: unknown."""
+        return None if self._covariance is None else self._covariance.carried(step, noise)
+
     def narrow(self, spread: np.ndarray) -> None:
         """Evidence other than scans weighed the particles, whose spread (3, 3) holds now."""
         if self._covariance is not None:

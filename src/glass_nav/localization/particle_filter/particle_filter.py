@@ -20,19 +20,22 @@ from glass_nav.localization.beam_classification.range_residuals import RangeResi
 from glass_nav.localization.particle_filter import importance_weights, motion, pose_estimate, proposal, resampling
 from glass_nav.localization.particle_filter.importance_weights import BeamMixture
 from glass_nav.localization.particle_filter.motion import OdometryNoise
+from glass_nav.localization.particle_filter.odometry_prior import OdometryPrior
 from glass_nav.localization.particle_filter.pose_estimate import PoseEstimate
 from glass_nav.localization.particle_filter.proposal import Proposal
 from glass_nav.localization.particle_filter.resampling import ParticleCount
 from glass_nav.localization.particle_filter.scan_registration import ScanRegistration
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
-from glass_nav.sensing.scan import Scan, spread_evenly
+from glass_nav.sensing.scan import Scan, spread_evenly, spread_over_surfaces
 from glass_nav.world.grid_map import GridMap
 from glass_nav.world.landmark_map import LandmarkMap
 
 ONE_PLACE = np.array([1.0, 1.0, 0.7])  # deviations [m, m, rad] that preliminary samples can cover
 _MIN_ENDS = 20  # beams of known case that a registration is refined by
 _BLOCK = 2**15  # beams of particles weighed at a time
+_ONE_PIECE_M = 0.25  # beams that end closer together are one piece of evidence when a scan is registered
+_SCALE_SIGMAS = 1.5  # of the kernel that aligns, in deviations of beams around walls
 _FULL_FIT = 20.0  # log likelihood ratio of a scan that fits everywhere to one that fits nowhere
 
 
@@ -168,10 +171,19 @@ class ParticleFilter:
         log_w = bearing_weights.log_weights(self.particles, bearings, landmarks, self._params.bearings)
         self._weights = resampling.tempered(np.log(self._weights) + log_w)
 
-    def register(self, scan: Scan, odom_from_base: np.ndarray) -> Registration:
-        """Align the scan from the best cluster; a cloud that is no single place is weighed by how the scan fits."""
+    def register(
+        self, scan: Scan, odom_from_base: np.ndarray, residuals: RangeResiduals, covariance: Optional[np.ndarray] = None
+    ) -> Registration:
+        """Align the scan from the best cluster; a cloud that is no single place is weighed by how the scan fits.
+
+        Args:
+            scan: one revolution of a lidar.
+            odom_from_base: (3,) odometry at its stamp.
+            residuals: how widely beams end around walls.
+            covariance: (3, 3) of the pose that odometry led to; None: the spread of the particles.
+        """
         best = pose_estimate.of(self.particles, self._weights)
-        beams = spread_evenly(scan.answered, self._params.proposal.proposal_max_beams)
+        beams = spread_over_surfaces(scan, _ONE_PIECE_M, self._params.proposal.proposal_max_beams)
         points = scan.points_in_base()[beams]
         if not len(beams):
             return Registration(best.map_from_base, best.covariance, best, None, 0, False)
@@ -181,9 +193,13 @@ class ParticleFilter:
             best = pose_estimate.of(self.particles, self._weights)
             return Registration(best.map_from_base, best.covariance, best, None, 0, False)
         finder = self._registration
-        found = finder.find(best.map_from_base, best.covariance, odom_from_base, points)
+        scale_m = _SCALE_SIGMAS * residuals.sigma_m
+        found = finder.find(best.map_from_base, best.covariance, odom_from_base, points, scale_m)
         if not finder.is_evidence:
             return Registration(best.map_from_base, np.zeros((3, 3)), best, None, 0, False)
+        slip = self._params.proposal.odom_slip_probability if finder.contradicts_odometry else 0.0
+        prior = OdometryPrior(best.map_from_base, best.covariance if covariance is None else covariance, slip)
+        found = self._most_probable_first(found, points, prior, residuals)
         return Registration(
             found.poses[0], np.zeros((3, 3)), best, found, len(beams), finder.fits, finder.contradicts_odometry
         )
@@ -192,20 +208,18 @@ class ParticleFilter:
         """Draw particles where the scan fits, and weigh all of them by the beams whose case is known."""
         if registration.alignment is None:
             return
-        residuals, mixture, shares = classifier.residuals, self._params.mixture, self._params.proposal
+        residuals, shares = classifier.residuals, self._params.proposal
         if not registration.contradicts_odometry:
             shares = replace(shares, odom_slip_probability=0.0)
         aligned = self._refined(
             registration, scan.points_in_base()[importance_weights.known_ends(cases.case)], residuals
         )
-        independent = importance_weights.independent_beams(residuals, mixture)
-        beam_information = min(1.0, independent / registration.beams) / residuals.sigma_m**2
         self.particles, log_ratio = proposal.draw(
             self.particles,
             self._weights,
             registration.best,
             aligned,
-            beam_information,
+            self._beam_information(registration.beams, residuals),
             shares,
             self._rng,
         )
@@ -240,6 +254,31 @@ class ParticleFilter:
         return best.share >= self._params.proposal.proposal_min_cluster_share and bool(
             np.all(np.sqrt(np.diag(best.covariance)) <= ONE_PLACE)
         )
+
+    def _most_probable_first(
+        self, found: Alignment, points_m: np.ndarray, prior: OdometryPrior, residuals: RangeResiduals
+    ) -> Alignment:
+        """The alignments (K) and the one that odometry holds back, K + 1, by their posterior probability."""
+        scale_m = _SCALE_SIGMAS * residuals.sigma_m
+        held = scan_alignment.align_near(
+            self._field,
+            points_m,
+            prior.map_from_base[None],
+            prior.information / self._beam_information(len(points_m), residuals),
+            first_scale_m=2.0 * scale_m,
+            last_scale_m=scale_m,
+        )
+        near = scan_alignment.at(self._field, points_m, held, scale_m)
+        poses = np.concatenate([found.poses, near.poses])
+        log_w = importance_weights.by_field(self._field, poses, points_m, residuals, self._params.mixture)
+        order = np.argsort(-(log_w + prior.log_density(poses)))
+        information = np.concatenate([found.information, near.information])
+        return Alignment(poses[order], information[order], np.concatenate([found.fit, near.fit])[order])
+
+    def _beam_information(self, beams: int, residuals: RangeResiduals) -> float:
+        """Of one of so many beams, across the wall that it ended at [1/m2]."""
+        independent = importance_weights.independent_beams(residuals, self._params.mixture)
+        return min(1.0, independent / beams) / residuals.sigma_m**2
 
     def _refined(self, registration: Registration, ends_m: np.ndarray, residuals: RangeResiduals) -> Alignment:
         """The alignments once more, and from the predicted pose, by all beams that ended at a known surface.

@@ -18,11 +18,9 @@ from glass_nav import _particles
 from glass_nav.geometry import angles
 from glass_nav.hypotheses.scan_alignment import Alignment
 from glass_nav.localization.particle_filter import resampling
+from glass_nav.localization.particle_filter.odometry_prior import MIN_DEVIATION, SLIP_DEVIATION
 from glass_nav.localization.particle_filter.pose_estimate import PoseEstimate
 from glass_nav.params import number
-
-_MIN_DEVIATION = np.array([0.01, 0.01, np.radians(0.2)])  # of odometry: m, m, rad
-_SLIP_DEVIATION = np.array([0.3, 0.3, np.radians(30.0)])  # a wheel that slipped, a robot that was pushed
 
 
 @dataclass(frozen=True)
@@ -71,8 +69,8 @@ def draw(
     count = int(round(proposal.proposal_scan_share * len(predicted)))
     if not count or not len(aligned.poses):
         return predicted, np.log(weights + 1e-300)
-    near = best.covariance + np.diag(_MIN_DEVIATION**2)
-    slipped = near + np.diag(_SLIP_DEVIATION**2)
+    near = best.covariance + np.diag(MIN_DEVIATION**2)
+    slipped = near + np.diag(SLIP_DEVIATION**2)
     # Directions that no wall constrains keep odometry's spread.
     around = np.linalg.inv(aligned.information * beam_information + np.linalg.inv(slipped))
     which = rng.integers(len(aligned.poses), size=count)

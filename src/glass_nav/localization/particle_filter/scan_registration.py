@@ -50,8 +50,6 @@ _MIN_DEVIATION = np.array([0.01, 0.01, np.radians(0.2)])  # of odometry: m, m, r
 _CONVINCING_FIT = 0.9  # of the usual fit: a place that odometry did not lead to
 _NO_EVIDENCE_FIT = 0.4  # of the lasting fit: nothing can be said about the place
 _MEMORY, _LASTING_MEMORY = 0.9, 0.995  # weight of the past per scan
-_MIN_SCALE_M, _MAX_SCALE_M = 0.06, 0.3  # of the kernel; follows how well the map fits
-_SCALE_MEDIANS = 2.0
 
 
 class ScanRegistration:
@@ -64,7 +62,7 @@ class ScanRegistration:
         self._field = field
         self._usual_fit = float("nan")  # of the last scans
         self._lasting_fit, self._remembered = float("nan"), 0  # over many scans, and how many they were
-        self._scale_m = _MIN_SCALE_M
+        self._scale_m = float("nan")  # of the kernel in its last step
         self._suspect: Optional[np.ndarray] = None  # (3,) map_from_odom of a place that needs a second scan
 
     @property
@@ -73,7 +71,12 @@ class ScanRegistration:
         return self._suspect
 
     def find(
-        self, mean: np.ndarray, covariance: np.ndarray, odom_from_base: np.ndarray, points_m: np.ndarray
+        self,
+        mean: np.ndarray,
+        covariance: np.ndarray,
+        odom_from_base: np.ndarray,
+        points_m: np.ndarray,
+        scale_m: float,
     ) -> Alignment:
         """At most 4 distinct poses, the best first.
 
@@ -81,7 +84,9 @@ class ScanRegistration:
             mean, covariance: (3,), (3, 3) of the predicted cluster.
             odom_from_base: (3,) odometry at the scan.
             points_m: (B, 2) finite end points of beams in the robot's frame, B >= 1.
+            scale_m: of the kernel in the last step of the alignment.
         """
+        self._scale_m = scale_m
         found = self._align_around(mean, covariance, _LEVELS[0], points_m)
         suspect, self._suspect = self._suspect, None
         self.fits = not found.fit[0] < _POOR_FIT * self._usual_fit
@@ -136,8 +141,6 @@ class ScanRegistration:
         self._usual_fit = _MEMORY * past + (1.0 - _MEMORY) * fit
         self._remembered += 1
         self._lasting_fit = lasting + max(1.0 - _LASTING_MEMORY, 1.0 / self._remembered) * (fit - lasting)
-        scale = _SCALE_MEDIANS * scan_alignment.median_distance(self._field, points_m, found.poses[0])
-        self._scale_m = float(np.clip(_MEMORY * self._scale_m + (1.0 - _MEMORY) * scale, _MIN_SCALE_M, _MAX_SCALE_M))
 
     def _align_around(
         self, mean: np.ndarray, covariance: np.ndarray, shape: PreliminarySamples, points_m: np.ndarray

@@ -69,3 +69,14 @@ def test_the_spread_stays_within_its_limits():
     assert after(RangeResiduals(0.5, 0.1), [exact] * 300).sigma_m == MIN_M
     wide = np.tile([-0.55, 0.55], 50), np.full(100, 0.01)
     assert after(RangeResiduals(0.5, 0.1), [wide] * 300).sigma_m == MAX_M
+
+
+def test_a_cabinet_before_a_thin_wall_widens_nothing():
+    """Three quarters of the beams that end near the wall end at it, for a long time."""
+    rng = np.random.default_rng(0)
+    learnt = RangeResiduals(0.5, 0.04)
+    for _ in range(100):
+        across_m = np.concatenate([rng.normal(0.025, 0.02, 50), rng.normal(-0.2, 0.02, 150)])
+        learnt = learnt.learn(across_m, np.full(200, 0.05), MIN_M, MAX_M)
+    assert learnt.depth_share == pytest.approx(0.5, abs=0.1)
+    assert learnt.sigma_m == pytest.approx(0.02, abs=0.005)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from buildings import L_ROOM, off
+from buildings import L_ROOM, Building, off
 
 from glass_nav.geometry import se2
 from glass_nav.localization.beam_classification.beam_classifier import BeamClassifier
@@ -31,7 +31,7 @@ def started(at=TRUE, spread=SPREAD, params=PARAMS, **changes):
 
 def updated(particles, scan, classifier=None):
     classifier = classifier or BeamClassifier(PARAMS.classifier, MAP)
-    registration = particles.register(scan, np.zeros(3))
+    registration = particles.register(scan, np.zeros(3), classifier.residuals)
     cases, _ = classifier.classify(scan, registration.map_from_base, registration.covariance)
     particles.weigh(scan, cases, registration, classifier)
     particles.estimate()
@@ -143,3 +143,18 @@ def test_the_particles_may_be_moved_elsewhere_as_one():
     particles.move_to(np.array([4.0, 1.0, -2.0]))
     np.testing.assert_allclose(particles.best.map_from_base, [4.0, 1.0, -2.0], atol=0.01)
     np.testing.assert_allclose(np.linalg.eigvalsh(particles.best.covariance), np.linalg.eigvalsh(covariance), rtol=0.05)
+
+
+@pytest.mark.parametrize("behind_m", [0.15, 0.2, 0.25])
+def test_a_cabinet_beside_the_robot_does_not_pull_a_pose_that_odometry_knows(behind_m):
+    """It hides most of the near wall and looks like it, moved; most beams end there."""
+    outline = [(0, 0), (8, 0), (8, 3), (0, 3)]
+    grid_map = Building(outline).grid_map()
+    true = np.array([3.0, 0.8, 0.0])
+    scan = Building(outline, walls=[(1.0, behind_m, 7.0, behind_m)]).scan(true, rng=np.random.default_rng(0))
+    particles = ParticleFilter(PARAMS.particle_filter, DistanceField(grid_map), np.random.default_rng(0))
+    particles.start_around(true, np.array([0.02, 0.02, 0.01]))
+    residuals = BeamClassifier(PARAMS.classifier, grid_map).residuals
+    registration = particles.register(scan, np.zeros(3), residuals, np.diag([0.02, 0.02, 0.005]) ** 2)
+    way_m, turn_rad = off(registration.map_from_base, true)
+    assert way_m < 0.03 and turn_rad < np.radians(0.5)

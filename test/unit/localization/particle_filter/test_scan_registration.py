@@ -10,6 +10,7 @@ from glass_nav.geometry import se2
 from glass_nav.localization.particle_filter.scan_registration import ScanRegistration
 from glass_nav.sensing.distance_field import DistanceField
 
+SCALE_M = 0.06
 TIGHT = np.diag([0.03, 0.03, 0.01]) ** 2
 ODOM_FROM_MAP = np.array([5.0, -3.0, 1.0])
 RING = np.column_stack(
@@ -43,7 +44,9 @@ class Robot:
         return L_ROOM.scan(true, rng=self.rng).points_in_base().copy()
 
     def find(self, odom_from_base, points):
-        found = self.anchor.find(se2.compose(self.map_from_odom, odom_from_base), TIGHT, odom_from_base, points)
+        found = self.anchor.find(
+            se2.compose(self.map_from_odom, odom_from_base), TIGHT, odom_from_base, points, SCALE_M
+        )
         self.map_from_odom = se2.compose(found.poses[0], se2.inverse(odom_from_base))
         return found
 
@@ -55,7 +58,7 @@ def test_a_scan_is_found_where_it_was_taken(l_room, seed):
     for true in loop_drive(8):
         prediction = true + rng.normal(0.0, [0.1, 0.1, 0.05])
         points = L_ROOM.scan(true, rng=rng).points_in_base()
-        found = anchor.find(prediction, np.diag([0.1, 0.1, 0.05]) ** 2, odometry_at(true), points)
+        found = anchor.find(prediction, np.diag([0.1, 0.1, 0.05]) ** 2, odometry_at(true), points, SCALE_M)
         way_m, turn_rad = off(found.poses[0], true)
         assert way_m < 0.01 and turn_rad < np.radians(0.3)
 
@@ -68,7 +71,11 @@ def test_an_uncertain_prediction_is_searched_around_widely(l_room, seed):
     bearing = rng.uniform(-np.pi, np.pi)
     prediction = true + [0.45 * np.cos(bearing), 0.45 * np.sin(bearing), np.radians(20.0) * (-1) ** seed]
     found = ScanRegistration(l_room).find(
-        prediction, np.diag([0.4, 0.4, 0.3]) ** 2, odometry_at(true), L_ROOM.scan(true, rng=rng).points_in_base()
+        prediction,
+        np.diag([0.4, 0.4, 0.3]) ** 2,
+        odometry_at(true),
+        L_ROOM.scan(true, rng=rng).points_in_base(),
+        SCALE_M,
     )
     way_m, turn_rad = off(found.poses[0], true)
     assert way_m < 0.01 and turn_rad < np.radians(0.3)
@@ -106,7 +113,7 @@ def test_a_spin_is_also_confirmed_by_a_scan_from_farther_on(l_room, seed):
 def test_one_absurd_scan_leaves_no_trace_in_the_next(l_room, seed):
     true = np.array([2.0, 1.6, 0.7])
     robot = Robot(l_room, true, seed)
-    robot.anchor.find(true, TIGHT, odometry_at(true), RING)
+    robot.anchor.find(true, TIGHT, odometry_at(true), RING, SCALE_M)
     found = robot.find(odometry_at(true), robot.points(true))  # of a robot that kept to odometry
     way_m, turn_rad = off(found.poses[0], true)
     assert way_m < 0.02 and turn_rad < np.radians(0.5)
@@ -119,7 +126,9 @@ def test_a_scan_that_fits_nowhere_twice_is_not_believed_either(l_room, seed):
     robot = Robot(l_room, true, seed)
     crowd = robot.rng.uniform(-2.0, 2.0, (90, 2))
     for _ in range(3):
-        assert off(robot.anchor.find(true, TIGHT, odometry_at(true), crowd).poses[0], true)[1] < np.radians(40.0)
+        assert off(robot.anchor.find(true, TIGHT, odometry_at(true), crowd, SCALE_M).poses[0], true)[1] < np.radians(
+            40.0
+        )
 
 
 def test_two_ways_to_fit_are_both_told():
@@ -128,7 +137,7 @@ def test_two_ways_to_fit_are_both_told():
     true = np.array([2.0, 2.0, np.radians(45.0)])
     points = square.scan(true, rng=np.random.default_rng(0)).points_in_base()
     found = ScanRegistration(DistanceField(square.grid_map())).find(
-        np.array([2.0, 2.0, 0.0]), np.diag([0.05, 0.05, 0.35]) ** 2, true, points
+        np.array([2.0, 2.0, 0.0]), np.diag([0.05, 0.05, 0.35]) ** 2, true, points, SCALE_M
     )
     assert len(found.poses) >= 2
     assert {int(turn) for turn in np.round(np.degrees(found.poses[:, 2]))} >= {45, -45}
@@ -140,7 +149,7 @@ def test_told_places_are_distinct_good_and_at_most_four():
     true = np.array([30.0, 0.9, 0.0])
     scan = CORRIDOR.scan(true, rng=rng)
     points = scan.points_in_base()[scan.ranges_m < 8.0]  # the corridor fits anywhere along itself
-    found = ScanRegistration(field).find(true, np.diag([0.3, 0.05, 0.03]) ** 2, true, points)
+    found = ScanRegistration(field).find(true, np.diag([0.3, 0.05, 0.03]) ** 2, true, points, SCALE_M)
     assert 2 <= len(found.poses) <= 4
     assert len(found.information) == len(found.fit) == len(found.poses)
     assert np.all(np.diff(found.fit) <= 0.0)
@@ -154,7 +163,7 @@ def test_told_places_are_distinct_good_and_at_most_four():
 def test_the_same_scan_again_is_the_same_answer(l_room):
     true = np.array([2.0, 1.6, 0.7])
     points = L_ROOM.scan(true).points_in_base()
-    first, second = (ScanRegistration(l_room).find(true, TIGHT, true, points) for _ in range(2))
+    first, second = (ScanRegistration(l_room).find(true, TIGHT, true, points, SCALE_M) for _ in range(2))
     np.testing.assert_allclose(first.poses, second.poses, atol=1e-9)
     np.testing.assert_allclose(first.fit, second.fit, atol=1e-9)
 
@@ -170,7 +179,7 @@ def test_a_scan_contradicts_odometry_only_if_it_fits_beside_the_place_that_odome
     slipped = true + [0.25 * np.cos(seed), 0.25 * np.sin(seed), 0.1]
     robot.find(odometry_at(true), robot.points(slipped))
     assert robot.anchor.contradicts_odometry
-    robot.anchor.find(true, TIGHT, odometry_at(true), RING)  # fits nowhere
+    robot.anchor.find(true, TIGHT, odometry_at(true), RING, SCALE_M)  # fits nowhere
     assert not robot.anchor.contradicts_odometry
 
 
@@ -182,7 +191,7 @@ def test_a_scan_that_fits_all_along_a_corridor_contradicts_no_odometry(seed):
         true = np.array([x_m, 0.9, 0.0])
         prediction = true + [rng.normal(0.0, 0.3), 0.0, 0.0]
         points = CORRIDOR.scan(true, rng=rng).points_in_base().copy()
-        anchor.find(prediction, TIGHT, prediction, points[np.isfinite(points).all(axis=1)])
+        anchor.find(prediction, TIGHT, prediction, points[np.isfinite(points).all(axis=1)], SCALE_M)
         assert not anchor.contradicts_odometry
 
 

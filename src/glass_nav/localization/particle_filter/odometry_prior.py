@@ -1,0 +1,50 @@
+"""Where odometry led the pose -> how probable are poses nearby, before the scan is looked at.
+
+Scans with many returns that the map lacks may fit better beside the pose than at it: the walls of a building behind the
+panes, a cabinet beside a wall. So the pose that a scan is classified at is the most probable one, not the one that fits
+best. A wheel may have slipped: then a wider distribution holds, with a small weight. K poses.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from glass_nav.geometry import angles
+
+MIN_DEVIATION = np.array([0.01, 0.01, np.radians(0.2)])  # of odometry: m, m, rad
+SLIP_DEVIATION = np.array([0.3, 0.3, np.radians(30.0)])  # a wheel that slipped, a robot that was pushed
+
+
+@dataclass(frozen=True)
+class OdometryPrior:
+    """Over planar poses."""
+
+    map_from_base: np.ndarray  # (3,) where odometry led
+    covariance: np.ndarray  # (3, 3) of that over x [m], y [m], yaw [rad] in map
+    slip_probability: float = 0.0  # that this step of odometry is useless
+
+    @property
+    def information(self) -> np.ndarray:
+        """(3, 3) of a step that did not slip."""
+        return np.linalg.inv(self._near)
+
+    def log_density(self, poses: np.ndarray) -> np.ndarray:
+        """(K,) of poses (K, 3), but for a constant."""
+        near = self._log_normal(poses, self._near) + np.log1p(-self.slip_probability)
+        if not self.slip_probability:
+            return near
+        slipped = self._log_normal(poses, self._near + np.diag(SLIP_DEVIATION**2))
+        return np.logaddexp(near, slipped + np.log(self.slip_probability))
+
+    @property
+    def _near(self) -> np.ndarray:
+        return self.covariance + np.diag(MIN_DEVIATION**2)
+
+    def _log_normal(self, poses: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+        off = poses - self.map_from_base
+        off[:, 2] = angles.wrap(off[:, 2])
+        root = np.linalg.cholesky(covariance)
+        deviations = np.linalg.solve(root, off.T)
+        return -0.5 * np.sum(deviations**2, axis=0) - np.log(np.diag(root)).sum()
