@@ -49,9 +49,10 @@ from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.localization.beam_classification.unmapped_panes import PaneUse
 from glass_nav.localization.localizer import Localizer
 from glass_nav.localization.localizer_params import LocalizerParams
-from glass_nav.panes.pane_finder import PaneFinder
+from glass_nav.panes.pane_finder import PaneFinderParams
 from glass_nav.recording import log_file
 from glass_nav.recording.recording import LogOptions, Step
+from glass_nav.replay.replay_panes import PaneSearch
 from glass_nav.replay.smoother import Smoother
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.simulation import (
@@ -184,10 +185,9 @@ def truth_of(frames: Sequence[Frame]) -> Trajectory:
 
 def by_command(grid_map: GridMap, frames: Sequence[Frame], smoother: Smoother, with_truth: bool) -> List[Pane]:
     """The panes that `map panes` draws after a drive that the smoother listened to."""
-    poses, finder = smoother.smooth_sure(truth_of(frames) if with_truth else None), PaneFinder(grid_map)
-    for frame in frames if poses is not None else ():
-        finder.observe(frame.scan, *poses.at(frame.scan.stamp_ns))
-    return [pane for pane in finder.panes(anew=True) if pane.probability >= PaneUse().pane_min_probability]
+    search = PaneSearch(grid_map, PaneFinderParams())
+    search.add_drive(smoother, lambda: (frame.scan for frame in frames), truth_of(frames) if with_truth else None)
+    return [pane for pane in search.panes() if pane.probability >= PaneUse().pane_min_probability]
 
 
 def _number(value: Optional[float]) -> float:

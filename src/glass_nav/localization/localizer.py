@@ -131,6 +131,11 @@ class Localizer:
         self._params = params
 
     @property
+    def field(self) -> DistanceField:
+        """Distances to the walls of the map."""
+        return self._field
+
+    @property
     def glass_map(self) -> GlassMap:
         """Evidence since set_map() that each wall cell of the map is glass."""
         return self._classifier.glass_map

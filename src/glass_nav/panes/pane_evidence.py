@@ -2,12 +2,15 @@
 
 Pieces of the line are looked up in every scan that saw them: a beam returned there, passed, or ended before. A pane
 returns what comes along its normal and lets the rest pass; a thing returns what comes from anywhere; clutter and people
-return little. L pieces, S scans.
+return little. Where a line of glass ends, and where another piece of it begins, follows from all pieces together: one
+piece alone is seen head-on by a scan or two. Where the map has nothing behind a pane, its own weak echo may be the only one, so
+that it returns oblique beams too; a thing returns the same there and elsewhere. L pieces, S scans.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Tuple
 
 import numpy as np
@@ -19,6 +22,8 @@ PIECE_M = 0.1
 _BOUNDS_RAD = np.radians([0.0, 3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 45.0, 65.0])  # of incidence
 _MIDDLE_RAD = 0.5 * (_BOUNDS_RAD[1:] + _BOUNDS_RAD[:-1])
 INCIDENCES = len(_MIDDLE_RAD)
+_BINS = 2 * INCIDENCES  # of beams with something mapped behind the line, then of those without
+_BEHIND, _OPEN = slice(INCIDENCES), slice(INCIDENCES, _BINS)
 _NEAR_NORMAL = 5  # of them: up to 20 degrees
 _AT_M = 0.1  # across the line: the beam ended there
 _BEHIND_M = 0.2  # it went on behind
@@ -29,28 +34,44 @@ _TEMPER = 0.5  # scans from places next to each other are not independent
 _HALF_RAD = np.radians([2.5, 4.0, 6.5, 10.0, 15.0, 20.0])
 _PANE_HEAD_ON = (0.99, 0.95, 0.85, 0.7)
 _PANE_OBLIQUE = {0.02: 1.0, 0.06: 1.0, 0.15: 1.0, 0.3: 0.7, 0.5: 0.4, 0.7: 0.2, 0.82: 0.1}  # with its weight
+_PANE_BEFORE_NOTHING = (
+    None,
+    0.7,
+    0.85,
+    0.97,
+)  # at oblique incidence where the map has nothing behind; None: as elsewhere
 _DIRT_RAD = np.radians(30.0)  # of the share at oblique incidence half is lost there, if it is of dust and prints
 _PASSER_BY_HEAD_ON = (0.4, 0.2)  # of what stood there for a moment
 _FLAT = (0.99, 0.95, 0.9, 0.8, 0.6, 0.35, 0.2, 0.1, 0.03, 0.01)  # things, with gaps or without, and chance
 _LEAKS = (1.0, 0.95, 0.9)  # of things at oblique incidence: beams pass their edges
 _OBLIQUE_RAD = np.radians(25.0)
+_NOTHING, _THING = (0.1, 0.03, 0.01), (0.99, 0.95, 0.9, 0.8)  # of _FLAT: what a line without glass goes through
+_CHANGE = 3.4  # nats: a line changes from one kind to another once in 3 m
+
+
+class Kind(IntEnum):
+    """What a piece of a line is."""
+
+    PANE = 0
+    NOTHING = 1
+    THING = 2  # a post, a pillar, furniture
 
 
 @dataclass(frozen=True)
 class Counts:
-    """What was seen of pieces of a line, by incidence."""
+    """What was seen of pieces of a line, by incidence, before something mapped and before nothing."""
 
-    returns: np.ndarray  # (L, INCIDENCES)
-    passes: np.ndarray  # (L, INCIDENCES)
+    returns: np.ndarray  # (L, 2, INCIDENCES)
+    passes: np.ndarray  # (L, 2, INCIDENCES)
     seen_from_m: np.ndarray  # (L,) spread along the line of the places that saw returns near the normal
 
     def head_on(self, pieces: np.ndarray) -> int:
         """Returns near the normal, all pieces (K,) together."""
-        return int(self.returns[pieces, :_NEAR_NORMAL].sum())
+        return int(self.returns[pieces, :, :_NEAR_NORMAL].sum())
 
     def oblique(self, pieces: np.ndarray) -> int:
         """Passes at oblique incidence."""
-        return int(self.passes[pieces, _NEAR_NORMAL:].sum())
+        return int(self.passes[pieces, :, _NEAR_NORMAL:].sum())
 
 
 def counts(scans: KeptScans, middle_m: np.ndarray, normal: np.ndarray, reach_m: float) -> Counts:
@@ -65,7 +86,7 @@ def counts(scans: KeptScans, middle_m: np.ndarray, normal: np.ndarray, reach_m: 
     laser = scans.map_from_laser
     low, high = middle_m.min(axis=0) - reach_m, middle_m.max(axis=0) + reach_m
     rows = np.flatnonzero(((laser[:, :2] >= low) & (laser[:, :2] <= high)).all(axis=1))
-    shape = len(middle_m), INCIDENCES
+    shape = len(middle_m), 2, INCIDENCES
     if not len(rows):
         return Counts(np.zeros(shape), np.zeros(shape), np.zeros(len(middle_m)))
     laser = laser[rows]
@@ -83,12 +104,9 @@ def counts(scans: KeptScans, middle_m: np.ndarray, normal: np.ndarray, reach_m: 
         returned = seen & (np.abs(beyond_m) <= _AT_M)
         lost = np.isposinf(measured) & (cos * scans.range_max_m[rows, None] ** 2 > 4.0 * away_m**2)
         passed = seen & (beyond_m > _BEHIND_M) & (np.isfinite(measured) | lost)
-    piece = np.broadcast_to(np.arange(len(middle_m)), kind.shape)
+    cell = (2 * np.arange(len(middle_m)) + np.isposinf(mapped)) * INCIDENCES + kind
     tables = [
-        np.bincount(piece[which] * INCIDENCES + kind[which], minlength=shape[0] * INCIDENCES)
-        .reshape(shape)
-        .astype(float)
-        for which in (returned, passed)
+        np.bincount(cell[which], minlength=np.prod(shape)).reshape(shape).astype(float) for which in (returned, passed)
     ]
     tangent = np.array([normal[1], -normal[0]])
     place_m = laser[:, :2] @ tangent
@@ -104,20 +122,56 @@ class Likelihoods:
 
     def __init__(self, seen: Counts) -> None:
         share = _TEMPER * np.minimum(1.0, _MOST / np.maximum(seen.returns + seen.passes, 1.0))
-        returns, passes = share * seen.returns, share * seen.passes
-        self._pane = returns @ np.log(_PANE).T + passes @ np.log1p(-_PANE).T  # (L, H)
-        self._other = returns @ np.log(_OTHER).T + passes @ np.log1p(-_OTHER).T
+        self._returns, self._passes = ((share * count).reshape(-1, _BINS) for count in (seen.returns, seen.passes))
+        self._pane, self._other = self._of(_PANE), self._of(_OTHER)
 
-    def pieces(self, sure: np.ndarray) -> np.ndarray:
-        """(L,) log likelihood ratio of each piece; the lobe is the one that fits the sure pieces (L,) bool best."""
-        best = np.argmax(self._pane[sure].sum(axis=0) + _PANE_LOG_WEIGHT)
-        ratio: np.ndarray = self._pane[:, best] - _log_mean(self._other)
-        return ratio
+    def _of(self, shares: np.ndarray, bins: slice = slice(None)) -> np.ndarray:
+        """(L, H) log likelihood of each piece, for shares (H, _BINS) of beams that return."""
+        shares = shares[:, bins]
+        log_likelihoods: np.ndarray = (
+            self._returns[:, bins] @ np.log(shares).T + self._passes[:, bins] @ np.log1p(-shares).T
+        )
+        return log_likelihoods
+
+    def kinds(self, sure: np.ndarray, mapped: np.ndarray) -> np.ndarray:
+        """(L,) Kind of each piece: the most probable sequence (Viterbi).
+
+        Args:
+            sure: (L,) bool pieces that returned beams head-on; the glass is the one that fits them best. How much of it
+                returns before nothing differs from piece to piece, and does not tell it from a thing.
+            mapped: (L,) bool pieces that belong to something on the map: they say nothing.
+        """
+        hypotheses = -1, len(_PANE_BEFORE_NOTHING)
+        fits = self._pane[sure].reshape(int(sure.sum()), *hypotheses).max(axis=2).sum(axis=0)
+        best = np.argmax(fits + _PANE_LOG_WEIGHT.reshape(hypotheses)[:, 0])
+        glass = _PANE.reshape(*hypotheses, _BINS)[best]
+        before_nothing = _log_mean(self._of(glass, _OPEN))
+        pane = self._of(glass[:1], _BEHIND)[:, 0] + before_nothing
+        thing = _log_mean(self._of(_OPAQUE, _BEHIND)) + before_nothing
+        likelihoods = np.stack([pane, _log_mean(self._of(_EMPTY)), thing], axis=1)
+        return _most_probable(np.where(mapped[:, None], 0.0, likelihoods))
 
     def whole(self, pieces: np.ndarray) -> float:
         """Log likelihood ratio of some pieces (K,) as one pane."""
         pane, other = self._pane[pieces].sum(axis=0), self._other[pieces].sum(axis=0)
         return float(_log_sum(pane + _PANE_LOG_WEIGHT) - _log_sum(other - np.log(len(other))))
+
+
+def _most_probable(log_likelihoods: np.ndarray) -> np.ndarray:
+    """(L,) the sequence of states with the highest likelihood, of (L, K) by state; each change costs the same."""
+    came_from = np.zeros(log_likelihoods.shape, int)
+    score, stay = np.zeros(log_likelihoods.shape[1]), np.arange(log_likelihoods.shape[1])
+    for piece, likelihood in enumerate(log_likelihoods):
+        best = int(np.argmax(score))
+        changes = score < score[best] - _CHANGE
+        came_from[piece] = np.where(changes, best, stay)
+        score = np.maximum(score, score[best] - _CHANGE) + likelihood
+    states = np.zeros(len(log_likelihoods), int)
+    state = int(np.argmax(score))
+    for piece in range(len(states) - 1, -1, -1):
+        states[piece] = state
+        state = came_from[piece, state]
+    return states
 
 
 def _log_sum(values: np.ndarray) -> float:
@@ -138,29 +192,36 @@ def _lobe(half_rad: float) -> np.ndarray:
 
 
 def _pane_shares() -> "Tuple[np.ndarray, np.ndarray]":
-    """(H, INCIDENCES) share of the beams that a pane returns, by hypothesis, and (H,) the log of its weight."""
+    """(H, _BINS) share of the beams that a pane returns, by hypothesis, and (H,) the log of its weight."""
     shares, weights = [], []
     for half_rad in _HALF_RAD:
+        lobe = _lobe(half_rad)
         for head_on in _PANE_HEAD_ON:
             for ratio, weight in _PANE_OBLIQUE.items():
                 for oblique in (np.ones(INCIDENCES), 0.5 ** ((_MIDDLE_RAD / _DIRT_RAD) ** 2)):
-                    lobe = _lobe(half_rad)
-                    shares.append(head_on * (ratio * oblique * (1.0 - lobe) + lobe))
-                    weights.append(weight)
+                    for open_ratio in _PANE_BEFORE_NOTHING:
+                        before = ratio * oblique, ratio * oblique if open_ratio is None else open_ratio
+                        shares.append(np.concatenate([head_on * (each * (1.0 - lobe) + lobe) for each in before]))
+                        weights.append(weight)
     return np.clip(np.array(shares), 0.01, 0.99), np.log(np.array(weights) / np.sum(weights))
 
 
 def _other_shares() -> np.ndarray:
-    """(H, INCIDENCES) the same for things, chance and people."""
-    leaks = [np.where(_MIDDLE_RAD > _OBLIQUE_RAD, leak, 1.0) for leak in _LEAKS]
-    flat = [share * leak for share in _FLAT for leak in leaks]
+    """(H, _BINS) the same for things, chance and people."""
     people = [
-        head_on * (ratio + (1.0 - ratio) * _lobe(half_rad))
+        np.tile(head_on * (ratio + (1.0 - ratio) * _lobe(half_rad)), 2)
         for head_on in _PASSER_BY_HEAD_ON
         for ratio in (0.02, 0.15)
         for half_rad in _HALF_RAD
     ]
-    return np.clip(np.array(flat + people), 0.01, 0.99)
+    return np.clip(np.concatenate([_flat_shares(_FLAT), people]), 0.01, 0.99)
+
+
+def _flat_shares(shares: "Tuple[float, ...]") -> np.ndarray:
+    """(H, _BINS) the same from everywhere, but for what leaks by the edges."""
+    leaks = [np.tile(np.where(_MIDDLE_RAD > _OBLIQUE_RAD, leak, 1.0), 2) for leak in _LEAKS]
+    return np.clip(np.array([share * leak for share in shares for leak in leaks]), 0.01, 0.99)
 
 
 (_PANE, _PANE_LOG_WEIGHT), _OTHER = _pane_shares(), _other_shares()
+_EMPTY, _OPAQUE = _flat_shares(_NOTHING), _flat_shares(_THING)

@@ -18,7 +18,7 @@ from glass_nav.geometry import se2
 from glass_nav.panes import kept_scans, pane_evidence, pane_lines, wall_intensity
 from glass_nav.panes.kept_scans import KeptScans
 from glass_nav.panes.mapped_surfaces import MappedSurfaces
-from glass_nav.panes.pane_evidence import PIECE_M, Counts, Likelihoods
+from glass_nav.panes.pane_evidence import PIECE_M, Counts, Kind, Likelihoods
 from glass_nav.panes.pane_lines import Line, Returns
 from glass_nav.panes.wall_intensity import WallIntensity
 from glass_nav.params import number
@@ -30,12 +30,13 @@ _TURN_RAD = 0.4  # a robot that turned so far sees something else
 _LOOK_FARTHER = 4.0  # times the reach: where the map says that a beam ends
 _LEAST_VOTES_M, _LEAST_SCANS = 0.25, 3  # of a line that is looked at more closely
 _LEAST_SPREAD_M = 0.3  # of the places that saw a pane
-_PIECE_CONTRADICTION, _GAP_CONTRADICTION = -1.0, -1.5  # log odds at which beams say that nothing stands there
+_POST_M = 0.3  # a thing between two panes that is not wider is a post of their frame
 _MOST_LOG_ODDS = 30.0
 _KNOWN_LOG_ODDS = 4.0  # limit for a pane known from before: beams can overrule it
 _FORGOTTEN = 0.01  # a candidate less probable than this is dropped
 _HELD_LOG_ODDS = (-2.5, 0.0, 1.5)  # more for a pane of which so many ends meet something mapped
 _LOOSE_M = 4.0  # a person who walks beside the robot traces a line too: a shorter one needs an end that is held
+_SURE_SCANS = 10  # the beams of one scan err together: a pane that fewer scans saw head-on is less sure
 _DUE_SCANS = 30  # kept since the panes were last looked for
 _SAME_ACROSS_M, _SAME_COS = 0.25, float(np.cos(np.radians(20.0)))
 _THIN_M = 0.05  # of a surface for each return that is kept
@@ -83,6 +84,15 @@ class PaneFinderParams:
                 raise ValueError(f"~{name} must be finite and >= 0 m, got {getattr(self, name)}")
         if not self.pane_max_scans >= 1:
             raise ValueError(f"~pane_max_scans must be >= 1, got {self.pane_max_scans}")
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """A part of a line."""
+
+    ends_m: Tuple[float, float]  # along the line, from its centre
+    own: np.ndarray  # (K,) pieces of it that are neither mapped nor posts
+    members: np.ndarray  # (M,) its returns near the normal
 
 
 class PaneFinder:
@@ -220,48 +230,40 @@ class PaneFinder:
         seen_head_on = (np.bincount(member, minlength=count)[:count] > 0) & ~mapped
         counts = pane_evidence.counts(self._scans, middle_m, line.normal, p.pane_reach_m)
         likelihoods = Likelihoods(counts)
-        log_odds = likelihoods.pieces(seen_head_on)
-        mapped |= self._mapped.is_speck(middle_m) & (log_odds < 0.0)  # a post between panes
-        log_odds[mapped] = 0.0
-        supported = np.flatnonzero(seen_head_on & ~mapped & (log_odds > _PIECE_CONTRADICTION))
+        kinds = likelihoods.kinds(seen_head_on, mapped)
+        supported = np.flatnonzero(seen_head_on & (kinds == Kind.PANE))
+        mapped |= kinds != Kind.PANE  # posts, mapped or not, say nothing of the panes beside them
         panes = []
-        for first, last in self._stretches(supported, log_odds):
+        for first, last in self._stretches(supported, kinds):
             inside = np.arange(first, last + 1)
             ends_m = at_m[first] - 0.5 * PIECE_M, at_m[last] + 0.5 * PIECE_M
-            on_it = line.members[(member >= first) & (member <= last)]
-            intensity = wall_intensity.log_odds(returns.excess[on_it])
-            pane = self._pane(line, ends_m, inside[~mapped[first : last + 1]], counts, likelihoods, intensity)
+            members = line.members[(member >= first) & (member <= last)]
+            stretch = _Stretch(ends_m, inside[~mapped[first : last + 1]], members)
+            pane = self._pane(line, stretch, returns, counts, likelihoods)
             panes += [] if pane is None else [pane]
         return panes
 
-    def _stretches(self, supported: np.ndarray, log_odds: np.ndarray) -> List[Tuple[int, int]]:
-        """First and last piece of each stretch of supported pieces, joined over gaps that no beam contradicts."""
-        most = int(round(self._p.pane_join_m / PIECE_M))
+    def _stretches(self, supported: np.ndarray, kinds: np.ndarray) -> List[Tuple[int, int]]:
+        """First and last piece of each stretch of supported pieces, joined over short gaps and posts."""
+        most, post = int(round(self._p.pane_join_m / PIECE_M)), int(round(_POST_M / PIECE_M))
         stretches: List[Tuple[int, int]] = []
         for at in supported.tolist():
             if stretches:
                 first, last = stretches[-1]
-                gap = log_odds[last + 1 : at]
-                if len(gap) <= most and np.minimum(gap, 0.0).sum() > _GAP_CONTRADICTION:
+                gap = kinds[last + 1 : at]
+                if len(gap) <= most and not (gap == Kind.NOTHING).any() and (gap == Kind.THING).sum() <= post:
                     stretches[-1] = first, at
                     continue
             stretches.append((at, at))
         return stretches
 
     def _pane(
-        self,
-        line: Line,
-        ends_m: Tuple[float, float],
-        own: np.ndarray,
-        counts: Counts,
-        likelihoods: Likelihoods,
-        intensity: float,
+        self, line: Line, stretch: _Stretch, returns: Returns, counts: Counts, likelihoods: Likelihoods
     ) -> Optional[Pane]:
-        """The pane between two places along a line, by its own pieces and the log odds of its intensities; None if too
-        little of it was seen.
-        """
+        """The pane on a stretch of a line; None if too little of it was seen."""
+        own, ends_m = stretch.own, stretch.ends_m
         seen_from_m = max(float(counts.seen_from_m[own].max()), ends_m[1] - ends_m[0])
-        if ends_m[1] - ends_m[0] < self._p.pane_min_length_m or seen_from_m < _LEAST_SPREAD_M:
+        if (len(own) + 0.5) * PIECE_M < self._p.pane_min_length_m or seen_from_m < _LEAST_SPREAD_M:
             return None
         start_m, end_m = self._to_wall(line, ends_m[0], -1.0), self._to_wall(line, ends_m[1], 1.0)
         pane = Pane(
@@ -276,8 +278,12 @@ class PaneFinder:
         before = next((known.probability for known in self._given if _is_one_of(pane, [known])), 0.0)
         held = sum(self._is_held(line, end_m, sign) for end_m, sign in zip(ends_m, (-1.0, 1.0)))
         share = 1.0 if held else min(1.0, pane.length_m / _LOOSE_M) ** 2
-        log_odds = self._prior(before) + _HELD_LOG_ODDS[held] + share * likelihoods.whole(own)
-        return replace(pane, probability=_probability(log_odds + intensity))
+        scans = min(len(np.unique(returns.scan[stretch.members])), _SURE_SCANS)
+        inner = own[1:-1]  # beams pass the edges of a thing
+        beams = share * likelihoods.whole(inner) / _SURE_SCANS + line.straightness(returns.points_m[stretch.members])
+        intensity = wall_intensity.log_odds(returns.excess[stretch.members])
+        log_odds = self._prior(before) + _HELD_LOG_ODDS[held] + scans * beams + intensity
+        return replace(pane, probability=_probability(log_odds))
 
     def _is_held(self, line: Line, end_m: float, sign: float) -> bool:
         """Whether the line goes on from this end to something mapped: a wall, a post, more of the pane."""

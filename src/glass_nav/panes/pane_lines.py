@@ -18,6 +18,7 @@ _TURN_RAD, _OFFSET_M, _ALONG_M = np.radians(4.0), 0.1, 1.0  # bins of the votes
 _VOTES_RAD = np.radians(12.0)  # a beam returns within this of the normal
 _JOIN_M = 1.5
 _NEAR_M = 0.12  # of the line that a return belongs to
+_SIGMA_M = 0.04  # of a return across a pane: of the range, and of the pose
 _ROUNDS = 8
 _STRIP_M, _STRIP_SLOPE = 0.5, 0.1  # around the first guess of a line: what may belong to it
 _LEAST_RETURNS = 3
@@ -57,6 +58,12 @@ class Line:
     def normal(self) -> np.ndarray:
         """(2,)"""
         return np.array([-np.sin(self.direction_rad), np.cos(self.direction_rad)])
+
+    def straightness(self, points_m: np.ndarray) -> float:
+        """Mean log likelihood ratio of returns (M, 2), on the line against anywhere in a strip around it; at most 0."""
+        offset_m = (points_m - self.centre_m) @ self.normal
+        on_it = -0.5 * float(np.mean((offset_m / _SIGMA_M) ** 2)) - np.log(np.sqrt(2.0 * np.pi) * _SIGMA_M)
+        return min(0.0, float(on_it + np.log(2.0 * _NEAR_M)))
 
 
 def traced(returns: Returns, least_votes_m: float, least_scans: int) -> Iterator[Line]:

@@ -7,7 +7,8 @@ every pose also follows from what was seen later, which makes it a third opinion
 starts from the filter's trajectory and finds the best one near it, so it does not correct a filter that was lost.
 
 Where poses have to be right, only the scans whose poses the filter was sure of pull (smooth_sure). Odometry leads from one
-sure stretch to the next, and the covariance says how far it can be trusted. S scans, B beams of each.
+sure stretch to the next, and the covariance says how far it can be trusted. Where panes that the map lacks have been found,
+scans between pull too, towards them. S scans, B beams of each.
 """
 
 from __future__ import annotations
@@ -49,6 +50,12 @@ class SmoothedPoses:
 
     trajectory: Trajectory  # map_from_base at the stamps of the scans
     covariance: np.ndarray  # (S, 3, 3)
+
+    @property
+    def deviation_m(self) -> np.ndarray:
+        """(S,) of x or y, the larger."""
+        variance: np.ndarray = self.covariance[:, [0, 1], [0, 1]].max(axis=1)
+        return np.sqrt(variance)
 
     def at(self, stamp_ns: int) -> Tuple[np.ndarray, np.ndarray]:
         """Pose (3,) at a stamp, and the covariance (3, 3) of the nearest scan."""
@@ -97,11 +104,23 @@ class Smoother:
         poses, _ = _optimized(self._field, points_m, present, poses, odometry, np.zeros((len(poses), 3)), poses)
         return Trajectory(np.array(self._stamps_ns, np.int64), poses)
 
-    def smooth_sure(self, truth: Optional[Trajectory] = None) -> Optional[SmoothedPoses]:
+    def __len__(self) -> int:
+        return len(self._stamps_ns)
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether the filter was sure of every pose."""
+        return all(self._sure)
+
+    def smooth_sure(
+        self, truth: Optional[Trajectory] = None, with_panes: Optional[Tuple[DistanceField, SmoothedPoses]] = None
+    ) -> Optional[SmoothedPoses]:
         """What the scans of state LOCALIZED and odometry between them say; of the other scans only the stamps count.
 
         Args:
             truth: map_from_base of a reference, which counts where no scan is sure.
+            with_panes: field of the map with what was found at the poses beside it: all scans pull whose poses were
+                certain enough to tell which wall or pane a beam met.
 
         Returns:
             None where no pose is sure, and there is no reference.
@@ -119,9 +138,12 @@ class Smoother:
         if not known.any():
             return None
         points_m, present = self._padded()
+        field, pulls = self._field, sure
+        if with_panes is not None:
+            field, pulls = with_panes[0], sure | (with_panes[1].deviation_m < _SCALES_M[0])
         reckoned = _reckoned(prior, known, odometry)
         poses, covariance = _optimized(
-            self._field, points_m, present & sure[:, None], reckoned, odometry, information, prior
+            field, points_m, present & pulls[:, None], reckoned, odometry, information, prior
         )
         covariance *= _contradiction(poses, odometry, known)[:, None, None]
         return SmoothedPoses(Trajectory(stamps_ns, poses), covariance)

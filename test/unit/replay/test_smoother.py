@@ -121,6 +121,18 @@ def test_between_sure_poses_odometry_leads_and_the_covariance_says_how_far_it_ca
     np.testing.assert_array_equal(covariance, found.covariance[20])
 
 
+def test_where_panes_were_found_scans_pull_that_the_filter_was_not_sure_of():
+    true = drive()
+    filtered, sure = a_filter_that_loses_its_way(true)
+    drifting = true + np.linspace(0.0, 1.0, len(true))[:, None] * [0.2, 0.0, 0.0]
+    smoother = listened(true, filtered, drifting, sure=sure)
+    assert not smoother.is_sure
+    without = smoother.smooth_sure()
+    found = smoother.smooth_sure(with_panes=(DistanceField(room()), without))
+    assert off_m(found.trajectory.poses, true)[15:25].max() < 0.02
+    assert found.deviation_m[20] < 0.7 * without.deviation_m[20]
+
+
 def test_the_covariance_is_that_of_the_whole_system():
     """The diagonal blocks of the inverse, against a dense one."""
     rng = np.random.default_rng(0)

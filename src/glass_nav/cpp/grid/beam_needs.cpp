@@ -2,93 +2,93 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace glass_nav {
 namespace {
 
-constexpr double kMaxTurn = 0.15;  // [rad] of a beam's end, seen from the pose: with more all is cast
-constexpr double kStair = 1.0;     // cells that a slanted wall is off its line
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr double kMaxTurn = 0.5;  // [rad] of a beam's end, seen from the pose: with more all is cast
+constexpr double kStair = 1.0;    // cells that a slanted wall is off its line
 
-/// A beam and those beside it.
-class Neighbours {
+/// Where beams end that are of the surface along one of them, as poses nearby see it.
+struct Ends {
+  double nearest, farthest;  // empty where there is no surface
+  double surface;            // how far the farthest pose sees it
+};
+
+/// How far across a surface another pose may see it elsewhere; an error of the mirror's place counts twice.
+double off(std::size_t path, const PoseSpread& spread) {
+  return kStair + (path == kMirrored ? 3.0 : 1.0) * spread.cells;
+}
+
+Ends ends_at(const SeenSurfaces& seen, std::size_t path, std::size_t beam, const PoseSpread& spread,
+             const EndGate& gate) {
+  const SeenSurface& surface = seen.at[path][beam];
+  if (!std::isfinite(surface.range)) return {kInfinite, -kInfinite, 0.0};
+  const double cos = std::max(surface.cos, kMinCos), moved = off(path, spread);
+  const double mirror = path == kMirrored ? 2.0 * seen.at[kFirst][beam].thickness : 0.0;
+  const double depth = gate.depth_share * (surface.thickness + mirror);
+  return {surface.range - (gate.across + moved) / cos, surface.range + (gate.across + moved + depth) / cos,
+          surface.range + moved / cos};
+}
+
+/// What lies along the beams beside each beam of a scan.
+class Neighbourhoods {
  public:
-  Neighbours(const SeenSurfaces& seen, const PoseSpread& spread, const BeamEnd& end, std::size_t beam)
-      : seen_(seen), spread_(spread), end_(end), beam_(beam) {
-    const double nearest = std::min(seen.at[kFirst][beam].range, end.range);
-    const double turn = 2.0 * spread.cells / nearest + spread.yaw_rad;
-    known_ = turn <= kMaxTurn && find(turn);
-  }
-
-  /// Whether they are seen, as far as it matters; else nothing can be left out.
-  bool known() const { return known_; }
-
-  Need need() const {
-    for (const std::size_t path : {kMirrored, kSecond, kThird}) {
-      for (std::size_t b = from_; b <= to_; ++b) {
-        if (may_end(path, b)) return Need::all;
-      }
-    }
-    return Need::first;
-  }
-
-  double reach() const {
-    double reach = 0.0;
+  Neighbourhoods(const SeenSurfaces& seen, const PoseSpread& spread, const EndGate& gate)
+      : seen_(seen), spread_(spread) {
     for (std::size_t path = 0; path < kPathCount; ++path) {
-      for (std::size_t b = from_; b <= to_; ++b) {
-        const SeenSurface& surface = seen_.at[path][b];
-        if (!std::isfinite(surface.range) || (path != kFirst && !may_end(path, b))) continue;
-        reach = std::max(reach, surface.range + off(path) / std::max(surface.cos, kMinCos));
+      ends_[path].reserve(seen.beams);
+      for (std::size_t b = 0; b < seen.beams; ++b) ends_[path].push_back(ends_at(seen, path, b, spread, gate));
+    }
+  }
+
+  PathChoice need(std::size_t beam, BeamEnd& end) const {
+    const double turn = 2.0 * spread_.cells / std::min(seen_.at[kFirst][beam].range, end.range) + spread_.yaw_rad;
+    std::size_t from = beam, to = beam;
+    if (!(turn <= kMaxTurn) || !find(turn, from, to)) return {};  // nothing can be left out
+    double reach = 0.0;
+    for (std::size_t b = from; b <= to; ++b) reach = std::max(reach, ends_[kFirst][b].surface);
+    std::array<bool, kPathCount> may_end{};
+    for (const std::size_t path : {kMirrored, kSecond, kThird}) {
+      for (std::size_t b = from; b <= to; ++b) {
+        const Ends& ends = ends_[path][b];
+        if (!(end.range >= ends.nearest && end.range <= ends.farthest)) continue;
+        may_end[path] = true;
+        reach = std::max(reach, ends.surface);
       }
     }
-    return reach;
+    end.reach = std::min(end.reach, reach);
+    return {may_end[kThird] ? 3 : may_end[kSecond] ? 2 : 1, may_end[kMirrored]};
   }
 
  private:
   /// The beams up to a turn to either side; false where the scan ends before.
-  bool find(double turn) {
-    const double* angles = seen_.angles;
-    for (from_ = beam_; std::abs(angles[from_] - angles[beam_]) < turn; --from_) {
-      if (from_ == 0) return false;
+  bool find(double turn, std::size_t& from, std::size_t& to) const {
+    const double *angles = seen_.angles, here = angles[from];
+    for (; std::abs(angles[from] - here) < turn; --from) {
+      if (from == 0) return false;
     }
-    for (to_ = beam_; std::abs(angles[to_] - angles[beam_]) < turn; ++to_) {
-      if (to_ + 1 == seen_.beams) return false;
+    for (; std::abs(angles[to] - here) < turn; ++to) {
+      if (to + 1 == seen_.beams) return false;
     }
     return true;
   }
 
-  /// The surface at the end of a path along another beam, and so one near it, may have ended this beam.
-  bool may_end(std::size_t path, std::size_t beam) const {
-    const SeenSurface& surface = seen_.at[path][beam];
-    if (!std::isfinite(surface.range)) return false;
-    const double across = (end_.range - surface.range) * std::max(surface.cos, kMinCos);
-    const double mirror = path == kMirrored ? 2.0 * seen_.at[kFirst][beam].thickness : 0.0;
-    const double depth = end_.depth_share * (surface.thickness + mirror);
-    return across >= -end_.gate - off(path) && across <= end_.gate + off(path) + depth;
-  }
-
-  /// How far across a surface another pose may see it elsewhere; an error of the mirror's place counts twice.
-  double off(std::size_t path) const { return kStair + (path == kMirrored ? 3.0 : 1.0) * spread_.cells; }
-
   const SeenSurfaces& seen_;
   const PoseSpread& spread_;
-  const BeamEnd& end_;
-  std::size_t beam_, from_ = 0, to_ = 0;
-  bool known_ = false;
+  std::array<std::vector<Ends>, kPathCount> ends_;
 };
 
 }  // namespace
 
-std::vector<Need> needs_of(const SeenSurfaces& seen, const PoseSpread& spread, std::vector<BeamEnd>& ends) {
-  std::vector<Need> needs(seen.beams, Need::all);
+std::vector<PathChoice> needs_of(const SeenSurfaces& seen, const PoseSpread& spread, const EndGate& gate,
+                                 std::vector<BeamEnd>& ends) {
+  std::vector<PathChoice> needs(seen.beams, PathChoice{0, false});
+  const Neighbourhoods neighbourhoods(seen, spread, gate);
   for (std::size_t b = 0; b < seen.beams; ++b) {
-    if (!std::isfinite(ends[b].range)) {
-      needs[b] = Need::nothing;
-      continue;
-    }
-    const Neighbours neighbours(seen, spread, ends[b], b);
-    if (!neighbours.known()) continue;
-    needs[b] = neighbours.need();
-    ends[b].reach = std::min(ends[b].reach, neighbours.reach());
+    if (std::isfinite(ends[b].range)) needs[b] = neighbourhoods.need(b, ends[b]);
   }
   return needs;
 }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "grid_raycaster.hpp"
 #include "wall_lines.hpp"
 
 namespace glass_nav {
@@ -37,22 +38,22 @@ struct SeenSurfaces {
   std::array<std::vector<SeenSurface>, kPathCount> at;  // by path and beam
 };
 
-/// How a beam ended. Lengths are in cells.
-struct BeamEnd {
-  double range;        // not finite: it did not return
-  double gate;         // across a surface; one that is farther from the end did not end it
+/// How far from a surface across it a beam may end and still be of it. Lengths are in cells.
+struct EndGate {
+  double across;
   double depth_share;  // of the thickness of a wall: how deep in it beams end
-  double reach;        // how far the poses nearby look along the beam
 };
 
-enum class Need {
-  nothing,  // the beam did not return
-  first,    // the first surface: nothing behind it could have ended the beam
-  all,
+/// How a beam ended. Lengths are in cells.
+struct BeamEnd {
+  double range;  // not finite: it did not return
+  double reach;  // how far the poses nearby look along the beam
 };
 
 /// What each beam needs, by what the pose sees along it and along the beams beside it, as far as the spread turns and
-/// moves it. Where less than its reach is enough, the reach is shortened.
-std::vector<Need> needs_of(const SeenSurfaces& seen, const PoseSpread& spread, std::vector<BeamEnd>& ends);
+/// moves it: paths to surfaces that may have ended it, and the first surface; none if it did not return. Where less
+/// than its reach is enough, the reach is shortened.
+std::vector<PathChoice> needs_of(const SeenSurfaces& seen, const PoseSpread& spread, const EndGate& gate,
+                                 std::vector<BeamEnd>& ends);
 
 }  // namespace glass_nav

@@ -38,6 +38,24 @@ py::array_t<T> result_for(const RayBatch& rays) {
   return py::array_t<T>({rays.pose_count, rays.angle_count});
 }
 
+/// Memory for several arrays, from the widest element to the narrowest. The allocator keeps one block for the next
+/// scan; several it gives back to the system, and getting their pages again takes as long as the rays.
+class ArrayBlock {
+ public:
+  explicit ArrayBlock(std::size_t bytes) : bytes_(static_cast<py::ssize_t>(bytes)) {}
+
+  template <class T>
+  py::array_t<T> next(const std::vector<py::ssize_t>& shape) {
+    py::array_t<T> array(shape, reinterpret_cast<T*>(bytes_.mutable_data() + used_), bytes_);
+    used_ += array.nbytes();
+    return array;
+  }
+
+ private:
+  py::array_t<std::uint8_t> bytes_;
+  py::ssize_t used_ = 0;
+};
+
 std::unique_ptr<GridRaycaster> make_grid(const Array<std::int8_t>& occupancy, double resolution_m, int occupied_percent,
                                          bool unknown_stops, std::shared_ptr<FreeRanges> guide) {
   if (occupancy.ndim() != 2) throw std::invalid_argument("occupancy must be (H, W)");
@@ -136,7 +154,7 @@ py::tuple cast_paths(const GridRaycaster& grid, const Array<double>& poses, cons
   {
     const double* reach = reach_m.data();
     py::gil_scoped_release unlocked;
-    grid.cast_paths(rays, reach, {max_thickness_m, min_linearity, min_gap_m}, out);
+    grid.cast_paths(rays, reach, nullptr, {max_thickness_m, min_linearity, min_gap_m}, out);
   }
   return py::make_tuple(range_m, cos, cell);
 }
@@ -157,9 +175,11 @@ py::tuple expected_ranges(const GridRaycaster& grid, const Array<std::int8_t>& o
   }
   const py::ssize_t paths = kPathCount, beams = angles.shape(0);
   const std::vector<py::ssize_t> of_samples{paths, poses.shape(0), beams}, of_pose{paths, beams}, of_beams{1, beams};
-  py::array_t<double> range_m(of_samples), cos(of_samples), incidence_rad(of_beams), line_m(of_pose), axis_rad(of_pose);
-  py::array_t<float> thickness_to(of_samples);
-  py::array_t<std::int32_t> cell(of_samples);
+  ArrayBlock block(paths * poses.shape(0) * beams * (2 * sizeof(double) + sizeof(float) + sizeof(std::int32_t)));
+  auto range_m = block.next<double>(of_samples), cos = block.next<double>(of_samples);
+  auto thickness_to = block.next<float>(of_samples);
+  auto cell = block.next<std::int32_t>(of_samples);
+  py::array_t<double> incidence_rad(of_beams), line_m(of_pose), axis_rad(of_pose);
   py::array_t<bool> seen_side(of_pose);
   const Expectation wanted{rays,
                            measured_m.data(),

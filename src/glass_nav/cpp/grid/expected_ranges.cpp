@@ -69,7 +69,7 @@ class ExpectedRanges {
     RayBatch rays = wanted_.rays;
     rays.pose_count = 1;
     const std::vector<double> reach_m(beams_, rays.max_range_m);
-    grid_.cast_paths(rays, reach_m.data(), wanted_.limits, paths_of(0));
+    grid_.cast_paths(rays, reach_m.data(), nullptr, wanted_.limits, paths_of(0));
     const double cell_m = grid_.resolution_m();
     seen_.beams = beams_;
     seen_.angles = rays.angles;
@@ -118,19 +118,19 @@ class ExpectedRanges {
 
   void look_from_others() {
     see_nothing();
-    const std::vector<Need> needs = needs_of_beams();
-    std::vector<std::size_t> first, all;
+    choices_ = needs_of_beams();
+    std::vector<std::size_t> first, more;
     for (std::size_t b = 0; b < beams_; ++b) {
-      if (needs[b] == Need::first) first.push_back(b);
-      if (needs[b] == Need::all) all.push_back(b);
+      if (choices_[b].surfaces == 0) continue;
+      (choices_[b].surfaces == 1 && !choices_[b].mirrored ? first : more).push_back(b);
     }
     if (!first.empty()) cast_first_along(first);
-    if (!all.empty()) cast_all_along(all);
+    if (!more.empty()) cast_paths_along(more);
   }
 
-  std::vector<Need> needs_of_beams() {
+  std::vector<PathChoice> needs_of_beams() {
     reach_m_.assign(wanted_.reach_m, wanted_.reach_m + beams_);
-    if (!std::isfinite(wanted_.gate_m)) return std::vector<Need>(beams_, Need::all);
+    if (!std::isfinite(wanted_.gate_m)) return std::vector<PathChoice>(beams_);
     const double cell_m = grid_.resolution_m();
     PoseSpread spread;
     const double* pose = wanted_.rays.poses;
@@ -141,9 +141,9 @@ class ExpectedRanges {
     }
     std::vector<BeamEnd> ends(beams_);
     for (std::size_t b = 0; b < beams_; ++b) {
-      ends[b] = {wanted_.measured_m[b] / cell_m, wanted_.gate_m / cell_m, wanted_.depth_share, reach_m_[b] / cell_m};
+      ends[b] = {wanted_.measured_m[b] / cell_m, reach_m_[b] / cell_m};
     }
-    const std::vector<Need> needs = needs_of(seen_, spread, ends);
+    std::vector<PathChoice> needs = needs_of(seen_, spread, {wanted_.gate_m / cell_m, wanted_.depth_share}, ends);
     for (std::size_t b = 0; b < beams_; ++b) reach_m_[b] = ends[b].reach * cell_m;
     return needs;
   }
@@ -162,14 +162,16 @@ class ExpectedRanges {
   /// The batch of the other samples along some beams only.
   struct SomeBeams {
     std::vector<double> angles, reach_m;
+    std::vector<PathChoice> choices;
     RayBatch rays;
   };
 
   SomeBeams others_along(const std::vector<std::size_t>& beams) const {
-    SomeBeams some{{}, {}, wanted_.rays};
+    SomeBeams some{{}, {}, {}, wanted_.rays};
     for (const std::size_t b : beams) {
       some.angles.push_back(wanted_.rays.angles[b]);
       some.reach_m.push_back(std::max(reach_m_[b], kNowhere_m));
+      some.choices.push_back(choices_[b]);
     }
     some.rays.poses += 3;
     some.rays.pose_count = samples_ - 1;
@@ -209,7 +211,7 @@ class ExpectedRanges {
     }
   }
 
-  void cast_all_along(const std::vector<std::size_t>& beams) {
+  void cast_paths_along(const std::vector<std::size_t>& beams) {
     const SomeBeams some = others_along(beams);
     const std::size_t count = beams.size(), plane = (samples_ - 1) * count;
     std::vector<double> range_m(kPathCount * plane), cos(kPathCount * plane);
@@ -220,7 +222,7 @@ class ExpectedRanges {
       to.cos[path] = cos.data() + path * plane;
       to.cell[path] = cell.data() + path * plane;
     }
-    grid_.cast_paths(some.rays, some.reach_m.data(), wanted_.limits, to);
+    grid_.cast_paths(some.rays, some.reach_m.data(), some.choices.data(), wanted_.limits, to);
     for (std::size_t path = 0; path < kPathCount; ++path) {
       for (std::size_t n = 1; n < samples_; ++n) {
         const std::size_t from = path * plane + (n - 1) * count, row = index(path, n, 0);
@@ -337,7 +339,8 @@ class ExpectedRanges {
   std::vector<Ray> poses_;
   std::size_t samples_, beams_;
   SeenSurfaces seen_{};          // from the pose
-  std::vector<double> reach_m_;  // of the other samples
+  std::vector<double> reach_m_;  // of the other samples, as what they look for
+  std::vector<PathChoice> choices_;
 };
 
 }  // namespace

@@ -125,7 +125,7 @@ void GridRaycaster::find_first(const RayBatch& batch, const Reach& t_max, double
 
 template <class Reach, class Store>
 void GridRaycaster::find_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const Reach& t_max,
-                                  const Store& store) const {
+                                  const PathChoice* choices, const Store& store) const {
   const SurfaceRules rules{limits.max_thickness_m / resolution_m_, limits.min_linearity,
                            limits.min_gap_m / resolution_m_};
   const WallNormals& wall_normals = normals();  // before the threads start
@@ -134,8 +134,11 @@ void GridRaycaster::find_surfaces(const RayBatch& batch, const SurfaceLimits& li
     for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
       constexpr std::size_t kTogether = 512;  // their state fits the level 2 cache
       for (std::size_t done = 0; done < count; done += kTogether) {
+        const auto choice = [&](std::size_t i) {
+          return choices == nullptr ? PathChoice{} : choices[(first + done + i) % batch.angle_count];
+        };
         finder.along_all(
-            std::min(kTogether, count - done), t_max, rays,
+            std::min(kTogether, count - done), t_max, choice, rays,
             [&](std::size_t i, const Surfaces& found, const Ray& ray) { store(first + done + i, finder, found, ray); });
       }
     });
@@ -144,7 +147,7 @@ void GridRaycaster::find_surfaces(const RayBatch& batch, const SurfaceLimits& li
 
 void GridRaycaster::cast_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const SurfaceArrays& out) const {
   const auto reach = [t_max = batch.max_range_m / resolution_m_](std::size_t) { return t_max; };
-  find_surfaces(batch, limits, reach, [&](std::size_t i, const auto&, const Surfaces& found, const Ray&) {
+  find_surfaces(batch, limits, reach, nullptr, [&](std::size_t i, const auto&, const Surfaces& found, const Ray&) {
     for (std::size_t k = 0; k < 3; ++k) {
       out.range_m[k][i] = found.range[k] * resolution_m_;
       out.cell[k][i] = found.cell[k];
@@ -157,10 +160,10 @@ void GridRaycaster::cast_surfaces(const RayBatch& batch, const SurfaceLimits& li
   });
 }
 
-void GridRaycaster::cast_paths(const RayBatch& batch, const double* reach_m, const SurfaceLimits& limits,
-                               const PathArrays& out) const {
+void GridRaycaster::cast_paths(const RayBatch& batch, const double* reach_m, const PathChoice* choices,
+                               const SurfaceLimits& limits, const PathArrays& out) const {
   const auto reach = [&](std::size_t beam) { return reach_m[beam] / resolution_m_; };
-  find_surfaces(batch, limits, reach, [&](std::size_t i, const auto& finder, const Surfaces& found, const Ray& ray) {
+  const auto store = [&](std::size_t i, const auto& finder, const Surfaces& found, const Ray& ray) {
     const Incidences incidences = finder.incidences(found, ray);
     constexpr std::size_t kMirrored = 1;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -172,7 +175,8 @@ void GridRaycaster::cast_paths(const RayBatch& batch, const double* reach_m, con
     out.range_m[kMirrored][i] = found.mirrored * resolution_m_;
     out.cos[kMirrored][i] = incidences.mirrored_cos;
     out.cell[kMirrored][i] = found.mirrored_cell;
-  });
+  };
+  find_surfaces(batch, limits, reach, choices, store);
 }
 
 void GridRaycaster::free_ranges(const FreeRanges& rays, const RayBatch& batch, double* range_m) const {

@@ -31,6 +31,12 @@ struct SurfaceLimits {
   double min_gap_m;        // a shorter free gap on the ray does not separate two surfaces
 };
 
+/// Which of the paths along a ray are looked for.
+struct PathChoice {
+  int surfaces = 3;      // so many with a normal, the nearest first, at most 3 in all
+  bool mirrored = true;  // the path mirrored at the first one
+};
+
 /// Where the results of cast_surfaces go: arrays of pose_count * angle_count.
 struct SurfaceArrays {
   double* range_m[3];           // first, second, third surface; inf where none
@@ -78,7 +84,8 @@ class GridRaycaster {
   void cast_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const SurfaceArrays& out) const;
 
   /// The same for comparison with measured ranges, without what lies between; beam b is followed up to reach_m[b].
-  void cast_paths(const RayBatch& batch, const double* reach_m, const SurfaceLimits& limits,
+  /// @param choices  of each beam; null: all paths are looked for
+  void cast_paths(const RayBatch& batch, const double* reach_m, const PathChoice* choices, const SurfaceLimits& limits,
                   const PathArrays& out) const;
 
   /// What the rays of another library answer up to max_range_m, unchecked: for comparison only.
@@ -94,7 +101,8 @@ class GridRaycaster {
   template <class Reach>
   void find_first(const RayBatch& batch, const Reach& t_max, double* range_m, std::int32_t* cell) const;
   template <class Reach, class Store>
-  void find_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const Reach& t_max, const Store& store) const;
+  void find_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const Reach& t_max, const PathChoice* choices,
+                     const Store& store) const;
 
   /// Keeps which cells of a box are unknown, if those stop rays; which of its cells end a ray, row by row.
   std::vector<std::uint8_t> drawn(const std::int8_t* occupancy, const CellBox& box);

@@ -50,17 +50,21 @@ class SurfaceFinder {
                 const WallNormals& normals, const SurfaceRules& rules)
       : cells_(cells), first_hits_(first_hits), marcher_(marcher), normals_(normals), rules_(rules) {}
 
-  /// Follows `count` rays of the stream `rays`, each up to t_max(beam); found(i, Surfaces, Ray) for each, in any order
-  /// and without the ray where it meets nothing. All rays go from surface to surface together, since the marcher is
-  /// fastest with many.
-  template <class Rays, class Reach, class Found>
-  void along_all(std::size_t count, const Reach& t_max, Rays& rays, const Found& found) const {
+  /// Follows `count` rays of the stream `rays`, each up to t_max(beam) and for the paths of choice(i) only; found(i,
+  /// Surfaces, Ray) for each, in any order and without the ray where it meets nothing. All rays go from surface to
+  /// surface together, since the marcher is fastest with many.
+  template <class Rays, class Reach, class Choice, class Found>
+  void along_all(std::size_t count, const Reach& t_max, const Choice& choice, Rays& rays, const Found& found) const {
     std::vector<std::size_t> meeting;  // the rays that meet something, whose searches and surfaces follow
     std::vector<Search> searches;
     std::vector<Surfaces> surfaces;
+    std::vector<int> wanted;         // surfaces along each of them
     std::vector<std::size_t> going;  // those of them that are not at their end
+    std::vector<std::size_t> mirrored;
     meeting.reserve(count);
+    wanted.reserve(count);
     going.reserve(count);
+    mirrored.reserve(count);
     searches.reserve(count);
     surfaces.reserve(count);
     first_hits_.along_all(count, t_max, rays, [&](std::size_t i, double t, std::int32_t met, const auto& search) {
@@ -68,17 +72,28 @@ class SurfaceFinder {
         found(i, Surfaces{}, Ray{});
         return;
       }
-      going.push_back(meeting.size());
-      meeting.push_back(i);
       searches.push_back(search());
+      const WallNormals::Normal normal = facing(normals_.at(met), searches.back().ray);
+      const auto paths = choice(i);
+      // A beam may miss what has no normal; of a choice of one surface nothing behind matters.
+      wanted.push_back(paths.surfaces > 1 && !usable(normal) ? paths.surfaces + 1 : paths.surfaces);
+      if (paths.surfaces > 1) going.push_back(meeting.size());
+      if (paths.mirrored) mirrored.push_back(meeting.size());
+      meeting.push_back(i);
       surfaces.emplace_back();
       surfaces.back().cell[0] = met;
       surfaces.back().range[0] = t;
+      surfaces.back().normal = normal;
     });
-    mirror(going, searches, surfaces);
+    mirror(mirrored, searches, surfaces);
     for (std::size_t k = 1; k < 3 && !going.empty(); ++k) {
       pass_surface(k - 1, going, searches, surfaces);
       seek_surface(k, going, searches, surfaces);
+      const auto done = [&](std::size_t i) {
+        const int found = static_cast<int>(k) + 1;
+        return wanted[i] <= found && (k == 2 || usable(normals_.at(surfaces[i].cell[k])));
+      };
+      going.erase(std::remove_if(going.begin(), going.end(), done), going.end());
     }
     for (std::size_t j = 0; j < meeting.size(); ++j) found(meeting[j], surfaces[j], searches[j].ray);
   }
@@ -146,13 +161,12 @@ class SurfaceFinder {
     going.erase(std::remove_if(going.begin(), going.end(), ends), going.end());
   }
 
-  /// Finds the normals of the first surfaces and follows the rays mirrored there: along u - 2 (u . n) n.
+  /// Follows the rays mirrored at their first surfaces: along u - 2 (u . n) n.
   void mirror(const std::vector<std::size_t>& hits, const std::vector<Search>& searches,
               std::vector<Surfaces>& surfaces) const {
     std::vector<std::size_t> mirrored;
     std::vector<WallLine> mirrors;
     for (const std::size_t i : hits) {
-      surfaces[i].normal = facing(normals_.at(surfaces[i].cell[0]), searches[i].ray);
       if (!usable(surfaces[i].normal)) continue;
       mirrored.push_back(i);
       mirrors.push_back({cells_.width, surfaces[i].cell[0], surfaces[i].normal.x, surfaces[i].normal.y});

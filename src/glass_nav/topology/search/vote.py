@@ -94,6 +94,7 @@ def expected(
             first, second = np.nonzero(np.ones_like(likelihood))
             there = views.at(departure ^ 1)[first]
             nats = views.nats(there, carried(poses[first], there, poses[second]))
+            nats = np.where(views.has_room(departure[first] ^ 1), nats, 0.0)
             likelihood = np.maximum(likelihood, _BY_GRAPH_ALONE) * np.exp(-nats.reshape(likelihood.shape))
         left = (likelihood * share).max(axis=1) / (likelihood @ share)
         outside[rank] = float(share @ (1.0 - left))
@@ -137,14 +138,15 @@ def towards_difference(
                     following.append((arrival, [*ranks, rank]))
         if not following:
             return None
-        there = np.repeat(views.at(np.array([arrival for arrival, _ in following])), len(others), axis=0)
-        shape = (len(following), len(others))
-        of_others = np.tile(others, (len(following), 1))
-        differs = views.differ(there, carried(np.broadcast_to(pose, there.shape), there, of_others)).reshape(shape)
-        if differs.any():
-            most = int(differs.sum(axis=1).argmax())
-            return following[most][1]
         level = following
+        arrivals = np.array([arrival for arrival, _ in following])
+        looks = np.flatnonzero(views.has_room(arrivals))
+        there = np.repeat(views.at(arrivals[looks]), len(others), axis=0)
+        of_others = np.tile(others, (len(looks), 1))
+        differs = views.differ(there, carried(np.broadcast_to(pose, there.shape), there, of_others))
+        if differs.any():
+            most = int(differs.reshape(len(looks), len(others)).sum(axis=1).argmax())
+            return following[int(looks[most])][1]
     return None
 
 
