@@ -23,5 +23,6 @@ def carried(
     covariance: np.ndarray,  # (3, 3) float64
     step: np.ndarray,  # (3,) float64
     noise: np.ndarray,  # (3, 3) float64
+    noise_scale: np.ndarray,  # (3,) float64
 ) -> np.ndarray: ...  # (3, 3) float64
 def mahalanobis(offset: np.ndarray, covariance: np.ndarray) -> float: ...

@@ -38,6 +38,8 @@ from xmlrpc.client import ServerProxy
 
 import numpy as np
 
+sys.path.append(str(Path(__file__).resolve().parents[1] / "support"))
+
 import pf_localization
 import tracks
 from glass_nav.evaluation.metrics import pose_errors
@@ -257,14 +259,10 @@ def master(log: Path) -> Iterator[None]:
         port = free.getsockname()[1]
     os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
     with running(["roscore", "-p", str(port)], log, elsewhere):
-        import rosgraph
+        import ros_master
         import rospy
 
-        end_s = time.monotonic() + START_S
-        while not rosgraph.is_master_online():
-            if time.monotonic() > end_s:
-                raise RuntimeError(f"no roscore after {START_S:g} s; see {log}")
-            time.sleep(0.2)
+        ros_master.wait_until_online(os.environ["ROS_MASTER_URI"], START_S, log)
         rospy.set_param("/use_sim_time", False)  # of this process; the localizers are started with true
         rospy.init_node("against_peers", disable_signals=True)
         rospy.set_param("/use_sim_time", True)

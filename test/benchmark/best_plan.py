@@ -100,5 +100,6 @@ class BestPlan:
             there = np.repeat(self._views.at(np.array([dart])), len(self._poses), axis=0)
             here = np.broadcast_to(self._poses[place], there.shape)
             self._views.arrive(np.zeros((0, 3)))  # as many comparisons as it takes
-            self._apart[place, dart] = self._views.differ(there, vote.carried(here, there, self._poses))
+            differs = self._views.differ(there, vote.carried(here, there, self._poses))
+            self._apart[place, dart] = differs & self._views.has_room(np.array([dart]))
         return self._apart[place, dart]

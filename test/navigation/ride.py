@@ -197,7 +197,9 @@ def drive(ride: Ride, goals: np.ndarray, node: str) -> Dict[str, Any]:
         said = in_time and client.get_state() == GoalStatus.SUCCEEDED
         if not in_time:
             client.cancel_goal()
-        rospy.sleep(0.5)
+        rospy.sleep(
+            2.0
+        )  # move_base's planner may be at this goal still, and would end the next one by its plan at once
         ends.append({"said": said, "off_m": round(float(np.hypot(*(goal - ride.pose)[:2])), 3)})
     impatient.send_signal(signal.SIGINT)
     asked, unanswered = (int(figure) for figure in impatient.communicate()[0].split()[-2:])

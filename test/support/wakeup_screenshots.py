@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import List
 
 import numpy as np
-import rosgraph
+import ros_master
 import rospy
 import twin_wings
 from rosgraph_msgs.msg import Clock
@@ -86,10 +86,7 @@ def _display(processes: List["subprocess.Popen[bytes]"]) -> "dict[str, str]":
 def _photograph(at_s: List[float], folder: Path, environment: "dict[str, str]") -> None:
     os.environ.update({name: environment[name] for name in ("ROS_MASTER_URI", "ROS_HOSTNAME")})
     deadline_s = time.monotonic() + START_LIMIT_S
-    while not rosgraph.is_master_online(environment["ROS_MASTER_URI"]):
-        if time.monotonic() > deadline_s:
-            raise SystemExit(f"no master within {START_LIMIT_S:g} s: see {folder / 'wakeup.log'}")
-        time.sleep(0.2)
+    ros_master.wait_until_online(environment["ROS_MASTER_URI"], START_LIMIT_S, folder / "wakeup.log")
     times_s: List[float] = []
     rospy.init_node("wakeup_screenshots", anonymous=True, disable_signals=True)
     rospy.Subscriber("/clock", Clock, lambda msg: times_s.append(msg.clock.to_sec()))

@@ -65,8 +65,9 @@ class KnownArea:
 
     def _cell(self, points_m: np.ndarray) -> np.ndarray:
         rows, columns = self._grid_map.cells(points_m)
-        rows = np.clip(rows + self._border, 0, self._last[0])  # the outermost cells are unknown
-        columns = np.clip(columns + self._border, 0, self._last[1])
+        # The outermost cells are unknown. np.clip takes three times as long for the points of a scan.
+        rows = np.minimum(np.maximum(rows + self._border, 0), self._last[0])
+        columns = np.minimum(np.maximum(columns + self._border, 0), self._last[1])
         return rows * self._stride + columns
 
 

@@ -222,8 +222,8 @@ class RayCaster:
         """What beams may measure from poses near the first of them.
 
         Ranges are as of cast_paths(), but from all poses except the first every other beam passes surfaces without a
-        normal. With a gate, paths that cannot have ended a beam are left out: where the first pose sees nothing
-        along a beam and those beside it that may have ended it, other than the first surface, only that one is cast.
+        normal. With a gate, paths that cannot have ended a beam are left out: besides the first surface only those are
+        cast that may have ended it by what the first pose sees along the beam and those beside it.
 
         Args:
             thickness_m: (H * W,) float32 of the map's walls.

@@ -129,7 +129,8 @@ py::array_t<double> log_weights(const DistanceField& field, const Array<double>&
   double* to = result.mutable_data();
   py::gil_scoped_release unlocked;
   const LogDensity density(sigma_m, z_hit, z_rand);
-  for (const Pose& pose : at) *to++ = log_weight_at(field, points, pose, density);
+  const double reach_m = reach_of(points);
+  for (const Pose& pose : at) *to++ = log_weight_at(field, points, reach_m, pose, density);
   return result;
 }
 

@@ -23,6 +23,7 @@ class DistanceField {
       : height_(height),
         width_(width),
         resolution_m_(resolution_m),
+        per_m_(1.0 / resolution_m),
         max_distance_m_(max_distance_m),
         x_(map_from_grid[0]),
         y_(map_from_grid[1]),
@@ -48,11 +49,29 @@ class DistanceField {
         : field_(field),
           column_(field.column(pose[0], pose[1])),
           row_(field.row(pose[0], pose[1])),
-          cos_(std::cos(pose[2] - field.yaw_) / field.resolution_m_),
-          sin_(std::sin(pose[2] - field.yaw_) / field.resolution_m_) {}
+          cos_(std::cos(pose[2] - field.yaw_) * field.per_m_),
+          sin_(std::sin(pose[2] - field.yaw_) * field.per_m_) {}
 
     double distance(double x_m, double y_m) const {
       return field_.distance(field_.square_at(column_ + cos_ * x_m - sin_ * y_m, row_ + sin_ * x_m + cos_ * y_m));
+    }
+
+    /// Whether all points that are at most so far from the frame's origin are inside of the grid.
+    bool is_inside(double reach_m) const {
+      const double reach = reach_m * field_.per_m_ + 1.0;
+      return column_ > reach && row_ > reach && column_ + reach < field_.width_ && row_ + reach < field_.height_;
+    }
+
+    /// The same distance, of a point that is inside.
+    double distance_inside(double x_m, double y_m) const {
+      const double column = column_ + cos_ * x_m - sin_ * y_m, row = row_ + sin_ * x_m + cos_ * y_m;
+      const int left = static_cast<int>(column), below = static_cast<int>(row);
+      const double right = column - left, up = row - below;
+      const float* corner = &field_.distance_m_[static_cast<std::size_t>(below) * (field_.width_ + 2) + left];
+      const float* above = corner + field_.width_ + 2;
+      const double d00 = corner[0], d01 = corner[1], d10 = above[0], d11 = above[1];
+      const double lower = d00 + (d01 - d00) * right, upper = d10 + (d11 - d10) * right;
+      return lower + (upper - lower) * up;
     }
 
    private:
@@ -63,8 +82,8 @@ class DistanceField {
   Slope at(double x_m, double y_m) const {
     const Square at = square(x_m, y_m);
     const double lower = at.d00 + (at.d01 - at.d00) * at.right, upper = at.d10 + (at.d11 - at.d10) * at.right;
-    const double along_column = ((at.d01 - at.d00) * (1.0 - at.up) + (at.d11 - at.d10) * at.up) / resolution_m_;
-    const double along_row = (upper - lower) / resolution_m_;
+    const double along_column = ((at.d01 - at.d00) * (1.0 - at.up) + (at.d11 - at.d10) * at.up) * per_m_;
+    const double along_row = (upper - lower) * per_m_;
     return {with_outside(lower + (upper - lower) * at.up, at.outside_m), cos_ * along_column - sin_ * along_row,
             sin_ * along_column + cos_ * along_row};
   }
@@ -110,7 +129,7 @@ class DistanceField {
   }
 
   int height_, width_;
-  double resolution_m_, max_distance_m_, x_, y_, yaw_, cos_, sin_;
+  double resolution_m_, per_m_, max_distance_m_, x_, y_, yaw_, cos_, sin_;
   std::vector<float> distance_m_;
 };
 

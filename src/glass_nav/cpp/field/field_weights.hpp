@@ -29,7 +29,11 @@ class LogDensity {
   std::vector<double> values_;
 };
 
-/// Sum over the points of the log density, with the scan at that pose.
-double log_weight_at(const DistanceField& field, const Points& points, const Pose& pose, const LogDensity& density);
+/// How far the farthest point is from the robot [m].
+double reach_of(const Points& points);
+
+/// Sum over the points, none farther than reach_m, of the log density, with the scan at that pose.
+double log_weight_at(const DistanceField& field, const Points& points, double reach_m, const Pose& pose,
+                     const LogDensity& density);
 
 }  // namespace glass_nav

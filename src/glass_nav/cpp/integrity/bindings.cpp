@@ -77,10 +77,11 @@ PYBIND11_MODULE(_integrity, module) {
       py::arg("covariance"), py::arg("spread"));
   module.def(
       "carried",
-      [](double yaw_rad, const Array& covariance, const Array& step, const Array& noise) {
-        return array_of(carried(yaw_rad, matrix_of(covariance), vector_of(step), matrix_of(noise)));
+      [](double yaw_rad, const Array& covariance, const Array& step, const Array& noise, const Array& noise_scale) {
+        return array_of(
+            carried(yaw_rad, matrix_of(covariance), vector_of(step), matrix_of(noise), vector_of(noise_scale)));
       },
-      py::arg("yaw_rad"), py::arg("covariance"), py::arg("step"), py::arg("noise"));
+      py::arg("yaw_rad"), py::arg("covariance"), py::arg("step"), py::arg("noise"), py::arg("noise_scale"));
   module.def(
       "mahalanobis",
       [](const Array& offset, const Array& covariance) {

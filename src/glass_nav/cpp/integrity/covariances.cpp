@@ -37,12 +37,16 @@ Matrix3 widened_by(const Matrix3& covariance, const Matrix3& spread) {
   });
 }
 
-Matrix3 carried(double yaw_rad, const Matrix3& covariance, const Vector3& step, const Matrix3& noise) {
+Matrix3 carried(double yaw_rad, const Matrix3& covariance, const Vector3& step, const Matrix3& noise,
+                const Vector3& noise_scale) {
   const double cos = std::cos(yaw_rad), sin = std::sin(yaw_rad);
   const Matrix3 turned{{cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0}};  // robot's axes before the step, in map
   const Vector3 along = turned * step;
   const Matrix3 by_pose{{1.0, 0.0, -along[1], 0.0, 1.0, along[0], 0.0, 0.0, 1.0}};
-  return by_pose * covariance * transposed(by_pose) + turned * noise * transposed(turned);
+  Matrix3 scaled = noise;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) scaled(i, j) *= std::sqrt(noise_scale[i] * noise_scale[j]);
+  return by_pose * covariance * transposed(by_pose) + turned * scaled * transposed(turned);
 }
 
 double mahalanobis(const Vector3& offset, const Matrix3& covariance) {

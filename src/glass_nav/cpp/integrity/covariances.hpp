@@ -12,8 +12,10 @@ Matrix3 better_of(const Matrix3& first, const Matrix3& second);
 /// A covariance, in directions in which a spread is far larger that spread.
 Matrix3 widened_by(const Matrix3& covariance, const Matrix3& spread);
 
-/// Covariance of a pose with that yaw after a step, in the robot's frame before it, which adds noise in that frame.
-Matrix3 carried(double yaw_rad, const Matrix3& covariance, const Vector3& step, const Matrix3& noise);
+/// Covariance of a pose with that yaw after a step, in the robot's frame before it, which adds noise in that frame; its
+/// variances are scaled.
+Matrix3 carried(double yaw_rad, const Matrix3& covariance, const Vector3& step, const Matrix3& noise,
+                const Vector3& noise_scale);
 
 /// Length of an offset in standard deviations.
 double mahalanobis(const Vector3& offset, const Matrix3& covariance);

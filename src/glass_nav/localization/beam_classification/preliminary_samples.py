@@ -7,7 +7,10 @@ the filter's own covariance here, with a floor. N samples.
 
 from __future__ import annotations
 
+import functools
+import math
 from dataclasses import dataclass
+from typing import Tuple
 
 import numpy as np
 
@@ -56,14 +59,23 @@ def around(map_from_base: np.ndarray, covariance: np.ndarray, shape: Preliminary
         (N, 3) poses in map; the first is the predicted pose itself.
     """
     variance, axes = np.linalg.eigh(covariance[:2, :2])
-    radii = np.clip(np.sqrt(np.maximum(variance, 0.0)), shape.sample_min_radius_m, shape.sample_max_radius_m)
-    heading = np.clip(np.sqrt(max(covariance[2, 2], 0.0)), shape.sample_min_heading_rad, shape.sample_max_heading_rad)
-    count = shape.sample_count - 1
-    bearing = 2.0 * np.pi * np.arange(count) / max(count, 1)
-    ring = np.resize(_RINGS, count)
-    on_circle = np.stack([np.cos(bearing), np.sin(bearing)], axis=-1) * ring[:, None]
-    samples = np.tile(np.asarray(map_from_base, float), (shape.sample_count, 1))
+    radii = np.minimum(
+        np.maximum(np.sqrt(np.maximum(variance, 0.0)), shape.sample_min_radius_m), shape.sample_max_radius_m
+    )
+    heading = math.sqrt(max(covariance[2, 2], 0.0))
+    heading = min(max(heading, shape.sample_min_heading_rad), shape.sample_max_heading_rad)
+    on_circle, turns = _pattern(shape.sample_count - 1)
+    samples = np.empty((shape.sample_count, 3))
+    samples[:] = map_from_base
     samples[1:, :2] += (on_circle * radii) @ axes.T
-    samples[1:, 2] += _WIDEST * (2.0 * np.mod(_GOLDEN * np.arange(1, count + 1), 1.0) - 1.0) * heading
+    samples[1:, 2] += turns * heading
     samples[:, 2] = angles.wrap(samples[:, 2])
     return samples
+
+
+@functools.lru_cache(maxsize=64)
+def _pattern(count: int) -> Tuple[np.ndarray, np.ndarray]:
+    """Points (count, 2) on the rings for a spread of 1, and turns (count,) for one of 1."""
+    bearing = 2.0 * np.pi * np.arange(count) / max(count, 1)
+    on_circle = np.stack([np.cos(bearing), np.sin(bearing)], axis=-1) * np.resize(_RINGS, count)[:, None]
+    return on_circle, _WIDEST * (2.0 * np.mod(_GOLDEN * np.arange(1, count + 1), 1.0) - 1.0)

@@ -37,9 +37,7 @@ class DeadReckoning:
             noise_scale: (3,) factors of its variances along, across and of the heading.
         """
         added = motion.covariance(step, noise)
-        if noise_scale is not _AS_IT_IS:
-            added = added * np.sqrt(np.outer(noise_scale, noise_scale))
-        grown = _integrity.carried(self.map_from_base[2], self.covariance, step, added)
+        grown = _integrity.carried(self.map_from_base[2], self.covariance, step, added, noise_scale)
         distance_m, _ = se2.travelled(step)
         return DeadReckoning(se2.compose(self.map_from_base, step), grown, self.distance_m + distance_m)
 

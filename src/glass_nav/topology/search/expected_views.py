@@ -17,8 +17,9 @@ from glass_nav.hypotheses.pose_belief import MapScans
 from glass_nav.topology.atlas.atlas import Atlas
 
 _COMPARED = 300  # new pairs for each step: 0.1 s
-_DIFFERENT = 3.0  # nats that tell two places apart
-_DECISIVE = 8.0  # ... so surely that a robot drives there to see it
+_DIFFERENT = 3.0  # nats that tell two places apart; copies of a room that are drawn at another angle differ by less
+DECISIVE = 8.0  # ... so surely that a robot drives there to see it
+_ROOM_M = 0.5  # nearer to walls a scan depends on each centimetre, and the robot stops short of a dead end
 _MAX_KEPT = 100_000  # pairs
 _SAME_M = 0.7  # a meetpoint nearer than this to one where the robot was is that
 _ROUNDED = np.array([0.05, 0.05, 0.02])  # poses in one such cell look the same
@@ -54,7 +55,7 @@ class ExpectedViews:
     def nats(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """(P,) log likelihood ratios of poses first (P, 3) to second (P, 3), by a scan seen at the first.
 
-        0 for pairs that there was no time to compare, and where the robot has been.
+        0 for pairs that hardly differ or that there was no time to compare, and where the robot has been.
         """
         pairs = [(_rounded(a), _rounded(b)) for a, b in zip(first, second)]
         been = self._has_been(first, second)
@@ -67,6 +68,7 @@ class ExpectedViews:
         for a, others in new.items():
             rows = list(others.values())
             found = pose_belief.expected_nats(self._scans, first[rows[0]], second[rows])
+            found = np.where(found < _DIFFERENT, 0.0, found)
             self._known.update(zip(((a, b) for b in others), found.tolist()))
         return np.where(been, 0.0, np.array([self._known.get(pair, 0.0) for pair in pairs]))
 
@@ -77,7 +79,11 @@ class ExpectedViews:
 
     def differ(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """(P,) bool: a scan at poses first (P, 3) would tell for certain that the robot is not at second (P, 3)."""
-        return self.nats(first, second) >= _DECISIVE
+        return self.nats(first, second) >= DECISIVE
+
+    def has_room(self, dart: np.ndarray) -> np.ndarray:
+        """(C,) bool: at the meetpoints that arrival darts (C,) lead to, views can be relied on."""
+        return self._atlas.nodes.r_m[self._atlas.darts.node[dart]] >= _ROOM_M
 
     def at(self, dart: np.ndarray) -> np.ndarray:
         """(C, 3) poses of a robot that came along darts (C,) to their meetpoints, looking away from them."""

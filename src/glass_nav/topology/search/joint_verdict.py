@@ -12,6 +12,7 @@ from typing import Optional
 import numpy as np
 
 from glass_nav.geometry import angles, se2
+from glass_nav.hypotheses import pose_tracker
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.observations import Meetpoint
 from glass_nav.topology.search import ambiguity, vote
@@ -28,9 +29,9 @@ _MIN_DRIVEN_M = 1.0  # before a place is confirmed: odometry must agree with it
 _LOST_SEARCHES, _LOST_M = 3, 4.0  # of the whole map, and driven, before it is given up
 _PLACED = 8  # places, the likeliest first, whose node is looked up though it does not match
 _NODE_M, _EDGE_RAD = 0.7, 0.6  # from where a pose expects a meetpoint, and the directions of its edges in the mean
-_WORTH = (
-    0.2  # share of the doubt that a turn removes by itself; else it is better to drive to a difference farther away
-)
+_MOST_BY_GRAPH = 4.0  # nats of the lead over another place that meetpoints may give
+_WORTH = 0.25  # share of the doubt that a turn removes by itself; else a difference farther away is the better goal
+_STILL_LIKELY = 0.3  # share of the likeliest place's probability
 _MAX_SHOWN = 0.9995  # of a probability in words
 
 
@@ -48,6 +49,7 @@ class JointVerdict:
         self._atlas = matcher.atlas
         self._matcher, self._forest, self._passed, self._params = matcher, forest, passed, params
         self._views = views
+        self._map_from_odom: Optional[np.ndarray] = None  # (3,) by the place that the last plan was for
 
     def final(self, belief: Belief, depth: int) -> Optional[SearchEstimate]:
         """CONFIRMED or LOST, wherever the robot is; None: not yet."""
@@ -58,6 +60,7 @@ class JointVerdict:
         explained = belief.explained[0]
         if (
             1.0 - share < risk
+            and self._scans_agree(belief)
             and belief.driven_m >= _MIN_DRIVEN_M
             and (np.isnan(explained) or explained >= self._params.least_explained)
         ):
@@ -95,14 +98,16 @@ class JointVerdict:
         voted = vote.expected(self._matcher, dart, share, self._views, poses)
         ranks = None
         if voted.removed < _WORTH and self._views is not None:
-            ranks = vote.towards_difference(self._matcher, self._views, int(dart[0]), poses[0], poses[1:])
-        if ranks is None and voted.splits:
+            lead = self._followed(belief, poses, share)
+            others = np.delete(poses, lead, axis=0)
+            ranks = vote.towards_difference(self._matcher, self._views, int(dart[lead]), poses[lead], others)
+        if ranks is None and voted.splits and (self._views is None or voted.removed >= _WORTH):
             reason = f"{places}; next the turn that leaves the least doubt per metre"
             return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(voted.rank, here.degree))
         proof = None
         if ranks is None:
             proof = ambiguity.prove(self._matcher, dart, views=self._views)
-            ranks = proof.ranks
+            ranks = proof.ranks if self._views is None else None
         if ranks is not None:
             reason = f"{places}; next towards the nearest difference, {len(ranks)} edge{'s' * (len(ranks) != 1)} away"
             return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(ranks[0], here.degree))
@@ -124,6 +129,29 @@ class JointVerdict:
         pose: Optional[np.ndarray] = None,
     ) -> SearchEstimate:
         return SearchEstimate(state, reason, depth, dart, np.zeros(len(dart), np.int64), choice, pose)
+
+    def _scans_agree(self, belief: Belief) -> bool:
+        """Whether scans have their part in the lead over every other place. Meetpoints of two copies of a place may differ
+        by how their graph was drawn, and a spurious one speaks for whichever has a node there.
+        """
+        needed = -np.log(self._params.tolerances.risk)
+        by_graph = np.minimum(belief.graph_nats[0] - belief.graph_nats[1:], _MOST_BY_GRAPH)
+        return bool((belief.scan_nats[0] - belief.scan_nats[1:] + by_graph >= needed).all())
+
+    def _followed(self, belief: Belief, poses: np.ndarray, share: np.ndarray) -> int:
+        """Index of the place for which the robot drives to a difference: the same as before as long as it is likely, or
+        else the robot would turn round whenever another one leads.
+        """
+        odom_from_base = belief.odom_from_base
+        if odom_from_base is None:
+            return 0
+        lead = 0
+        if self._map_from_odom is not None:
+            before = pose_tracker.same_place(poses, se2.compose(self._map_from_odom, odom_from_base))
+            likely = np.flatnonzero(before & (share > _STILL_LIKELY * share[0]))
+            lead = int(likely[0]) if len(likely) else 0
+        self._map_from_odom = se2.compose(poses[lead], se2.inverse(odom_from_base))
+        return lead
 
     def _place(self, belief: Belief) -> str:
         share = belief.share[0]

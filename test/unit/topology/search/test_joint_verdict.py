@@ -1,4 +1,4 @@
-"""Where a robot stands that sees a meetpoint otherwise than the atlas has it."""
+"""What is made of a belief: where a robot stands that sees a meetpoint otherwise than the atlas has it, when it is sure."""
 
 from __future__ import annotations
 
@@ -7,8 +7,14 @@ import numpy as np
 import pytest
 
 from glass_nav.topology.observations import Meetpoint
-from glass_nav.topology.search import joint_verdict
-from glass_nav.topology.search.belief import NO_DART
+from glass_nav.topology.search import belief, joint_verdict
+from glass_nav.topology.search.belief import NO_DART, Belief
+from glass_nav.topology.search.joint_verdict import JointVerdict
+from glass_nav.topology.search.matching import Matcher
+from glass_nav.topology.search.passed_edges import PassedEdges
+from glass_nav.topology.search.search_forest import SearchForest
+from glass_nav.topology.search.search_params import SearchParams
+from glass_nav.vocabulary import SearchState
 
 CROSS = made_atlases.corridors(
     [(0.0, 0.0), (5.0, 0.0), (0.0, 5.0), (-5.0, 0.0), (0.0, -5.0)], [1.0] * 5, [(0, 1), (0, 2), (0, 3), (0, 4)]
@@ -35,3 +41,26 @@ def test_the_edge_that_it_came_along_is_told_by_all_directions_together(quarter:
 def test_no_edge_is_told_where_the_atlas_has_no_such_node(pose: "list[float]", degree: int) -> None:
     meetpoint = Meetpoint(degree, 1.0, bearings_rad=BEARINGS_RAD[:degree])
     assert joint_verdict.darts_near(CROSS, np.array([pose]), meetpoint).tolist() == [NO_DART]
+
+
+@pytest.mark.parametrize(
+    "scans, graph, confirmed",
+    [
+        pytest.param((20.0, 5.0), (0.0, 0.0), True, id="by scans"),
+        pytest.param((20.0, 16.5), (6.0, 0.0), True, id="by both"),
+        pytest.param((20.0, 20.0), (9.0, 0.0), False, id="by meetpoints alone"),
+    ],
+)
+def test_scans_must_have_their_part_in_the_lead_over_another_place(
+    scans: "tuple[float, float]", graph: "tuple[float, float]", confirmed: bool
+) -> None:
+    params, matcher = SearchParams(), Matcher(CROSS, SearchParams().tolerances, use_angles=True)
+    nats = np.array(scans) + graph
+    poses = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]])
+    _, share, elsewhere = belief.places(poses, nats)
+    told = Belief(
+        np.zeros(3), poses, share, elsewhere, np.array(scans), np.array(graph), np.ones(2), np.full(2, NO_DART), 5.0, 3
+    )
+    verdict = JointVerdict(matcher, SearchForest(matcher, 2), PassedEdges(), params)
+    final = verdict.final(told, 0)
+    assert (final is not None and final.state == SearchState.CONFIRMED) == confirmed
