@@ -18,7 +18,7 @@ from glass_nav.topology.atlas.atlas import Atlas
 
 _COMPARED = 300  # new pairs for each step: 0.1 s
 _DIFFERENT = 3.0  # nats that tell two places apart; copies of a room that are drawn at another angle differ by less
-_DECISIVE = 8.0  # ... so surely that a robot drives there to see it
+DECISIVE = 8.0  # ... so surely that a robot drives there to see it
 _ROOM_M = 0.5  # nearer to walls a scan depends on each centimetre, and the robot stops short of a dead end
 _MAX_KEPT = 100_000  # pairs
 _SAME_M = 0.7  # a meetpoint nearer than this to one where the robot was is that
@@ -79,7 +79,7 @@ class ExpectedViews:
 
     def differ(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """(P,) bool: a scan at poses first (P, 3) would tell for certain that the robot is not at second (P, 3)."""
-        return self.nats(first, second) >= _DECISIVE
+        return self.nats(first, second) >= DECISIVE
 
     def has_room(self, dart: np.ndarray) -> np.ndarray:
         """(C,) bool: at the meetpoints that arrival darts (C,) lead to, views can be relied on."""

@@ -16,12 +16,13 @@ from typing import List, Optional, Tuple
 import numpy as np
 
 from glass_nav.geometry import se2
-from glass_nav.topology.search.expected_views import ExpectedViews
+from glass_nav.topology.search.expected_views import DECISIVE, ExpectedViews
 from glass_nav.topology.search.matching import Matcher
 
 _POLLED = 100  # candidates whose expectations are compared pairwise: 2 ms of a step
 _BACK = 0.999  # share of the gain of the way back
 _MIN_GAIN = 0.01  # share of the doubt that a turn must remove to be worth taking
+_LOOKED_FOR = 3  # places that the leading one is to be told from by driving farther
 _LOOKED_AT = 8  # candidates whose views are compared pairwise
 _BY_GRAPH_ALONE = 0.8  # chance that a difference of the graph is none where scans would show none: it was drawn so
 _EQUAL = 1e-9  # survivors by which two turns differ only by rounding
@@ -114,20 +115,22 @@ def carried(here: np.ndarray, there: np.ndarray, other: np.ndarray) -> np.ndarra
 def towards_difference(
     matcher: Matcher, views: ExpectedViews, dart: int, pose: np.ndarray, others: np.ndarray
 ) -> Optional[List[int]]:
-    """Turns to the nearest meetpoint, by edges, where a robot would see that it is not at one of the other places.
+    """Turns to the nearest meetpoint, by edges, where a robot would see for certain that it is not at one of the other
+    places; if there is none, where it would see a difference at all.
 
     Args:
         matcher: of the atlas.
         views: of its map.
         dart: along which the robot came, if the leading place is right.
         pose: (3,) of the robot there.
-        others: (C, 3) poses at the other places.
+        others: (C, 3) poses at the other places, the likeliest first; some of them are looked at.
 
     Returns:
         Ranks; None: no difference was found, in as many comparisons as a step may take.
     """
     level: List[Tuple[int, List[int]]] = [(dart, [])]
-    known = {dart}
+    known, hint = {dart}, None
+    others = others[:_LOOKED_FOR]
     while level and not views.is_exhausted:
         following = []
         for at, ranks in level:
@@ -137,17 +140,19 @@ def towards_difference(
                     known.add(arrival)
                     following.append((arrival, [*ranks, rank]))
         if not following:
-            return None
+            break
         level = following
         arrivals = np.array([arrival for arrival, _ in following])
         looks = np.flatnonzero(views.has_room(arrivals))
         there = np.repeat(views.at(arrivals[looks]), len(others), axis=0)
         of_others = np.tile(others, (len(looks), 1))
-        differs = views.differ(there, carried(np.broadcast_to(pose, there.shape), there, of_others))
-        if differs.any():
-            most = int(differs.reshape(len(looks), len(others)).sum(axis=1).argmax())
-            return following[int(looks[most])][1]
-    return None
+        nats = views.nats(there, carried(np.broadcast_to(pose, there.shape), there, of_others))
+        nats = nats.reshape(len(looks), len(others)).max(axis=1, initial=0.0)
+        if nats.max(initial=0.0) >= DECISIVE:
+            return following[int(looks[nats.argmax()])][1]
+        if hint is None and nats.max(initial=0.0) > 0.0:
+            hint = following[int(looks[nats.argmax()])][1]
+    return hint
 
 
 def seed(matcher: Matcher, dart: np.ndarray) -> int:

@@ -50,6 +50,15 @@ def test_the_nearest_difference_is_found_by_where_the_robot_would_stand(differ: 
     assert ranks == ([0, 1] if differ else None)  # back, then straight on
 
 
+def test_a_difference_that_is_not_decisive_is_a_goal_where_there_is_no_better_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    matcher, views = rows(True)
+    monkeypatch.setattr(vote, "DECISIVE", 1000.0)
+    pose, other = views.at(np.array([0, 4]))
+    assert vote.towards_difference(matcher, views, 0, pose, other[None]) == [0, 1]
+
+
 def test_what_was_seen_once_is_expected_to_tell_nothing_more_until_another_search() -> None:
     _, views = rows(True)
     first, second = views.at(np.array([3])), views.at(np.array([7]))
