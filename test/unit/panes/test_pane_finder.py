@@ -105,6 +105,13 @@ def test_a_pane_goes_up_to_the_wall_that_it_nearly_meets() -> None:
     assert min(pane.start_m[0], pane.end_m[0]) == pytest.approx(3.05, abs=0.05)
 
 
+def test_a_thing_whose_edges_let_beams_pass_is_no_pane() -> None:
+    grid_map = hall()
+    grid_map.occupancy[50:52, 81:83] = grid_map.occupancy[50:52, 99:101] = 100  # posts beside it
+    edges = [made_pane_drive.pane((x_m, 2.5), (x_m + 0.1, 2.5), 0.2) for x_m in (4.3, 4.7)]
+    assert found(made_pane_drive.wall((4.4, 2.5), (4.7, 2.5)), *edges, grid_map=grid_map) == []
+
+
 def test_specks_that_a_mapper_left_do_not_hide_the_pane() -> None:
     grid_map = hall()
     grid_map.occupancy[51, 65:140:9] = 100  # on the line of the pane, a cell each

@@ -32,9 +32,8 @@ Matrix3 better_of(const Matrix3& first, const Matrix3& second) {
 }
 
 Matrix3 widened_by(const Matrix3& covariance, const Matrix3& spread) {
-  return mixed(covariance, spread, [](double value) {
-    return std::max(value * -std::expm1(-(value / kFar) * (value / kFar)), 1.0);
-  });
+  return mixed(covariance, spread,
+               [](double value) { return std::max(value * -std::expm1(-(value / kFar) * (value / kFar)), 1.0); });
 }
 
 Matrix3 carried(double yaw_rad, const Matrix3& covariance, const Vector3& step, const Matrix3& noise,

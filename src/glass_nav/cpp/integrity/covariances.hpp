@@ -1,5 +1,5 @@
-/// Covariances of a pose over x, y and yaw in map. The formulations are in localization/integrity/pose_covariance.py and
-/// dead_reckoning.py.
+/// Covariances of a pose over x, y and yaw in map. The formulations are in localization/integrity/pose_covariance.py
+/// and dead_reckoning.py.
 #pragma once
 
 #include "../poses/matrix3.hpp"

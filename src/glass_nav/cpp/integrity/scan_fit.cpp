@@ -7,19 +7,19 @@ namespace glass_nav {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kFreeM = 2.0;                                            // FREE_M of the Python face
-constexpr double kSameWallM = 0.5, kSameWallCos = 0.90630778703664996;    // of neighbouring beams: 25 degrees
-constexpr double kPieceM = 1.0;                                           // of a wall: pieces err by themselves
-constexpr double kBeforeWallM = 0.25;                                     // where the field is looked at
-constexpr double kKernelScales = 3.0;                                     // residuals beyond are not of that wall
-constexpr double kCloseM = 0.3;                                           // residuals that the scale is learnt from
-constexpr double kNearM = 0.15;                                           // kernel where the scan may fit beside the pose
-constexpr double kMadToDeviation = 1.4826;                                // of a normal distribution
-constexpr double kMinDeviationM = 0.002;                                  // of walls and of their pieces
-constexpr double kPriorWeight = 10.0, kMemory = 0.98;                     // beams that edge_m is worth; past per scan
-constexpr double kFitted = 2.0;                                           // sides whose error the fit takes up
-constexpr double kPriorBeams = 0.01;                                      // weight of kFreeM
-constexpr double kLeastUnmapped = 1.0, kMostUnmapped = 4.0;               // beams that ended at another thing
+constexpr double kFreeM = 2.0;                                          // FREE_M of the Python face
+constexpr double kSameWallM = 0.5, kSameWallCos = 0.90630778703664996;  // of neighbouring beams: 25 degrees
+constexpr double kPieceM = 1.0;                                         // of a wall: pieces err by themselves
+constexpr double kBeforeWallM = 0.25;                                   // where the field is looked at
+constexpr double kKernelScales = 3.0;                                   // residuals beyond are not of that wall
+constexpr double kCloseM = 0.3;                                         // residuals that the scale is learnt from
+constexpr double kNearM = 0.15;                                         // kernel where the scan may fit beside the pose
+constexpr double kMadToDeviation = 1.4826;                              // of a normal distribution
+constexpr double kMinDeviationM = 0.002;                                // of walls and of their pieces
+constexpr double kPriorWeight = 10.0, kMemory = 0.98;                   // beams that edge_m is worth; past per scan
+constexpr double kFitted = 2.0;                                         // sides whose error the fit takes up
+constexpr double kPriorBeams = 0.01;                                    // weight of kFreeM
+constexpr double kLeastUnmapped = 1.0, kMostUnmapped = 4.0;             // beams that ended at another thing
 constexpr double kSmallest = 1e-9;
 constexpr int kSteps = 10;  // to each side of the pose, along the direction that is constrained least
 constexpr std::array<double, kSteps> kStepsM{0.04, 0.08, 0.13, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0};
@@ -71,7 +71,7 @@ FitInformation ScanFit::of(const DistanceField& field, const SeenScan& scan, dou
   std::vector<Piece> pieces;
   double squared_arms = 0.0, along_wall_m = 0.0, part = 0.0;
   for (std::size_t i = 0; i < scan.count; ++i) {
-    const double *end = scan.xy_m + 2 * i;
+    const double* end = scan.xy_m + 2 * i;
     Beam& beam = beams[i];
     beam.arm_x = cos * end[0] - sin * end[1];
     beam.arm_y = sin * end[0] + cos * end[1];
@@ -80,8 +80,8 @@ FitInformation ScanFit::of(const DistanceField& field, const SeenScan& scan, dou
     const double range_m = std::max(std::sqrt(square(along_x) + square(along_y)), kSmallest);
     along_x /= range_m;
     along_y /= range_m;
-    const Slope at = field.at(beam.arm_x - kBeforeWallM * along_x + pose[0],
-                              beam.arm_y - kBeforeWallM * along_y + pose[1]);
+    const Slope at =
+        field.at(beam.arm_x - kBeforeWallM * along_x + pose[0], beam.arm_y - kBeforeWallM * along_y + pose[1]);
     const double slope = std::sqrt(square(at.along_x) + square(at.along_y));
     beam.normal_x = at.along_x / std::max(slope, kSmallest);
     beam.normal_y = at.along_y / std::max(slope, kSmallest);
@@ -94,8 +94,8 @@ FitInformation ScanFit::of(const DistanceField& field, const SeenScan& scan, dou
     if (i > 0) {
       const Beam& last = beams[i - 1];
       const double apart_m = std::sqrt(square(end[0] - end[-2]) + square(end[1] - end[-1]));
-      const bool is_other = apart_m > kSameWallM ||
-                            beam.normal_x * last.normal_x + beam.normal_y * last.normal_y < kSameWallCos;
+      const bool is_other =
+          apart_m > kSameWallM || beam.normal_x * last.normal_x + beam.normal_y * last.normal_y < kSameWallCos;
       if (!is_other) along_wall_m += apart_m;
       const double now = std::floor(along_wall_m / kPieceM);
       is_new = is_other || (i > 1 && now > part);
@@ -114,8 +114,7 @@ FitInformation ScanFit::of(const DistanceField& field, const SeenScan& scan, dou
     const double squared = square(beam.residual_m);
     beam.near = square(square(near_m) / (square(near_m) + squared) * beam.steepness);
     beam.weight = matched ? square(square(kernel_m) / (square(kernel_m) + squared) * beam.steepness) : beam.near;
-    beam.jacobian = {beam.normal_x, beam.normal_y,
-                     (beam.normal_y * beam.arm_x - beam.normal_x * beam.arm_y) / lever_m};
+    beam.jacobian = {beam.normal_x, beam.normal_y, (beam.normal_y * beam.arm_x - beam.normal_x * beam.arm_y) / lever_m};
     information.add_outer(beam.jacobian, beam.weight);
     near_information.add_outer(beam.jacobian, beam.near);
     for (std::size_t k = 0; k < 3; ++k) pull[k] -= beam.near * beam.jacobian[k] * beam.residual_m;
@@ -224,8 +223,7 @@ Matrix3 ScanFit::spread_of(const std::vector<Beam>& beams, const std::vector<Pie
     if (off_m > kernel_m && off_m < 3.0 * kernel_m && beam.steepness > 0.0) beside += 1.0;
   }
   const double unmapped = square(std::min(std::max(0.5 * beside, kLeastUnmapped), kMostUnmapped));
-  Matrix3 spread =
-      Matrix3::diagonal(square(kPriorBeams * kFreeM) + unmapped * (variance(kSide) + variance(kPiece)));
+  Matrix3 spread = Matrix3::diagonal(square(kPriorBeams * kFreeM) + unmapped * (variance(kSide) + variance(kPiece)));
   Vector3 total{};
   std::array<Vector3, kSides> of_side{};
   const double of_beam = variance(kBeam) * beam_share, of_piece = variance(kPiece);
@@ -252,12 +250,11 @@ Matrix3 ScanFit::spread_of(const std::vector<Beam>& beams, const std::vector<Pie
 void ScanFit::widen(const DistanceField& field, const Vector3& pose, const std::vector<Beam>& beams,
                     const Matrix3& information, double lever_m, std::size_t pieces, Matrix3& covariance) const {
   const Eigen3 found = eigen(covariance);
-  const auto longest = static_cast<std::size_t>(
-      std::max_element(found.values.begin(), found.values.end()) - found.values.begin());
+  const auto longest =
+      static_cast<std::size_t>(std::max_element(found.values.begin(), found.values.end()) - found.values.begin());
   const Vector3 axis{found.axes(0, longest), found.axes(1, longest), found.axes(2, longest)};
   const double kernel = square(kKernelScales * scale_m_);
-  const double share =
-      0.5 * square(kKernelScales) * static_cast<double>(pieces) / static_cast<double>(beams.size());
+  const double share = 0.5 * square(kKernelScales) * static_cast<double>(pieces) / static_cast<double>(beams.size());
   const double curvature = share * dot(axis, information * axis) / kernel;
   std::array<double, 2 * kSteps + 1> loss{}, linearized{};
   for (int i = -kSteps; i <= kSteps; ++i) {
@@ -265,8 +262,8 @@ void ScanFit::widen(const DistanceField& field, const Vector3& pose, const std::
     const double x = pose[0] + step * axis[0], y = pose[1] + step * axis[1];
     double total = 0.0;
     for (const Beam& beam : beams) {
-      const double squared = square(field.distance(x + cos * beam.arm_x - sin * beam.arm_y,
-                                                   y + sin * beam.arm_x + cos * beam.arm_y));
+      const double squared =
+          square(field.distance(x + cos * beam.arm_x - sin * beam.arm_y, y + sin * beam.arm_x + cos * beam.arm_y));
       total += squared / (squared + kernel);
     }
     loss[static_cast<std::size_t>(i + kSteps)] = share * total;

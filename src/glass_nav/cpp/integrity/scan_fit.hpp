@@ -10,7 +10,8 @@
 
 namespace glass_nav {
 
-/// End points of beams in the robot's frame, x and y in turn, by ascending angle; the lidar there, and the robot in map.
+/// End points of beams in the robot's frame, x and y in turn, by ascending angle; the lidar there, and the robot in
+/// map.
 struct SeenScan {
   const double* xy_m;
   std::size_t count;
@@ -30,7 +31,8 @@ class ScanFit {
   /// edge_m: deviation of an edge that is drawn in whole cells.
   explicit ScanFit(double edge_m);
 
-  /// beam_share: of all beams that the pose was fitted to, how many these are. matched: the pose was fitted to this scan.
+  /// beam_share: of all beams that the pose was fitted to, how many these are. matched: the pose was fitted to this
+  /// scan.
   FitInformation of(const DistanceField& field, const SeenScan& scan, double beam_share, bool matched);
 
  private:

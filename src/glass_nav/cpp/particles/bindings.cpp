@@ -107,8 +107,11 @@ py::array_t<double> proposal_log_ratio(const Array& poses, std::size_t kept, con
   if (scans.count == 0 || static_cast<std::size_t>(around.size()) != 9 * scans.count) {
     throw std::invalid_argument("aligned poses must be (K, 3), K > 0, and their covariances (K, 3, 3)");
   }
-  Mixture mixture{normal_pose(mean.data(), near.data()), normal_pose(mean.data(), slipped.data()), {},
-                  slip_probability, scan_share};
+  Mixture mixture{normal_pose(mean.data(), near.data()),
+                  normal_pose(mean.data(), slipped.data()),
+                  {},
+                  slip_probability,
+                  scan_share};
   for (std::size_t i = 0; i < scans.count; ++i)
     mixture.by_scan.push_back(normal_pose(scans.data + 3 * i, around.data() + 9 * i));
   py::array_t<double> log_ratio(static_cast<py::ssize_t>(from.count));

@@ -16,8 +16,8 @@ struct BinSize {
 
 /// The bins that poses fall in.
 struct FilledBins {
-  std::vector<Bin> bins;               // all different, as they were first met
-  std::vector<std::size_t> of_pose;    // the number of each pose's bin
+  std::vector<Bin> bins;             // all different, as they were first met
+  std::vector<std::size_t> of_pose;  // the number of each pose's bin
 };
 
 /// poses: x, y, yaw in turn. yaw_bins: they go round; 0: yaw does not.

@@ -33,7 +33,8 @@ class JoinedSets {
 std::vector<std::size_t> clusters_of(const std::vector<Bin>& bins, std::int64_t yaw_bins) {
   std::vector<std::size_t> order(bins.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(), [&bins](std::size_t one, std::size_t other) { return bins[one] < bins[other]; });
+  std::sort(order.begin(), order.end(),
+            [&bins](std::size_t one, std::size_t other) { return bins[one] < bins[other]; });
   JoinedSets sets(bins.size());
   for (std::size_t i = 0; i < bins.size(); ++i) {
     for (std::int64_t dx = -1; dx <= 1; ++dx) {
@@ -78,8 +79,8 @@ Moments moments_of(const double* poses, const double* weights, std::size_t count
   for (std::size_t i = 0; i < count; ++i) {
     if (!counts(i)) continue;
     const double* pose = poses + 3 * i;
-    result.covariance.add_outer(
-        {pose[0] - result.mean[0], pose[1] - result.mean[1], wrap(pose[2] - result.mean[2])}, weight(i));
+    result.covariance.add_outer({pose[0] - result.mean[0], pose[1] - result.mean[1], wrap(pose[2] - result.mean[2])},
+                                weight(i));
   }
   return result;
 }

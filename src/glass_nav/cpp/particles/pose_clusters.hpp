@@ -19,8 +19,8 @@ struct Moments {
 /// Of weighted poses, yaw on the circle. members: those that count; null: all.
 Moments moments_of(const double* poses, const double* weights, std::size_t count, const bool* members);
 
-/// Marks the members of the cluster with the most weight, and returns the weight. Bins that touch are one cluster; those
-/// of yaw go round.
+/// Marks the members of the cluster with the most weight, and returns the weight. Bins that touch are one cluster;
+/// those of yaw go round.
 double mark_best_cluster(const double* poses, const double* weights, std::size_t count, const BinSize& size,
                          std::int64_t yaw_bins, bool* members);
 
