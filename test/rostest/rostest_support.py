@@ -55,7 +55,10 @@ def process_of(node: str) -> int:
 
 def busy_threads(pid: int) -> int:
     """How many threads of a process used more than a quarter of the CPU time that all of them used."""
-    stats = [(task / "stat").read_text() for task in Path(f"/proc/{pid}/task").iterdir()]
+    stats = []
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # a thread that has ended since
+            stats.append((task / "stat").read_text())
     ticks = [sum(map(int, stat.rpartition(")")[2].split()[11:13])) for stat in stats]  # user, system
     return sum(each > 0.25 * sum(ticks) for each in ticks)
 

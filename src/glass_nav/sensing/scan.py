@@ -11,6 +11,8 @@ from typing import Optional
 
 import numpy as np
 
+_ONE_PIECE_M = 0.25  # edge of a square of the floor: beams that end in one are one piece of evidence
+
 
 class ScanError(ValueError):
     """A scan that cannot be used.
@@ -175,20 +177,20 @@ def spread_evenly(usable: np.ndarray, count: int) -> np.ndarray:
     return beams[np.rint(steps).astype(int)]
 
 
-def spread_over_surfaces(scan: Scan, side_m: float, count: int) -> np.ndarray:
-    """Indices of at most count beams that returned, one for each square of the floor that any ended in.
+def one_of_each_piece(scan: Scan) -> np.ndarray:
+    """Indices of beams that returned, one for each square of the floor that any ended in.
 
     Neighbouring beams that end at one thing are one piece of evidence. Evenly spread over the angles, most beams end at
-    what is close: a cabinet beside the robot would outvote all walls behind it.
-
-    Args:
-        scan: one revolution of a lidar.
-        side_m: of the squares.
-        count: chosen evenly from them if there are more.
+    what is close: a cabinet or a person beside the robot would outvote all walls behind.
     """
     beams = np.flatnonzero(scan.answered)
-    squares = np.floor(scan.points_in_base()[beams] / side_m).astype(np.int64)
+    squares = np.floor(scan.points_in_base()[beams] / _ONE_PIECE_M).astype(np.int64)
     _, first = np.unique(squares @ [1, 2**31], return_index=True)
+    return np.sort(beams[first])
+
+
+def spread_over_surfaces(scan: Scan, count: int) -> np.ndarray:
+    """Indices of at most count beams, chosen evenly from one of each piece of a surface."""
     usable = np.zeros(len(scan.ranges_m))
-    usable[beams[first]] = 1.0
+    usable[one_of_each_piece(scan)] = 1.0
     return spread_evenly(usable, count)

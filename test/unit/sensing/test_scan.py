@@ -169,17 +169,17 @@ def test_few_beams_are_all_chosen():
 
 
 def test_a_thing_close_to_the_robot_is_chosen_as_often_as_one_of_its_size_far_away():
-    """Beams 1 degree apart, to a wall 1 m ahead for the first half and 8 m for the other."""
+    """Beams 1 degree apart, to a wall 1.1 m ahead for the first half and 8.1 m for the other, in the middle of squares."""
     bearings = np.radians(np.arange(-45.0, 45.0))
-    ranges_m = np.where(bearings < 0.0, 1.0, 8.0) / np.cos(bearings)
+    ranges_m = np.where(bearings < 0.0, 1.1, 8.1) / np.cos(bearings)
     scan = scan_from_fields(STAMP_NS, ranges_m, bearings[0], np.radians(1.0), 0.1, 20.0, HERE)
-    near = spread_over_surfaces(scan, 0.25, 90)
+    near = spread_over_surfaces(scan, 90)
     near, far = near[near < 45], near[near >= 45]
     assert 4 <= len(near) <= 6  # 1 m of wall
     assert 30 <= len(far) <= 35  # 8 m
-    assert len(spread_over_surfaces(scan, 0.25, 10)) == 10
+    assert len(spread_over_surfaces(scan, 10)) == 10
 
 
 def test_beams_without_a_return_are_not_chosen_over_surfaces():
     scan = scan_from_fields(STAMP_NS, [1.0, np.inf, np.nan, 3.0], 0.0, 0.5, 0.1, 20.0, HERE)
-    np.testing.assert_array_equal(spread_over_surfaces(scan, 0.25, 90), [0, 3])
+    np.testing.assert_array_equal(spread_over_surfaces(scan, 90), [0, 3])

@@ -61,7 +61,7 @@ class BeamClassifier:
         self.caster = RayCaster(grid_map, params.raycast_backend, params.raycast_threads)
         self.known_area = KnownArea(grid_map)
         self.thickness_m = wall_thickness.wall_thickness(grid_map)  # (H * W,)
-        self._opaque = free_standing.walls(grid_map, params.vote.glass_max_thickness_m).ravel()  # (H * W,) bool
+        self._opaque = np.flatnonzero(free_standing.walls(grid_map, params.vote.glass_max_thickness_m))  # flat cells
         self.residuals = RangeResiduals(_DEPTH_SHARE, params.min_sigma_m)
         self.glass_map = GlassMap(grid_map, params.glass)
         self._coatings = UNKNOWN_COATINGS
@@ -148,7 +148,10 @@ class BeamClassifier:
 
     def _is_gone(self, cell: np.ndarray, axis_rad: np.ndarray) -> np.ndarray:
         """(G,) bool, of cells (G,) with their axes (G,): the map shows what is no longer there."""
-        return self.glass_map.is_gone(cell, axis_rad, (cell >= 0) & self._opaque[cell])
+        at = np.searchsorted(self._opaque, cell)
+        opaque = at < len(self._opaque)
+        opaque[opaque] = self._opaque[at[opaque]] == cell[opaque]
+        return self.glass_map.is_gone(cell, axis_rad, opaque)
 
     def evidence(
         self, scan: Scan, cases: BeamCases, expected: ExpectedRanges, map_from_base: np.ndarray

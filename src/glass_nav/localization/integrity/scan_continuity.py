@@ -2,10 +2,11 @@
 
 A robot that is carried to a place that looks like the one it left cannot tell from the map: among doors that look alike
 scans fit as well as they did. But what it sees changes at once. Where the lidar looked through a moment ago there is a
-surface now, and the other way round. A few beams contradict each other always, where people walk and at the edges of
-things, more in glass; how many is learnt. Odometry may have missed a part of the motion, so the scans are also compared
-with the motion of the tracked pose. A break counts if the next scan contradicts the one before it as well: a person who
-steps before the lidar makes a single scan look like another place. The formulation is ours. B beams.
+surface now, and the other way round. Surfaces are counted and not beams: a person who comes near has many beams, but all
+else stays as it was. A few contradict each other always, where people walk and at the edges of things, more in glass;
+how many is learnt. Odometry may have missed a part of the motion, so the scans are also compared with the motion of the
+tracked pose. A break counts if the next scan contradicts the one before it as well: a crowd before the lidar makes a
+single scan look like another place. The formulation is ours. P pieces of surfaces.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ from typing import NamedTuple, Optional
 import numpy as np
 
 from glass_nav.geometry import se2
-from glass_nav.sensing.scan import Scan
+from glass_nav.sensing.scan import Scan, one_of_each_piece
 
 _TOLERANCE_M, _TOLERANCE_SHARE = 0.15, 0.03  # of a range: nearer than that to what was seen is no contradiction
 _TOLERANCE_RAD = 0.035  # of a bearing, odometry's error included
 _MIN_BEAMS = 20  # with fewer a scan is no evidence
 _MEMORY_SCANS = 20.0  # that what is usual is averaged over
 _MIN_SCANS = 5  # before anything is unusual
-_BREAK = (0.06, 7.0)  # above the usual share of contradictions, as such and in mean deviations
+_BREAK = (0.05, 5.0)  # above the usual share of contradictions, as such and in mean deviations
 _TURNS_RAD = (-0.05, 0.05, -0.1, 0.1, -0.2, 0.2)  # that odometry may have missed
 _MAX_STEP_M = 1.0  # farther apart two scans need not have anything in common
 
@@ -90,7 +91,7 @@ class ScanContinuity:
 
 
 def contradictions(before: Scan, after: Scan, step: np.ndarray) -> float:
-    """Share of the end points of two scans, taken a step (3,) apart, that the other scan looked through."""
+    """Of the pieces of surfaces that two scans, taken a step (3,) apart, met: the share that the other looked through."""
     before_from_after = se2.compose(
         se2.inverse(before.base_from_laser), se2.compose(np.asarray(step, float), after.base_from_laser)
     )
@@ -100,8 +101,9 @@ def contradictions(before: Scan, after: Scan, step: np.ndarray) -> float:
 
 
 def _ends(scan: Scan) -> np.ndarray:
-    """(B, 2) end points [m] in the frame of the lidar."""
-    ranges_m, bearings = scan.ranges_m[scan.answered], scan.angles_rad[scan.answered]
+    """(P, 2) end points [m] in the frame of the lidar, one on each piece of a surface."""
+    beams = one_of_each_piece(scan)
+    ranges_m, bearings = scan.ranges_m[beams], scan.angles_rad[beams]
     return np.column_stack([ranges_m * np.cos(bearings), ranges_m * np.sin(bearings)])
 
 

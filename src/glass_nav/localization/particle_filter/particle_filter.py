@@ -34,7 +34,6 @@ from glass_nav.world.landmark_map import LandmarkMap
 ONE_PLACE = np.array([1.0, 1.0, 0.7])  # deviations [m, m, rad] that preliminary samples can cover
 _MIN_ENDS = 20  # beams of known case that a registration is refined by
 _BLOCK = 2**15  # beams of particles weighed at a time
-_ONE_PIECE_M = 0.25  # beams that end closer together are one piece of evidence when a scan is registered
 _SCALE_SIGMAS = 1.5  # of the kernel that aligns, in deviations of beams around walls
 _FULL_FIT = 20.0  # log likelihood ratio of a scan that fits everywhere to one that fits nowhere
 
@@ -183,7 +182,7 @@ class ParticleFilter:
             covariance: (3, 3) of the pose that odometry led to; None: the spread of the particles.
         """
         best = pose_estimate.of(self.particles, self._weights)
-        beams = spread_over_surfaces(scan, _ONE_PIECE_M, self._params.proposal.proposal_max_beams)
+        beams = spread_over_surfaces(scan, self._params.proposal.proposal_max_beams)
         points = scan.points_in_base()[beams]
         if not len(beams):
             return Registration(best.map_from_base, best.covariance, best, None, 0, False)
