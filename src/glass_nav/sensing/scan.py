@@ -180,17 +180,10 @@ def spread_evenly(usable: np.ndarray, count: int) -> np.ndarray:
 def one_of_each_piece(scan: Scan) -> np.ndarray:
     """Indices of beams that returned, one for each square of the floor that any ended in.
 
-    Neighbouring beams that end at one thing are one piece of evidence. Evenly spread over the angles, most beams end at
-    what is close: a cabinet or a person beside the robot would outvote all walls behind.
+    Neighbouring beams that end at one thing tell one thing. By angle, most beams end at what is close: a person beside the
+    robot would outvote all walls behind.
     """
     beams = np.flatnonzero(scan.answered)
     squares = np.floor(scan.points_in_base()[beams] / _ONE_PIECE_M).astype(np.int64)
     _, first = np.unique(squares @ [1, 2**31], return_index=True)
     return np.sort(beams[first])
-
-
-def spread_over_surfaces(scan: Scan, count: int) -> np.ndarray:
-    """Indices of at most count beams, chosen evenly from one of each piece of a surface."""
-    usable = np.zeros(len(scan.ranges_m))
-    usable[one_of_each_piece(scan)] = 1.0
-    return spread_evenly(usable, count)

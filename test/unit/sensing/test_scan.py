@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from glass_nav.sensing.scan import Scan, ScanError, scan_from_fields, spread_evenly, spread_over_surfaces
+from glass_nav.sensing.scan import Scan, ScanError, one_of_each_piece, scan_from_fields, spread_evenly
 
 STAMP_NS = 12_345_000_000
 HERE = np.zeros(3)
@@ -173,13 +173,12 @@ def test_a_thing_close_to_the_robot_is_chosen_as_often_as_one_of_its_size_far_aw
     bearings = np.radians(np.arange(-45.0, 45.0))
     ranges_m = np.where(bearings < 0.0, 1.1, 8.1) / np.cos(bearings)
     scan = scan_from_fields(STAMP_NS, ranges_m, bearings[0], np.radians(1.0), 0.1, 20.0, HERE)
-    near = spread_over_surfaces(scan, 90)
+    near = one_of_each_piece(scan)
     near, far = near[near < 45], near[near >= 45]
     assert 4 <= len(near) <= 6  # 1 m of wall
     assert 30 <= len(far) <= 35  # 8 m
-    assert len(spread_over_surfaces(scan, 10)) == 10
 
 
-def test_beams_without_a_return_are_not_chosen_over_surfaces():
+def test_a_beam_without_a_return_is_of_no_piece():
     scan = scan_from_fields(STAMP_NS, [1.0, np.inf, np.nan, 3.0], 0.0, 0.5, 0.1, 20.0, HERE)
-    np.testing.assert_array_equal(spread_over_surfaces(scan, 90), [0, 3])
+    np.testing.assert_array_equal(one_of_each_piece(scan), [0, 3])

@@ -15,6 +15,7 @@ from glass_nav.geometry import angles
 
 MIN_DEVIATION = np.array([0.01, 0.01, np.radians(0.2)])  # of odometry: m, m, rad
 SLIP_DEVIATION = np.array([0.3, 0.3, np.radians(30.0)])  # a wheel that slipped, a robot that was pushed
+_WIDER = 2.0  # than the covariance says: what is wrong in the map errs alike in scan after scan, which it does not know
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class OdometryPrior:
 
     @property
     def _near(self) -> np.ndarray:
-        return self.covariance + np.diag(MIN_DEVIATION**2)
+        return _WIDER**2 * self.covariance + np.diag(MIN_DEVIATION**2)
 
     def _log_normal(self, poses: np.ndarray, covariance: np.ndarray) -> np.ndarray:
         off = poses - self.map_from_base

@@ -27,7 +27,7 @@ from glass_nav.localization.particle_filter.resampling import ParticleCount
 from glass_nav.localization.particle_filter.scan_registration import ScanRegistration
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
-from glass_nav.sensing.scan import Scan, spread_evenly, spread_over_surfaces
+from glass_nav.sensing.scan import Scan, spread_evenly
 from glass_nav.world.grid_map import GridMap
 from glass_nav.world.landmark_map import LandmarkMap
 
@@ -182,7 +182,7 @@ class ParticleFilter:
             covariance: (3, 3) of the pose that odometry led to; None: the spread of the particles.
         """
         best = pose_estimate.of(self.particles, self._weights)
-        beams = spread_over_surfaces(scan, self._params.proposal.proposal_max_beams)
+        beams = spread_evenly(scan.answered, self._params.proposal.proposal_max_beams)
         points = scan.points_in_base()[beams]
         if not len(beams):
             return Registration(best.map_from_base, best.covariance, best, None, 0, False)

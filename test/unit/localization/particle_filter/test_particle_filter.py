@@ -155,6 +155,6 @@ def test_a_cabinet_beside_the_robot_does_not_pull_a_pose_that_odometry_knows(beh
     particles = ParticleFilter(PARAMS.particle_filter, DistanceField(grid_map), np.random.default_rng(0))
     particles.start_around(true, np.array([0.02, 0.02, 0.01]))
     residuals = BeamClassifier(PARAMS.classifier, grid_map).residuals
-    registration = particles.register(scan, np.zeros(3), residuals, np.diag([0.02, 0.02, 0.005]) ** 2)
+    registration = particles.register(scan, np.zeros(3), residuals, np.diag([0.01, 0.01, 0.0025]) ** 2)
     way_m, turn_rad = off(registration.map_from_base, true)
     assert way_m < 0.03 and turn_rad < np.radians(0.5)
