@@ -1,8 +1,8 @@
 """Where odometry led the pose -> how probable are poses nearby, before the scan is looked at.
 
 Scans with many returns that the map lacks may fit better beside the pose than at it: the walls of a building behind the
-panes, a cabinet beside a wall. So the pose that a scan is classified at is the most probable one, not the one that fits
-best. A wheel may have slipped: then a wider distribution holds, with a small weight. K poses.
+panes, a cabinet beside a wall. So the pose that a scan is classified at is the one that fits best only if that is the more
+probable one. A wheel may have slipped: then a wider distribution holds, with a small weight. K poses.
 """
 
 from __future__ import annotations

@@ -198,7 +198,7 @@ class ParticleFilter:
             return Registration(best.map_from_base, np.zeros((3, 3)), best, None, 0, False)
         slip = self._params.proposal.odom_slip_probability if finder.contradicts_odometry else 0.0
         prior = OdometryPrior(best.map_from_base, best.covariance if covariance is None else covariance, slip)
-        found = self._most_probable_first(found, points, prior, residuals)
+        found = self._with_held(found, points, prior, residuals)
         return Registration(
             found.poses[0], np.zeros((3, 3)), best, found, len(beams), finder.fits, finder.contradicts_odometry
         )
@@ -254,12 +254,12 @@ class ParticleFilter:
             np.all(np.sqrt(np.diag(best.covariance)) <= ONE_PLACE)
         )
 
-    def _most_probable_first(
+    def _with_held(
         self, found: Alignment, points_m: np.ndarray, prior: OdometryPrior, residuals: RangeResiduals
     ) -> Alignment:
-        """The alignments (K) and the one that odometry holds back, K + 1, by their posterior probability."""
+        """The alignments (K) and the one that odometry holds back, K + 1; it comes first if it is the more probable one."""
         scale_m = _SCALE_SIGMAS * residuals.sigma_m
-        held = scan_alignment.align_near(
+        poses = scan_alignment.align_near(
             self._field,
             points_m,
             prior.map_from_base[None],
@@ -267,12 +267,16 @@ class ParticleFilter:
             first_scale_m=2.0 * scale_m,
             last_scale_m=scale_m,
         )
-        near = scan_alignment.at(self._field, points_m, held, scale_m)
-        poses = np.concatenate([found.poses, near.poses])
-        log_w = importance_weights.by_field(self._field, poses, points_m, residuals, self._params.mixture)
-        order = np.argsort(-(log_w + prior.log_density(poses)))
-        information = np.concatenate([found.information, near.information])
-        return Alignment(poses[order], information[order], np.concatenate([found.fit, near.fit])[order])
+        held = scan_alignment.at(self._field, points_m, poses, scale_m)
+        both = np.concatenate([held.poses, found.poses[:1]])
+        log_w = importance_weights.by_field(self._field, both, points_m, residuals, self._params.mixture)
+        held_log_p, best_log_p = (log_w + prior.log_density(both)).tolist()
+        at = 0 if held_log_p >= best_log_p else 1
+        return Alignment(
+            np.insert(found.poses, at, held.poses[0], axis=0),
+            np.insert(found.information, at, held.information[0], axis=0),
+            np.insert(found.fit, at, held.fit[0]),
+        )
 
     def _beam_information(self, beams: int, residuals: RangeResiduals) -> float:
         """Of one of so many beams, across the wall that it ended at [1/m2]."""
