@@ -6,6 +6,7 @@ from typing import List
 
 import made_buildings
 import numpy as np
+import pytest
 
 from glass_nav.demo.simulated_robot import SimulatedRobot
 from glass_nav.demo.wake_up_demo import WakeUpDemo, WakeUpDemoParams
@@ -27,6 +28,7 @@ def robot_at(seed: int, lines: List[str], search: SearchParams = SearchParams())
     return SimulatedRobot(simulation, GRID_MAP, ATLAS, seed, lines.append, search)
 
 
+@pytest.mark.long_run
 def test_a_robot_finds_its_place_is_localized_and_takes_goals() -> None:
     lines: List[str] = []
     robot = robot_at(1, lines, SearchParams(confirm_edges=0))
