@@ -3,8 +3,9 @@
 Navigation asks tf for "now" and does not wait. So the last correction is sent again the moment a scan arrives, before the
 filter has worked on it, and the new correction follows when it is computed. Each transform is stamped ahead of its scan
 by `transform_tolerance`, as AMCL's are, and by more where that ends before the next scan has arrived and its transform
-has reached the listeners: at ten scans a second and a tolerance of 0.1 s, on a busy machine, or from a slow lidar. A stamp is never sent twice, so a correction holds from the time on up to which transforms were sent already, and
-never moves one that somebody may have used.
+has reached the listeners: at ten scans a second and a tolerance of 0.1 s, on a busy machine, or from a slow lidar. A
+stamp is never sent twice, so a correction holds from the time on up to which transforms were sent already, and never
+moves one that somebody may have used.
 """
 
 from __future__ import annotations
