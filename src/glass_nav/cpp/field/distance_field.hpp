@@ -63,17 +63,11 @@ class DistanceField {
 
     void distances(double x_m, double y_m, float* distance_m) const {
       std::array<double, kMost> column, row;
-      double least = 1.0, most_column = 0.0, most_row = 0.0;
       for (std::size_t k = 0; k < count_; ++k) {
         column[k] = column_[k] + cos_[k] * x_m - sin_[k] * y_m;
         row[k] = row_[k] + sin_[k] * x_m + cos_[k] * y_m;
       }
-      for (std::size_t k = 0; k < count_; ++k) {
-        least = std::min(least, std::min(column[k], row[k]));
-        most_column = std::max(most_column, column[k]);
-        most_row = std::max(most_row, row[k]);
-      }
-      if (least > 0.0 && most_column < field_.width_ + 0.999 && most_row < field_.height_ + 0.999) {
+      if (is_inside(column, field_.width_ + 0.999) && is_inside(row, field_.height_ + 0.999)) {
         distances_inside(column, row, distance_m);
         return;
       }
@@ -84,6 +78,13 @@ class DistanceField {
 
    private:
     using Values = std::array<double, kMost>;
+
+    /// Not if one is NaN.
+    bool is_inside(const Values& values, double most) const {
+      std::int64_t inside = 1;
+      for (std::size_t k = 0; k < count_; ++k) inside &= (values[k] > 0.0) & (values[k] < most);
+      return inside != 0;
+    }
 
     void distances_inside(const Values& column, const Values& row, float* distance_m) const {
       std::array<std::int32_t, kMost> corner;
