@@ -145,7 +145,9 @@ def main() -> int:
         scan = scan_at(caster, pose, arguments.beams, 1, rng)
         localizer.request_update()
         whole.append(cpu_ms(lambda scan=scan: localizer.update(scan, np.zeros(3))))
-        classified.append(cpu_ms(lambda scan=scan: localizer.update(scan, np.zeros(3)).report))  # it has not moved: cases only
+        classified.append(
+            cpu_ms(lambda scan=scan: localizer.update(scan, np.zeros(3)).report)
+        )  # it has not moved: cases only
 
     print(
         f"{arguments.map}: {arguments.beams} beams classified by {settings.samples.sample_count} samples, "

@@ -185,14 +185,6 @@ WallCells make_walls(const Array<std::int64_t>& wall, std::int64_t rows, std::in
 
 std::vector<py::ssize_t> shape_of(const py::array& array) { return {array.shape(), array.shape() + array.ndim()}; }
 
-py::array_t<bool> has_wall(const WallCells& walls, const Array<std::int64_t>& cell) {
-  py::array_t<bool> found(shape_of(cell));
-  for (py::ssize_t i = 0; i < cell.size(); ++i) {
-    found.mutable_data()[i] = walls.number(cell.data()[i]) != CellSet::kNone;
-  }
-  return found;
-}
-
 void check_memory(const py::array& log_odds) {
   if (log_odds.ndim() != 2 || log_odds.shape(0) != static_cast<py::ssize_t>(kQuestions)) {
     throw std::invalid_argument("log odds must be (2, W)");
@@ -314,7 +306,6 @@ PYBIND11_MODULE(_beam_vote, module) {
              py::arg("gains"), py::arg("frequencies"), py::arg("sigma_m"), py::arg("max_range_m"), py::arg("min_cos"));
   py::class_<WallCells>(module, "WallCells")
       .def(py::init(&make_walls), py::arg("wall"), py::arg("rows"), py::arg("columns"))
-      .def("has", &has_wall, py::arg("cell"))
       .def("chances", &glass_chances, py::arg("log_odds"), py::arg("through"), py::arg("there"), py::arg("cell"))
       .def("gone", &gone, py::arg("log_odds"), py::arg("cell"), py::arg("axis_rad"), py::arg("opaque"),
            py::arg("resolution_m"), py::arg("grid_yaw_rad"), py::arg("prior"), py::arg("limit"),

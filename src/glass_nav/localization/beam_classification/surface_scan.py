@@ -90,22 +90,20 @@ def of(
     """
     if not trusted:
         return SurfaceScan(ranges_m, np.zeros(len(ranges_m), bool), False)
-    return SurfaceScan(
-        *_beam_vote.cut(
-            ranges_m,
-            case,
-            first.range_m,
-            first.cos_incidence,
-            first.axis_rad,
-            glass,
-            gate_m,
-            max_range_m,
-            _SURE,
-            _NO_RETURN_GLASS,
-            _NO_RETURN_WALL,
-            _DARK_TO_DIM,
-            _SAME_WALL_M,
-            _SAME_WALL_RAD,
-        ),
-        True,
+    as_cut_m, cut = _beam_vote.cut(
+        ranges_m,
+        case,
+        first.range_m,
+        first.cos_incidence,
+        first.axis_rad,
+        glass,
+        gate_m,
+        max_range_m,
+        _SURE,
+        _NO_RETURN_GLASS,
+        _NO_RETURN_WALL,
+        _DARK_TO_DIM,
+        _SAME_WALL_M,
+        _SAME_WALL_RAD,
     )
+    return SurfaceScan(as_cut_m, cut, True)
