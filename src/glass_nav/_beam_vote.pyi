@@ -1,5 +1,5 @@
 # cpp/vote; its faces are in localization/beam_classification. N samples, B beams, W wall cells.
-from typing import Sequence, Tuple
+from typing import Sequence
 
 import numpy as np
 
@@ -122,7 +122,7 @@ def evidence(
     first_m: np.ndarray,  # (B,) float64
     seen_through: np.ndarray,  # (B,) float64
     known_end: np.ndarray,  # (B,) bool
-) -> Tuple[float, float, float, float]: ...  # answered, explained, short, passed
+) -> tuple[float, float, float, float]: ...  # answered, explained, short, passed
 def cut(
     measured_m: np.ndarray,  # (B,) float64
     case: np.ndarray,  # (B,) uint8
@@ -138,4 +138,4 @@ def cut(
     dark_to_dim: float,
     same_wall_m: float,
     same_wall_rad: float,
-) -> Tuple[np.ndarray, np.ndarray]: ...  # ranges (B,) float64, cut (B,) bool
+) -> tuple[np.ndarray, np.ndarray]: ...  # ranges (B,) float64, cut (B,) bool

@@ -127,7 +127,8 @@ class GlassMap:
         """(2, ...) probabilities for flat cells (...) of the map: that it can be seen through, and if so that it is there,
         that is glass and no object that is gone; the priors for -1.
         """
-        return self._cells_of_walls.chances(self._log_odds, *self._prior[:, 0], cell)
+        through, there = self._prior[:, 0].tolist()
+        return self._cells_of_walls.chances(self._log_odds, through, there, cell)
 
     def is_gone(self, cell: np.ndarray, axis_rad: np.ndarray, opaque: np.ndarray) -> np.ndarray:
         """Whether what the map shows is no longer there, so that a beam behind it passed nothing.
