@@ -67,7 +67,7 @@ def test_the_missing_pane_is_found_and_drawn(run, drive, tmp_path):
     (pane,) = panes_file.load(tmp_path / "found" / "panes.yaml", before).panes
     assert pane.length_m == pytest.approx(PANE_M, abs=0.3)
     assert pane.probability > 0.9
-    assert f"1 panes drawn, {pane.length_m:.1f} m of glass that the map lacks" in out
+    assert f"1 pane drawn, {pane.length_m:.1f} m of glass that the map lacks" in out
     wanted = map_file.load(complete).occupied & ~before.occupied
     assert np.count_nonzero(after.occupied & wanted) > 0.8 * np.count_nonzero(wanted)
 
@@ -77,7 +77,7 @@ def test_with_a_ground_truth_panes_are_found_where_the_filter_is_not_sure(run, d
     lacking = drive.with_suffix(".map.yaml")
     code, out, _ = run("map", "panes", drive, "--map", lacking, "--every", "2", "--out", tmp_path / "found")
     assert code == 0
-    assert "1 panes drawn" in out
+    assert "1 pane drawn" in out
 
 
 def test_the_complete_map_gets_no_pane_twice(run, drive, tmp_path):
