@@ -80,6 +80,7 @@ def pane_echoes(
     max_range_m: float,
     min_cos: float,
 ) -> tuple[np.ndarray, np.ndarray]: ...  # (B,) float64 each
+def reflectance(incidence_rad: np.ndarray, index: float) -> np.ndarray: ...  # (...) float64 -> (...) float64
 
 class WallCells:
     def __init__(self, wall: np.ndarray, rows: int, columns: int) -> None: ...  # (W,) int64, with a border of 2 cells

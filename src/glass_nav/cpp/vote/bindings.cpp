@@ -172,6 +172,14 @@ py::tuple pane_echoes(const Array<double>& measured_m, const Array<double>& rang
   return py::make_tuple(mirrored, unmapped);
 }
 
+py::array_t<double> reflectance(const Array<double>& incidence_rad, double index) {
+  py::array_t<double> result(std::vector<py::ssize_t>(incidence_rad.shape(), incidence_rad.shape() + incidence_rad.ndim()));
+  for (py::ssize_t i = 0; i < result.size(); ++i) {
+    result.mutable_data()[i] = reflectance_of(incidence_rad.data()[i], index);
+  }
+  return result;
+}
+
 // -- what is learnt of walls
 
 WallCells make_walls(const Array<std::int64_t>& wall, std::int64_t rows, std::int64_t columns) {
@@ -304,6 +312,7 @@ PYBIND11_MODULE(_beam_vote, module) {
   module.def("pane_echoes", &pane_echoes, py::arg("measured_m"), py::arg("range_m"), py::arg("mirrored_cos"),
              py::arg("turned_rad"), py::arg("reflectance"), py::arg("seen_side"), py::arg("unmapped_end"),
              py::arg("gains"), py::arg("frequencies"), py::arg("sigma_m"), py::arg("max_range_m"), py::arg("min_cos"));
+  module.def("reflectance", &reflectance, py::arg("incidence_rad"), py::arg("index"));
   py::class_<WallCells>(module, "WallCells")
       .def(py::init(&make_walls), py::arg("wall"), py::arg("rows"), py::arg("columns"))
       .def("chances", &glass_chances, py::arg("log_odds"), py::arg("through"), py::arg("there"), py::arg("cell"))
