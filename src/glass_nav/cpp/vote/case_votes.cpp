@@ -11,6 +11,24 @@ constexpr std::size_t kFirst = 0, kMirrored = 1, kSecond = 2;
 constexpr std::size_t kGone = kPaths, kElsewhere = kPaths + 1;  // rows of the priors
 constexpr double kMostSquare = 100.0;                           // of a residual in sigmas
 
+/// Logarithm of a product, with a call of log() only now and then.
+class LogProduct {
+ public:
+  void multiply(double factor) {
+    const double before = product_;
+    product_ *= factor;
+    if (product_ > kLeast && product_ < kMost) return;
+    log_ += std::log(before) + std::log(factor);
+    product_ = 1.0;
+  }
+  double log() const { return log_ + std::log(product_); }
+
+ private:
+  static constexpr double kLeast = 1e-150, kMost = 1e150;
+
+  double product_ = 1.0, log_ = 0.0;
+};
+
 /// Weights of the samples, sum 1, from their log evidence.
 void weigh(std::vector<double>& log_evidence, double temper) {
   const double best = *std::max_element(log_evidence.begin(), log_evidence.end());
@@ -27,6 +45,7 @@ void count_case_votes(const Offers& offers, const Chances& chances, double* shar
   std::vector<double> joint((kPaths + 1) * plane);  // nothing, then the paths
   std::vector<double> weight(offers.samples, 0.0);
   for (std::size_t n = 0; n < offers.samples; ++n) {
+    LogProduct evidence;
     for (std::size_t b = 0; b < beams; ++b) {
       const std::size_t i = n * beams + b;
       const double z = offers.measured_m[b];
@@ -37,10 +56,10 @@ void count_case_votes(const Offers& offers, const Chances& chances, double* shar
         const std::size_t at = path * plane + i;
         if (!std::isfinite(offers.range_m[at])) continue;
         const double cos = std::max(offers.cos[at], chances.min_cos);
-        double end_m = offers.range_m[at] + chances.depth_share * offers.thickness_m[at] / cos;
+        // Beams end that deep in the wall, along the normal.
+        double across = (z - offers.range_m[at]) * cos - chances.depth_share * offers.thickness_m[at];
         if (path == kMirrored)
-          end_m += 2.0 * first_depth * offers.cos[kFirst * plane + i];  // a mirror lies that much deeper
-        const double across = (z - end_m) * cos;
+          across -= 2.0 * first_depth * offers.cos[kFirst * plane + i] * cos;  // a mirror lies that much deeper
         if (!(std::abs(across) <= chances.gate_m)) continue;
         // An error of the mirror's own place counts twice, along its normal.
         const double widening = path == kMirrored ? std::hypot(1.0, 2.0 * offers.cos[kFirst * plane + i]) : 1.0;
@@ -54,8 +73,9 @@ void count_case_votes(const Offers& offers, const Chances& chances, double* shar
       const double nothing =
           uncertain + chances.prior[kGone * beams + b] * at_second + chances.prior[kElsewhere * beams + b];
       joint[i] = nothing;
-      weight[n] += std::log(total + nothing);
+      evidence.multiply(total + nothing);
     }
+    weight[n] = evidence.log();
   }
   weigh(weight, chances.temper);
   std::fill(share, share + (kPaths + 1) * beams, 0.0);
