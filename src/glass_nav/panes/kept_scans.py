@@ -78,10 +78,12 @@ class KeptScans:
 
     def _beams(self, scan: Scan) -> Tuple[np.ndarray, np.ndarray]:
         """As nearest_beams(); a lidar's angles are nearly always those of its last scan."""
-        angles_rad, beams, direction = self._beams_of.get(scan.lidar, (None, None, None))
-        if angles_rad is None or not np.array_equal(angles_rad, scan.angles_rad):
-            beams, direction = nearest_beams(scan.angles_rad)
-            self._beams_of[scan.lidar] = scan.angles_rad, beams, direction
+        if scan.lidar in self._beams_of:
+            angles_rad, beams, direction = self._beams_of[scan.lidar]
+            if np.array_equal(angles_rad, scan.angles_rad):
+                return beams, direction
+        beams, direction = nearest_beams(scan.angles_rad)
+        self._beams_of[scan.lidar] = scan.angles_rad, beams, direction
         return beams, direction
 
     def _row(self, laser: np.ndarray) -> int:
