@@ -357,7 +357,7 @@ class Localizer:
         covariance = self._integrity.at(step, self._params.odometry, self._filter.best.covariance)
         judgement = self._quality.judge(self._filter.best, covariance)
         trusted = judgement.state == LocalizationState.LOCALIZED
-        if updated and trusted and self._filter.fits:
+        if updated and trusted and self._filter.fits and not self._quality.left_odometry:
             self._dead_reckoning = DeadReckoning(map_from_base, covariance)
         return Estimate(
             scan.stamp_ns,

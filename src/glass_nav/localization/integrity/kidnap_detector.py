@@ -13,7 +13,8 @@ dragged away from it has no advantage. But when the scans say that the robot was
 until it is ahead of all other places.
 
 A pose that was given is a claim. Odometry continues it, and scans fit near it: neither proves it. So it is compared with all
-other places from the first scan on, until it is ahead of them or none has overtaken it over some distance.
+other places from the first scan on, until it is ahead of them or none has overtaken it over some distance. So is a pose
+that scans led to and odometry did not.
 """
 
 from __future__ import annotations
@@ -72,7 +73,13 @@ class Verdict:
     kept: bool = (
         False  # odometry leads from the last sure pose to this one, and the robot was not moved without driving
     )
-    proven: bool = True  # the tracked pose was compared with all other places since it was given
+    given: bool = False  # the tracked pose was not compared with all other places yet
+    left_odometry: bool = False  # nor was it since scans led to it and odometry did not
+
+    @property
+    def proven(self) -> bool:
+        """Nothing but other places speaks against the tracked pose."""
+        return not (self.given or self.left_odometry)
 
     @property
     def fit_there(self) -> float:
@@ -126,7 +133,8 @@ class KidnapDetector:
         self._odom_from_base: Optional[np.ndarray] = None
         self._continuity = ScanContinuity()
         self._moved = False  # without driving, since the last search that found the tracked pose right
-        self._proven = proven
+        self._given = not proven
+        self._left_odometry = False  # since the last search that found the tracked pose right
         self._verdict = Verdict(float("nan"), self._usual, -np.inf, False, None, None)
 
     def decide_by(self, params: SearchParams) -> None:
@@ -134,6 +142,11 @@ class KidnapDetector:
         self._params = params
         if self._search is not None:
             self._search.decide_by(params)
+
+    @property
+    def _unproven(self) -> Tuple[bool, bool]:
+        """Verdict.given, Verdict.left_odometry."""
+        return self._given, self._left_odometry
 
     @property
     def _tolerance(self) -> float:
@@ -173,16 +186,28 @@ class KidnapDetector:
         matcher = self._matcher if self._params.recover_when_lost else None
         if matcher is not None and self._continuity.observe(scan, odom_from_base, map_from_base):
             self._moved, self._search = True, None  # what a search gathered before is about another place
-        if self._moved or not self._proven:
-            dead_reckoning = None
+        if matcher is None:  # nothing can be compared
+            self._given = self._left_odometry = False
         kept = dead_reckoning is not None and bool(dead_reckoning.mahalanobis(map_from_base[None])[0] < _KEPT)
-        if matcher is not None and self._search is None and (doubted or self._moved or not self._proven):
+        if matcher is not None and dead_reckoning is not None and not (kept or self._left_odometry):
+            self._left_odometry, self._search = True, None
+        if self._moved or self._given:
+            dead_reckoning, kept = None, False
+        if matcher is not None and self._search is None and (doubted or self._moved or any(self._unproven)):
             self._begin_search(matcher, map_from_base, dead_reckoning)
         if self._search is None:
             if not doubted:
                 self._learn(fit, step_m)
             self._verdict = Verdict(
-                self._fit, self._usual, -np.inf, doubted, None, None, kept=kept, proven=self._proven
+                self._fit,
+                self._usual,
+                -np.inf,
+                doubted,
+                None,
+                None,
+                kept=kept,
+                given=self._given,
+                left_odometry=self._left_odometry,
             )
         else:
             self._search_m += step_m
@@ -218,7 +243,7 @@ class KidnapDetector:
     ) -> Verdict:
         """The tracked pose with the best place elsewhere."""
         if np.isnan(candidates.fit):  # the first scan has not been matched everywhere yet
-            return Verdict(self._fit, self._usual, -np.inf, doubted, None, None, None, self._moved, kept, self._proven)
+            return Verdict(self._fit, self._usual, -np.inf, doubted, None, None, None, self._moved, kept, *self._unproven)
         here = pose_tracker.same_place(candidates.poses, map_from_base)
         with np.errstate(divide="ignore"):
             log_w = np.log(candidates.weights)
@@ -232,7 +257,7 @@ class KidnapDetector:
         fit_during_search = self._search_fit_m / self._search_m
         steady = self._fit > fit_during_search - _DOUBT[0]
         clear = log_ratio <= -_CLEAR  # scans speak for the tracked pose, whatever it started with
-        settled = clear or (log_ratio <= 0.0 and not self._moved and (self._proven or self._search_m > _TWINS_M))
+        settled = clear or (log_ratio <= 0.0 and not self._moved and (not any(self._unproven) or self._search_m > _TWINS_M))
         best_here = steady and (
             log_ratio < -self._params.search_margin or (settled and self._search_m > _SETTLED_M)
         )
@@ -242,12 +267,13 @@ class KidnapDetector:
         elif self._learnt_m <= _PRIOR_M and clear:  # nowhere else do they fit as well
             self._usual = min(self._usual, max(self._fit, candidates.fit))
         contested = self._moved and log_ratio > -_CLEAR
-        proven = self._proven
-        if best_here or (proven and (calm or (log_ratio <= 0.0 and not doubted and not self._moved))):
-            self._search, self._moved, self._proven = None, False, True
+        unproven = self._unproven
+        if best_here or (not any(unproven) and (calm or (log_ratio <= 0.0 and not doubted and not self._moved))):
+            self._search = None
+            self._moved = self._given = self._left_odometry = False
         found = candidates.poses[0] if candidates.found and not here[0] and self._is_fit_for(candidates) else None
         there = None if elsewhere is None else candidates.poses[elsewhere]
-        return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates, there, contested, kept, proven)
+        return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates, there, contested, kept, *unproven)
 
     def _is_fit_for(self, candidates: Candidates) -> bool:
         """Scans fit at the best place as they did before, or nothing comes near it.
