@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Callable, Dict, Optional, Tuple
+from typing import Any, Callable, Dict, List, Optional, Tuple
 
 import numpy as np
 import pytest
 
 REPO = Path(__file__).resolve().parents[1]
+UNIT = REPO / "test" / "unit"
 CELL_M = 0.05
 GIVING_WAY = 10  # niceness
 # The room of RoomBag: 6 x 4 m without its upper right corner, so that it looks the same from no two places.
@@ -24,6 +25,13 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     """
     if "PYTEST_XDIST_WORKER" in os.environ and not item.get_closest_marker("xdist_group"):
         os.nice(max(0, GIVING_WAY - os.nice(0)))
+
+
+def pytest_collection_modifyitems(items: List[pytest.Item]) -> None:
+    """Only short unit tests are traced for coverage: it costs a fifth of the time of a long run, which reaches no more."""
+    for item in items:
+        if UNIT not in item.path.parents or item.get_closest_marker("long_run"):
+            item.add_marker("no_cover")
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,6 @@
-# cpp/vote; its face is localization/beam_classification/case_votes.py. N samples, B beams.
+# cpp/vote; its faces are in localization/beam_classification. N samples, B beams, W wall cells.
+from typing import Sequence
+
 import numpy as np
 
 def case_votes(
@@ -78,3 +80,63 @@ def pane_echoes(
     max_range_m: float,
     min_cos: float,
 ) -> tuple[np.ndarray, np.ndarray]: ...  # (B,) float64 each
+def reflectance(incidence_rad: np.ndarray, index: float) -> np.ndarray: ...  # (...) float64 -> (...) float64
+
+class WallCells:
+    def __init__(self, wall: np.ndarray, rows: int, columns: int) -> None: ...  # (W,) int64, with a border of 2 cells
+    def chances(  # (2, ...) float64
+        self,
+        log_odds: np.ndarray,  # (2, W) float32
+        through: float,
+        there: float,
+        cell: np.ndarray,  # (...) int, without the border
+    ) -> np.ndarray: ...
+    def gone(  # (B,) bool
+        self,
+        log_odds: np.ndarray,  # (W,) float32
+        cell: np.ndarray,  # (B,) int
+        axis_rad: np.ndarray,  # (B,) float64
+        opaque: np.ndarray,  # (B,) bool
+        resolution_m: float,
+        grid_yaw_rad: float,
+        prior: float,
+        limit: float,
+        opaque_prior: float,
+        opaque_limit: float,
+        spread: float,
+        reach: int,
+    ) -> np.ndarray: ...
+    def learn(
+        self,
+        log_odds: np.ndarray,  # (2, W) float32, changed
+        crossed: np.ndarray,  # (W,) bool, changed
+        cell: np.ndarray,  # (B,) int
+        evidence: np.ndarray,  # (2, B) float64
+        spread: Sequence[float],
+        scan_share: Sequence[float],
+        limit: float,
+    ) -> None: ...
+
+def evidence(
+    measured_m: np.ndarray,  # (B,) float64
+    case: np.ndarray,  # (B,) uint8
+    first_m: np.ndarray,  # (B,) float64
+    seen_through: np.ndarray,  # (B,) float64
+    known_end: np.ndarray,  # (B,) bool
+) -> tuple[float, float, float, float]: ...  # answered, explained, short, passed
+def cut(
+    measured_m: np.ndarray,  # (B,) float64
+    case: np.ndarray,  # (B,) uint8
+    range_m: np.ndarray,  # (B,) float64
+    cos: np.ndarray,  # (B,) float64
+    axis_rad: np.ndarray,  # (B,) float64
+    glass: np.ndarray,  # (2, B) float64
+    gate_m: np.ndarray,  # (B,) float64
+    max_range_m: float,
+    sure: float,
+    no_return_glass: float,
+    no_return_wall: float,
+    dark_to_dim: float,
+    same_wall_m: float,
+    same_wall_rad: float,
+) -> tuple[np.ndarray, np.ndarray]: ...  # ranges (B,) float64, cut (B,) bool

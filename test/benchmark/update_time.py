@@ -103,7 +103,7 @@ def compare(arguments: argparse.Namespace) -> Dict[str, float]:
         still = fine.frames[index]
         classifier.set_pose(still.map_from_base, covariance)
         classifier.update(still.scan, still.odom_from_base)  # the next one has not moved: cases only, no particles
-        times[CLASSIFY].append(cpu_ms(lambda still=still: classifier.update(still.scan, still.odom_from_base)))
+        times[CLASSIFY].append(cpu_ms(lambda still=still: classifier.update(still.scan, still.odom_from_base).report))
     return {name: float(np.median(each)) for name, each in times.items()}
 
 
@@ -145,7 +145,9 @@ def main() -> int:
         scan = scan_at(caster, pose, arguments.beams, 1, rng)
         localizer.request_update()
         whole.append(cpu_ms(lambda scan=scan: localizer.update(scan, np.zeros(3))))
-        classified.append(cpu_ms(lambda scan=scan: localizer.update(scan, np.zeros(3))))  # it has not moved: cases only
+        classified.append(
+            cpu_ms(lambda scan=scan: localizer.update(scan, np.zeros(3)).report)
+        )  # it has not moved: cases only
 
     print(
         f"{arguments.map}: {arguments.beams} beams classified by {settings.samples.sample_count} samples, "

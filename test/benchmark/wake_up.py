@@ -172,11 +172,12 @@ class Trial:
         """Run until the search is over, or driving has stopped."""
         robot = self.robot
         robot.wake_up(self.grid_map)
-        step_s = 0.0
+        step_s, truth = 0.0, self.simulation.map_from_base
         while self.now_s < self.job.limit_s and not robot.has_given_up:
             began = time.process_time()
             frame = robot.step()
             step_s = max(step_s, time.process_time() - began)
+            truth = frame.map_from_base
             if self.alone is not None:
                 self.alone.see(frame, self.now_s)
             estimate = robot.session.status.estimate
@@ -195,7 +196,7 @@ class Trial:
             "best_plan": self.plan,
             "candidates": -1 if estimate is None else len(estimate.dart),
             "reason": "" if estimate is None else estimate.reason,
-            **self._errors(estimate),
+            **self._errors(estimate, truth),
         }
 
     def _best_plan(self) -> Optional[int]:
@@ -257,8 +258,9 @@ class Trial:
             f"{' or '.join(lengths) or 'no edge'}"
         )
 
-    def _errors(self, estimate: Optional[SearchEstimate]) -> Dict[str, Any]:
-        truth, pose = self.simulation.map_from_base, self.robot.initial_pose
+    def _errors(self, estimate: Optional[SearchEstimate], truth: np.ndarray) -> Dict[str, Any]:
+        """Against the true pose (3,) at the last scan."""
+        pose = self.robot.initial_pose
         if (
             self.job.elsewhere
             and estimate is not None

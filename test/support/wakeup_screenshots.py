@@ -97,7 +97,9 @@ def _photograph(at_s: List[float], folder: Path, environment: "dict[str, str]") 
             time.sleep(0.05)
         path = folder / f"wakeup_{wanted_s:g}.png"
         subprocess.run(
-            ["import", "-window", "root", "-dither", "None", "-colors", "256", str(path)], env=environment, check=True
+            ["import", "-window", "root", "-dither", "None", "-colors", "128", f"PNG8:{path}"],
+            env=environment,
+            check=True,
         )
         print(path, flush=True)
 

@@ -40,7 +40,7 @@ MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or les
     "evaluation/pages": "geometry evaluation/metrics evaluation/plots",
     "replay": "geometry world sensing panes hypotheses localization topology driving recording evaluation",
     "compare": "geometry world sensing panes hypotheses localization topology driving recording evaluation replay",
-    "demo": "geometry world sensing hypotheses localization topology driving simulation evaluation",
+    "demo": "geometry world sensing hypotheses localization topology driving recording simulation evaluation",
     "cli": "geometry world sensing panes hypotheses localization topology driving recording simulation evaluation checkup "
     "replay compare",
     "ros": "geometry world sensing panes hypotheses localization topology driving recording simulation evaluation checkup "

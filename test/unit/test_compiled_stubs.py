@@ -35,8 +35,8 @@ def in_module(owner: Any) -> Names:
     found: Names = {}
     for name in dir(owner):
         value = getattr(owner, name)
-        if name.startswith("__") and not (name == "__init__" and isinstance(owner, type)):
-            continue
+        if name.startswith("_") and not (name == "__init__" and isinstance(owner, type)):
+            continue  # Python's and pybind11's own
         if isinstance(value, type):
             found[name] = in_module(value)
         elif isinstance(value, property):

@@ -28,7 +28,8 @@ _STEP_M, _STEP_RAD = 0.15, 0.2  # between scans that are followed
 _MIN_POINTS, _MAX_POINTS = 20, 150
 _LOST_FIT, _LOST_SCANS = 0.6, 10  # a pose that fits less is not trusted, and after so many scans searched for again
 _COVARIANCE = np.diag([0.03**2, 0.03**2, 0.01**2])  # of a pose that fits
-_GLASS_PROBABILITY, _MIN_GLASS_M = 0.9, 3.0
+_GLASS_PROBABILITY = 0.9  # of a pane that is named
+_MAX_DOUBT = 0.01  # probability that none of the panes is real, above which none is named
 _LEAST_PASSES, _LEAST_HEAD_ON = 3, 8  # beams through a cell of a wall that is gone, and along the normal of all of it
 _MOST_RETURNS = 0.1  # of a wall that is gone, over the beams that pass
 _MIN_GONE_M = 1.5  # an open door is shorter
@@ -60,9 +61,8 @@ def check(grid_map: GridMap, scans: Sequence[Scan], odom_from_base: np.ndarray) 
     for scan, pose in zip(followed.scans, followed.map_from_base):
         finder.observe(scan, pose, _COVARIANCE)
     panes = [pane for pane in finder.panes() if pane.probability >= _GLASS_PROBABILITY]
-    length_m = sum(pane.length_m for pane in panes)
-    if length_m >= _MIN_GLASS_M:
-        yield _glass_not_mapped(panes, length_m)
+    if np.prod([1.0 - pane.probability for pane in panes]) <= _MAX_DOUBT:
+        yield _glass_not_mapped(panes)
     gone = _gone_walls(grid_map, followed)
     if gone:
         yield _wall_is_gone(gone)
@@ -162,7 +162,7 @@ def _gone_walls(grid_map: GridMap, followed: Followed) -> List[Tuple[np.ndarray,
 def _crossings(grid_map: GridMap, followed: Followed) -> np.ndarray:
     """(4, H, W) beams that passed or ended at each wall cell, and those of them that came along its normal."""
     caster = RayCaster(grid_map)
-    counts = np.zeros((4, grid_map.occupancy.size), int)
+    cells: List[List[np.ndarray]] = [[], [], [], []]
     for scan, pose in zip(followed.scans, followed.map_from_base):
         from_laser = se2.compose(pose, scan.base_from_laser)
         hits = caster.cast_surfaces(from_laser[None], scan.angles_rad, scan.range_max_m)
@@ -174,12 +174,14 @@ def _crossings(grid_map: GridMap, followed: Followed) -> np.ndarray:
             passed, ended = met & (across_m > _BEHIND_M), met & (np.abs(across_m) <= _AT_WALL_M)
             head_on = cos >= _HEAD_ON_COS
         passed[1:-1] &= passed[:-2] & passed[2:]  # not by its edge
-        for count, beams in zip(counts, (passed, ended, passed & head_on, ended & head_on)):
-            count += np.bincount(cell[beams], minlength=len(count))
-    return counts.reshape(4, *grid_map.occupancy.shape)
+        for kind, beams in zip(cells, (passed, ended, passed & head_on, ended & head_on)):
+            kind.append(cell[beams])
+    counts = [np.bincount(np.concatenate(kind), minlength=grid_map.occupancy.size) for kind in cells]
+    return np.array(counts).reshape(4, *grid_map.occupancy.shape)
 
 
-def _glass_not_mapped(panes: Sequence[Pane], length_m: float) -> Finding:
+def _glass_not_mapped(panes: Sequence[Pane]) -> Finding:
+    length_m = sum(pane.length_m for pane in panes)
     longest = sorted(panes, key=lambda pane: -pane.length_m)
     return Finding(
         "glass-not-mapped",

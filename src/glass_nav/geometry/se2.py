@@ -33,4 +33,4 @@ def transform_points(a_from_b: np.ndarray, points_b: np.ndarray) -> np.ndarray:
 def travelled(before_from_after: np.ndarray) -> Tuple[float, float]:
     """Distance [m] and turn [rad], both >= 0, of one step of odometry (3,)."""
     x, y, yaw = (float(value) for value in before_from_after)
-    return math.hypot(x, y), abs(float(angles.wrap(yaw)))
+    return math.hypot(x, y), abs(angles.wrap_one(yaw))

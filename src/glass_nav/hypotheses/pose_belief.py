@@ -92,6 +92,7 @@ class Evidence:
     """Of K poses."""
 
     nats: np.ndarray  # (K,) log likelihood ratios to elsewhere, by the scans
+    checked_nats: np.ndarray  # (K,) the part of them by scans that did not choose the pose
     explained: np.ndarray  # (K,) pieces of wall that the map explains
     seen: np.ndarray  # (K,) pieces of wall that it should
     other_nats: np.ndarray  # (K,) log likelihood ratios by what is not a scan
@@ -100,7 +101,7 @@ class Evidence:
     @classmethod
     def none(cls, count: int) -> Evidence:
         nothing = np.zeros(count)
-        return cls(nothing, nothing, nothing, nothing, np.full(count, NEW, np.int64))
+        return cls(nothing, nothing, nothing, nothing, nothing, np.full(count, NEW, np.int64))
 
     def __getitem__(self, chosen: np.ndarray) -> Evidence:
         return Evidence(*(values[chosen] for values in vars(self).values()))
@@ -110,7 +111,13 @@ class Evidence:
         return Evidence(*map(np.concatenate, zip(vars(self).values(), vars(more).values())))
 
     def with_view(self, nats: np.ndarray, explained: np.ndarray, seen: np.ndarray) -> Evidence:
-        return replace(self, nats=self.nats + nats, explained=self.explained + explained, seen=self.seen + seen)
+        return replace(
+            self,
+            nats=self.nats + nats,
+            checked_nats=self.checked_nats + nats,
+            explained=self.explained + explained,
+            seen=self.seen + seen,
+        )
 
     @property
     def total(self) -> np.ndarray:
@@ -134,7 +141,6 @@ class PoseBelief:
         """Nothing is known any more."""
         self._tracker = pose_tracker.PoseTracker(_MAX_BEHIND, _MAX_POSES)
         self.evidence = Evidence.none(0)
-        self.now = np.zeros(0)  # (K,) share of the last scan judged that the map explains
         self.driven_m = 0.0
         self.searches = 0  # of the whole map, complete
         self._walls = NewWalls()
@@ -197,7 +203,7 @@ class PoseBelief:
             return np.zeros(0, np.int64)
         chosen = np.arange(len(poses))[:_TRACED]
         evidence, kept = self._traced(poses[chosen])
-        self._append(poses[chosen][kept], evidence[kept], np.full(len(kept), np.nan))
+        self._append(poses[chosen][kept], evidence[kept])
         return chosen[kept]
 
     # -- a scan that the poses are judged by
@@ -217,7 +223,6 @@ class PoseBelief:
             return False
         self._judged_at, self._judged_m = self._odom_from_base, self.driven_m
         self._tracker.poses = beams.poses
-        self.now = _share(beams)
         if view is not None:
             self._views.append(view)
             self.evidence = self.evidence.with_view(*_of_view(beams, view))
@@ -265,7 +270,7 @@ class PoseBelief:
             self._views.append(view)
             self._judged_at, self._judged_m = search.odom_from_base, search.driven_m
             evidence = Evidence.none(len(now)).with_view(*(each[order] for each in _of_view(found, view)))
-            self._append(now, evidence, share)
+            self._append(now, replace(evidence, checked_nats=np.zeros(len(now))))
             self._keep_distinct()
             return
         worth = np.flatnonzero(share >= max(_CHANCE - _AS_GOOD, np.fmax.reduce(share, initial=0.0) - _AS_GOOD))
@@ -303,14 +308,12 @@ class PoseBelief:
             np.int64,
         )
 
-    def _append(self, poses: np.ndarray, evidence: Evidence, now: np.ndarray) -> None:
+    def _append(self, poses: np.ndarray, evidence: Evidence) -> None:
         self._tracker.add(poses)
         self.evidence = self.evidence.then(evidence)
-        self.now = np.concatenate([self.now, now])
 
     def _keep_distinct(self) -> None:
-        chosen = self._tracker.keep_distinct(self.evidence.total)
-        self.evidence, self.now = self.evidence[chosen], self.now[chosen]
+        self.evidence = self.evidence[self._tracker.keep_distinct(self.evidence.total)]
 
 
 class _SearchedScan:

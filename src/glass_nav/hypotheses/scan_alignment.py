@@ -108,4 +108,4 @@ def distinct(aligned: Alignment) -> Alignment:
 
 def _is_same_place(pose: Sequence[float], other: Sequence[float]) -> bool:
     apart_m = math.hypot(pose[0] - other[0], pose[1] - other[1])
-    return apart_m < _SAME_M and abs(angles.wrap(pose[2] - other[2])) < _SAME_RAD
+    return apart_m < _SAME_M and abs(angles.wrap_one(pose[2] - other[2])) < _SAME_RAD

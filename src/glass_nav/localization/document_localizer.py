@@ -19,6 +19,7 @@ from glass_nav.localization import initial_pose
 from glass_nav.localization.beam_classification.beam_classifier import BeamClassifier
 from glass_nav.localization.beam_classification.case_votes import BeamCases
 from glass_nav.localization.beam_classification.glass_map import GlassMap
+from glass_nav.localization.beam_report import BeamReport
 from glass_nav.localization.integrity import protection_level
 from glass_nav.localization.integrity.pose_state import PoseQuality
 from glass_nav.localization.localizer import Estimate
@@ -173,17 +174,16 @@ class DocumentLocalizer:
         best = pose_estimate.of(self._particles, self._weights)
         judgement = self._quality.judge(best)
         trusted = judgement.state == LocalizationState.LOCALIZED
+        report = BeamReport(cases, self._classifier.surfaces(scan, cases, expected, trusted), evidence.inlier_ratio)
         return Estimate(
             scan.stamp_ns,
             map_from_base,
             best.covariance,
             self._map_from_odom,
-            cases,
-            self._classifier.surfaces(scan, cases, expected, trusted),
+            lambda: report,
             self._particles,
             judgement.state,
             judgement.reason,
-            evidence.inlier_ratio,
             updated,
             judgement.confidence,
             judgement.places,

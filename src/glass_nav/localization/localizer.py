@@ -7,6 +7,7 @@ glass_localization.txt: decide beam by beam what the beam met, then weigh the pa
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Callable, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
@@ -17,11 +18,13 @@ from glass_nav.hypotheses.global_search import GlobalSearch
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.localization import initial_pose, start_area
 from glass_nav.localization.beam_classification.beam_classifier import BeamClassifier, BeamClassifierParams
+from glass_nav.localization.beam_classification.beam_evidence import BeamEvidence
 from glass_nav.localization.beam_classification.case_votes import BeamCases
 from glass_nav.localization.beam_classification.expected_ranges import ExpectedRanges
 from glass_nav.localization.beam_classification.glass_map import GlassMap
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
 from glass_nav.localization.beam_classification.unmapped_panes import UnmappedPanes
+from glass_nav.localization.beam_report import BeamReport
 from glass_nav.localization.integrity import pose_state, protection_level
 from glass_nav.localization.integrity.dead_reckoning import DeadReckoning
 from glass_nav.localization.integrity.integrity_monitor import IntegrityMonitor
@@ -51,16 +54,71 @@ class Estimate:
     map_from_base: np.ndarray  # (3,) pose of the best cluster
     covariance: np.ndarray  # (3, 3) of that cluster, x [m], y [m], yaw [rad]
     map_from_odom: np.ndarray  # (3,) what tf needs
-    cases: BeamCases  # of every beam of the scan
-    surface_scan: SurfaceScan  # the scan in which glass is an obstacle
+    report_beams: Callable[[], BeamReport]  # by what the filter knows when it is called
     particles: np.ndarray  # (P, 3) poses in map
     state: LocalizationState
     reason: str  # the state in words
-    inlier_ratio: float  # of the beams that say something, see beam_evidence.py; NaN without any
     updated: bool  # whether this scan moved the particles
     confidence: float  # chance that the pose is right, 0..1
     places: int = 1  # that are possible, see pose_state.Judgement
     levels: ProtectionLevels = protection_level.UNKNOWN  # how far off the pose may be
+
+    @cached_property
+    def report(self) -> BeamReport:
+        """Of the beams. Worked out when it is first asked for, which is to be before the next scan."""
+        return self.report_beams()
+
+    @property
+    def cases(self) -> BeamCases:
+        """Of every beam of the scan."""
+        return self.report.cases
+
+    @property
+    def surface_scan(self) -> SurfaceScan:
+        """The scan in which glass is an obstacle."""
+        return self.report.surface_scan
+
+    @property
+    def inlier_ratio(self) -> float:
+        """Of the beams that say something, the share that the map explains; NaN without any."""
+        return self.report.inlier_ratio
+
+
+class SeenBeams:
+    """The beams of a scan from one pose."""
+
+    def __init__(
+        self,
+        classifier: BeamClassifier,
+        scan: Scan,
+        map_from_base: np.ndarray,
+        cases: BeamCases,
+        expected: ExpectedRanges,
+    ) -> None:
+        """
+        Args:
+            classifier: of the map.
+            scan: the scan.
+            map_from_base: (3,) the pose.
+            cases: of the beams, as classified from there or nearby.
+            expected: from the pose, its sample 0.
+        """
+        self._classifier, self._scan, self._expected = classifier, scan, expected
+        self._cases = classifier.seen_from(cases, scan, expected)
+        self.evidence: BeamEvidence = classifier.evidence(scan, self._cases, expected, map_from_base)
+
+    @classmethod
+    def between(
+        cls, classifier: BeamClassifier, scan: Scan, map_from_base: np.ndarray, covariance: np.ndarray
+    ) -> SeenBeams:
+        """Those of a scan between two updates, from a pose (3,) with that covariance (3, 3)."""
+        cases, expected = classifier.classify(scan, map_from_base, covariance, for_weights=False)
+        return cls(classifier, scan, map_from_base, cases, expected)
+
+    def report(self, trusted: bool) -> BeamReport:
+        """All of it; `trusted`: the pose is."""
+        surfaces = self._classifier.surfaces(self._scan, self._cases, self._expected, trusted)
+        return BeamReport(self._cases, surfaces, self.evidence.inlier_ratio)
 
 
 class Localizer:
@@ -246,17 +304,17 @@ class Localizer:
         step = self._schedule.step_to(odom_from_base)
         due = self._schedule.is_due(scan.lidar, odom_from_base, self._params.schedule)
         if not due and self._integrity.fits(scan, map_from_base, step, self._params.odometry):
-            best = self._filter.best
-            cases, expected = self._classifier.classify(scan, map_from_base, best.covariance, for_weights=False)
             if self._search is None and self._kidnap_detector.is_matching:  # a robot that stands is to know, too
                 self._watch(scan, odom_from_base, map_from_base, step)
-            return self._judged(scan, map_from_base, cases, expected, step)
+            return self._judged(scan, map_from_base, step)
         cases = self._track(scan, odom_from_base) if self._search is None else self._find(scan, odom_from_base)
         self._schedule.updated(scan.lidar, odom_from_base)
         self._map_from_odom = se2.compose(self._filter.best.map_from_base, se2.inverse(odom_from_base))
         map_from_base = se2.compose(self._map_from_odom, odom_from_base)
         expected = self._classifier.expected_at(scan, map_from_base)  # the beams were classified at the registered pose
-        estimate = self._judged(scan, map_from_base, cases, expected, None)
+        estimate = self._judged(
+            scan, map_from_base, None, SeenBeams(self._classifier, scan, map_from_base, cases, expected)
+        )
         self._look_for_panes(scan, estimate)
         return estimate
 
@@ -340,37 +398,39 @@ class Localizer:
         return self._correct(scan, odom_from_base, None)
 
     def _judged(
-        self,
-        scan: Scan,
-        map_from_base: np.ndarray,
-        cases: BeamCases,
-        expected: ExpectedRanges,
-        step: Optional[np.ndarray],
+        self, scan: Scan, map_from_base: np.ndarray, step: Optional[np.ndarray], seen: Optional[SeenBeams] = None
     ) -> Estimate:
-        """The pose with its state; `expected` is of that pose, `step` since the last update: None at an update."""
-        updated = step is None
-        cases = self._classifier.seen_from(cases, scan, expected)
-        evidence = self._classifier.evidence(scan, cases, expected, map_from_base)
-        if updated:
-            judged = evidence.without_crowd()
+        """The pose with its state.
+
+        Args:
+            scan: the scan.
+            map_from_base: (3,) the pose.
+            step: (3,) of odometry since the last update; None: this scan was one.
+            seen: from the pose, at an update; None: nothing depends on the beams, they wait until somebody asks.
+        """
+        best, classifier = self._filter.best, self._classifier
+        if seen is not None:
+            judged = seen.evidence.without_crowd()
             self._quality.observe(judged.inlier_ratio, judged.judged_share)
-        covariance = self._integrity.at(step, self._params.odometry, self._filter.best.covariance)
-        judgement = self._quality.judge(self._filter.best, covariance)
+        covariance = self._integrity.at(step, self._params.odometry, best.covariance)
+        judgement = self._quality.judge(best, covariance)
         trusted = judgement.state == LocalizationState.LOCALIZED
-        if updated and trusted and self._filter.fits and not self._quality.left_odometry:
+        if seen is not None and trusted and self._filter.fits and not self._quality.left_odometry:
             self._dead_reckoning = DeadReckoning(map_from_base, covariance)
+
+        def report_beams() -> BeamReport:
+            return (seen or SeenBeams.between(classifier, scan, map_from_base, best.covariance)).report(trusted)
+
         return Estimate(
             scan.stamp_ns,
             map_from_base,
             covariance,
             self._map_from_odom,
-            cases,
-            self._classifier.surfaces(scan, cases, expected, trusted),
+            report_beams,
             self._filter.particles,
             judgement.state,
             judgement.reason,
-            evidence.inlier_ratio,
-            updated,
+            seen is not None,
             judgement.confidence,
             judgement.places,
             protection_level.of(map_from_base, covariance, self._grid_map.resolution_m),

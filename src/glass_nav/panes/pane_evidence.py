@@ -141,7 +141,7 @@ class Likelihoods:
                 returns before nothing differs from piece to piece, and does not tell it from a thing.
             mapped: (L,) bool pieces that belong to something on the map: they say nothing.
         """
-        hypotheses = -1, len(_PANE_BEFORE_NOTHING)
+        hypotheses = len(_PANE) // len(_PANE_BEFORE_NOTHING), len(_PANE_BEFORE_NOTHING)
         fits = self._pane[sure].reshape(int(sure.sum()), *hypotheses).max(axis=2).sum(axis=0)
         best = np.argmax(fits + _PANE_LOG_WEIGHT.reshape(hypotheses)[:, 0])
         glass = _PANE.reshape(*hypotheses, _BINS)[best]

@@ -42,6 +42,8 @@ _RIDGE = 1e-6
 _WHEELS_OFF = 2.0  # deviations by which a stretch of odometry may be off and be trusted like its steps
 _TRUTH_SIGMA = np.array([0.03, 0.03, 0.01])  # of a reference, where no scan is sure
 _TRUTH_OFF_M = 0.3  # a reference that is farther from sure poses (median) belongs to another map
+# So does one along which hardly a scan fits: of the best tenth of the scans, half the beams end at mapped walls.
+_AT_WALL_M, _FIT, _FITTING_SCANS = 0.15, 0.5, 0.1
 
 
 @dataclass(frozen=True)
@@ -131,13 +133,13 @@ class Smoother:
             np.array(self._odometry, float),
         )
         stamps_ns = np.array(self._stamps_ns, np.int64)
+        points_m, present = self._padded()
         known, prior, information = sure.copy(), poses.copy(), np.zeros((len(poses), 3))
-        if truth is not None and _agrees(truth, stamps_ns[sure], poses[sure]):
+        if truth is not None and _agrees(truth, stamps_ns, poses, sure, self._field, points_m, present):
             given = truth.covers(stamps_ns) & ~sure
             prior[given], information[given], known[given] = truth.at(stamps_ns[given]), _TRUTH_SIGMA**-2.0, True
         if not known.any():
             return None
-        points_m, present = self._padded()
         field, pulls = self._field, sure
         if with_panes is not None:
             field, pulls = with_panes[0], sure | (with_panes[1].deviation_m < _SCALES_M[0])
@@ -191,13 +193,37 @@ def _optimized(
     return poses, _covariances(diagonal, beside)
 
 
-def _agrees(truth: Trajectory, stamps_ns: np.ndarray, poses: np.ndarray) -> bool:
-    """Whether a reference is where the filter was sure to be, at stamps (S,) at poses (S, 3)."""
+def _agrees(
+    truth: Trajectory,
+    stamps_ns: np.ndarray,
+    poses: np.ndarray,
+    sure: np.ndarray,
+    field: DistanceField,
+    points_m: np.ndarray,
+    present: np.ndarray,
+) -> bool:
+    """Whether a reference is of this map: it is where the filter was sure to be or, where it never was, scans fit there.
+
+    Args:
+        truth: map_from_base of the reference.
+        stamps_ns: (S,) of the scans.
+        poses: (S, 3) of the filter.
+        sure: (S,) bool which of them are sure.
+        field: of the map.
+        points_m: (S, B, 2) where beams ended, in the robot's frame.
+        present: (S, B) bool, which of them count.
+    """
     covered = truth.covers(stamps_ns)
+    compared = covered & sure
+    if compared.any():
+        off_m = np.hypot(*(truth.at(stamps_ns[compared]) - poses[compared])[:, :2].T)
+        return float(np.median(off_m)) <= _TRUTH_OFF_M
     if not covered.any():
-        return len(truth) > 0
-    off_m = np.hypot(*(truth.at(stamps_ns[covered]) - poses[covered])[:, :2].T)
-    return float(np.median(off_m)) <= _TRUTH_OFF_M
+        return False
+    ends_m = se2.transform_points(truth.at(stamps_ns[covered])[:, None], points_m[covered])
+    at_wall = present[covered] & (field.at(ends_m[..., 0], ends_m[..., 1])[0] <= _AT_WALL_M)
+    share = at_wall.sum(axis=1) / np.maximum(present[covered].sum(axis=1), 1)
+    return float(np.quantile(share, 1.0 - _FITTING_SCANS)) >= _FIT
 
 
 def _reckoned(poses: np.ndarray, known: np.ndarray, odometry: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from glass_nav.simulation import building_map
 from glass_nav.simulation.building import Building, Pane, Thing, Wall, box
 from glass_nav.simulation.lidar import LidarModel
 from glass_nav.simulation.simulation import Simulation
+from glass_nav.world import pane as found
 
 PANE_Y, PANE_X = 3.0, (3.0, 8.0)
 HALL = Building(
@@ -43,6 +44,34 @@ def test_glass_that_the_map_lacks_is_named_with_its_length_and_place(drive):
     assert 4.0 < length_m < 6.0
     assert "in 1 pane: " in finding.what and "y 3.0 m" in finding.what
     assert finding.advice.startswith("draw it in: glass_nav map panes BAG --map MAP.yaml --out DIR")
+
+
+@pytest.mark.parametrize(
+    ("probabilities", "named"),
+    [
+        pytest.param((0.98,), False, id="one pane, which one time in fifty is none"),
+        pytest.param((0.995,), True, id="one pane that is certain"),
+        pytest.param((0.92, 0.92), True, id="two panes, one of which is real almost certainly"),
+        pytest.param((0.92, 0.6, 0.6), False, id="panes that are not probable do not count"),
+    ],
+)
+def test_glass_is_named_once_it_is_certain_that_some_of_it_is_real(monkeypatch, drive, probabilities, named):
+    panes = [found.Pane(np.zeros(2), np.ones(2), probability) for probability in probabilities]
+
+    class Finder:
+        def __init__(self, grid_map):
+            pass
+
+        def observe(self, scan, map_from_base, covariance):
+            return True
+
+        def panes(self):
+            return panes
+
+    monkeypatch.setattr(glass_checks, "PaneFinder", Finder)
+    monkeypatch.setattr(glass_checks, "follow", lambda *_: glass_checks.Followed(drive[0][:1], np.ones((1, 3))))
+    findings = [finding.name for finding in glass_checks.check(building_map.draw(HALL), *drive)]
+    assert findings == ["glass-not-mapped"] * named
 
 
 def test_a_wall_that_beams_pass_from_all_sides_is_gone(drive):

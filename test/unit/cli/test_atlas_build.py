@@ -165,6 +165,7 @@ def test_wrong_options_are_refused_before_anything_is_read(run, words, text):
     assert (code, out, err) == (2, "", f"glass_nav atlas: {text}\n")
 
 
+@pytest.mark.long_run
 def test_an_atlas_without_lines_or_with_very_many_nodes_can_be_drawn(run, tmp_path, monkeypatch):
     """Edges without a polyline are drawn straight; beyond a number of nodes they carry no numbers."""
     atlas = atlas_file.load(REPO / "atlas" / "glass_bridge")

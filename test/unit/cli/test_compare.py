@@ -221,6 +221,7 @@ def test_several_logs_are_told_apart_and_together(run, room_bag, room_map, tmp_p
     assert "<h2>second.bag</h2>" in (tmp_path / "out" / "compare.html").read_text()
 
 
+@pytest.mark.long_run
 def test_a_run_that_fails_is_named_and_the_others_are_compared(run, room_bag, room_map, tmp_path):
     path = room_bag(scans=6).write()
     (tmp_path / "elsewhere.yaml").write_text("odom_frame_id: wheels\n")

@@ -91,6 +91,7 @@ def test_in_a_hallway_it_says_which_way_is_not_corrected(room, capsys):
     assert "the direction 0 deg of the map: not corrected" in out or "the direction 180 deg" in out
 
 
+@pytest.mark.long_run
 def test_a_log_gives_the_scan_with_that_index(small_bag, capsys):
     log, grid, truth = small_bag
     for index in (0, 7):
@@ -130,6 +131,7 @@ def small_bag(tmp_path_factory):
     return path, folder / "run.map.yaml", open_log(path).ground_truth
 
 
+@pytest.mark.long_run
 def test_a_scan_of_another_place_is_refused_after_the_picture(room, capsys):
     assert locate(room, np.array([40.0, 0.9, 0.1]), grid="hall.yaml") == 3
     assert "glass_nav locate: the scan fits nowhere near the pose: " in capsys.readouterr().err

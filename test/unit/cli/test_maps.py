@@ -67,16 +67,17 @@ def test_the_missing_pane_is_found_and_drawn(run, drive, tmp_path):
     (pane,) = panes_file.load(tmp_path / "found" / "panes.yaml", before).panes
     assert pane.length_m == pytest.approx(PANE_M, abs=0.3)
     assert pane.probability > 0.9
-    assert f"1 panes drawn, {pane.length_m:.1f} m of glass that the map lacks" in out
+    assert f"1 pane drawn, {pane.length_m:.1f} m of glass that the map lacks" in out
     wanted = map_file.load(complete).occupied & ~before.occupied
     assert np.count_nonzero(after.occupied & wanted) > 0.8 * np.count_nonzero(wanted)
 
 
+@pytest.mark.long_run
 def test_with_a_ground_truth_panes_are_found_where_the_filter_is_not_sure(run, drive, tmp_path, never_sure):
     lacking = drive.with_suffix(".map.yaml")
     code, out, _ = run("map", "panes", drive, "--map", lacking, "--every", "2", "--out", tmp_path / "found")
     assert code == 0
-    assert "1 panes drawn" in out
+    assert "1 pane drawn" in out
 
 
 def test_the_complete_map_gets_no_pane_twice(run, drive, tmp_path):
@@ -88,6 +89,7 @@ def test_the_complete_map_gets_no_pane_twice(run, drive, tmp_path):
     np.testing.assert_array_equal(after.occupancy, before.occupancy)
 
 
+@pytest.mark.long_run
 def test_panes_are_chosen_by_number(run, drive, tmp_path):
     lacking = drive.with_suffix(".map.yaml")
     code, out, _ = run(
@@ -134,6 +136,7 @@ def test_panes_by_hand_and_of_a_file_are_drawn(run, floor, tmp_path):
         assert first[key] == second[key]
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("out, path", [("pictures", "pictures/floor.png"), ("mine.png", "mine.png")])
 def test_a_map_is_shown_with_its_panes(run, floor, tmp_path, out, path):
     run("map", "draw", floor, "--pane", 0, 0, 1, 0, "--out", tmp_path / "drawn")

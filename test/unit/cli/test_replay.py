@@ -89,6 +89,7 @@ def test_a_replay_follows_the_robot_and_writes_everything(run, room_bag, tmp_pat
     )
 
 
+@pytest.mark.long_run
 def test_the_same_seed_gives_the_same_answer_and_another_one_another(run, room_bag, tmp_path):
     path = room_bag().write()
     ways, cases, glass = [], [], []
@@ -154,6 +155,7 @@ def one_bad_scan(**changes):
     return lambda index, fields: {**fields, **changes} if index == 3 else fields
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize(
     "changes, reason",
     [
@@ -170,6 +172,7 @@ def test_a_bad_scan_is_counted_and_said(run, room_bag, tmp_path, changes, reason
     assert f"glass_nav replay: 1 scans rejected: {reason}\n" in err
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize(
     "change",
     [
@@ -392,6 +395,7 @@ def test_the_script_runs_by_itself(room_bag, room_map, tmp_path):
 TRUE_BEAMS = {"true_beams": (("/true_beams", "TrueBeams"),)}
 
 
+@pytest.mark.long_run
 def test_a_log_with_the_truth_about_its_beams_has_its_cases_scored(run, room_bag, tmp_path):
     code, out, err = run(room_bag(**TRUE_BEAMS).write())
     assert code == 0
@@ -454,6 +458,7 @@ def test_only_part_of_a_log_is_scored_against_its_own_truth(run, room_bag, tmp_p
     assert figures(tmp_path)["cases"]["true_share"] == [0.0, 0.75, 0.0, 0.0, 0.25]  # scans 3, 6, 9, 12
 
 
+@pytest.mark.long_run
 def test_the_truth_is_not_looked_at_when_it_is_not_wanted(run, room_bag, tmp_path):
     code, out, _ = run(room_bag(**TRUE_BEAMS).write(), "--true-beams", "none")
     assert code == 0

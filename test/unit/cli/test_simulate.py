@@ -72,6 +72,7 @@ def test_a_lidar_that_turns_makes_a_bag_that_says_so(run, tmp_path):
     assert set(stamps_ns) <= set(recording.ground_truth.stamps_ns.tolist())
 
 
+@pytest.mark.long_run
 def test_a_bag_and_its_map_replay_as_they_are(run, tmp_path):
     code, out, err = run("--seed", 1)
     assert code == 0, err
@@ -104,6 +105,7 @@ def test_a_bag_and_its_map_replay_as_they_are(run, tmp_path):
     assert figures["position_max_m"] < 0.2
 
 
+@pytest.mark.long_run
 def test_the_same_seed_gives_the_same_bag(run, tmp_path):
     bags = []
     for seed in (2, 2, 3):

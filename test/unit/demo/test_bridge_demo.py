@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from glass_nav.demo import bridge_demo
 from glass_nav.demo.bridge_demo import FIELD, OURS, Tracked
 
 
+@pytest.mark.long_run
 def test_both_localizers_follow_the_same_drive() -> None:
     tracked = bridge_demo.drive(seed=1, max_scans=4)
     assert list(tracked) == [OURS, FIELD]

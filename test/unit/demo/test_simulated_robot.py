@@ -44,6 +44,7 @@ def test_a_robot_finds_its_place_is_localized_and_takes_goals() -> None:
     assert arrival is not None and arrival.outcome == Outcome.PREEMPTED
 
 
+@pytest.mark.long_run
 def test_the_same_seed_gives_the_same_drive() -> None:
     robots = [robot_at(3, []) for _ in range(2)]
     for robot in robots:

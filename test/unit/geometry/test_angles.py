@@ -15,6 +15,12 @@ def test_wrapped_angles_lie_in_the_half_open_interval():
     assert np.all(wrapped >= -np.pi) and np.all(wrapped < np.pi)
 
 
+def test_one_angle_is_wrapped_as_many_are():
+    for angle in (0.3, np.pi, -np.pi, 3.0 * np.pi, -4.0, 1e6):
+        assert angles.wrap_one(angle) == angles.wrap(angle)
+    assert all(np.isnan(angles.wrap_one(angle)) for angle in (np.nan, np.inf))
+
+
 def test_not_a_number_stays_not_a_number():
     assert np.isnan(angles.wrap(np.nan))
 

@@ -43,6 +43,7 @@ def test_a_pose_gains_by_the_walls_that_the_map_explains_and_elsewhere_by_the_ot
     np.testing.assert_allclose(belief.poses, [TRUTH, WRONG])
     # Elsewhere the map explains 0.7 of a scan that poses are chosen by; half a nat for each of the 80 pieces.
     np.testing.assert_allclose(belief.evidence.nats, [40.0 * (0.95 - 0.7), 40.0 * (0.65 - 0.7)])
+    np.testing.assert_allclose(belief.evidence.checked_nats, [0.0, 0.0])  # it chose the poses
     np.testing.assert_allclose(belief.evidence.share, [0.95, 0.65])
     assert belief.evidence.label.tolist() == [NEW, NEW]
 
@@ -63,13 +64,14 @@ def test_a_wall_counts_once_however_often_it_is_seen() -> None:
 
 def test_new_walls_decide_as_the_robot_drives_on() -> None:
     belief = begun(world(wrong=0.8))
-    leads = [belief.evidence.nats[0] - belief.evidence.nats[1]]
+    leads, chosen_by = [belief.evidence.nats[0] - belief.evidence.nats[1]], belief.evidence.nats[0]
     for x in (2.5, 5.0, 7.5):
         assert seen(belief, x)
         seen(belief, x)  # a search may have been complete with the first one
         np.testing.assert_allclose(belief.poses[0], TRUTH + [x, 0.0, 0.0])
         leads.append(belief.evidence.nats[0] - belief.evidence.nats[1])
     assert (np.diff(leads) > 0.2).all()
+    assert belief.evidence.checked_nats[0] == pytest.approx(belief.evidence.nats[0] - chosen_by)
     assert not seen(belief, 7.6)  # it did not move
 
 

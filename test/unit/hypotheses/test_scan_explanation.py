@@ -112,6 +112,7 @@ def test_where_the_map_knows_nothing_beams_are_no_evidence_but_through_a_wall_th
     assert np.isnan(ScanExplanation(nothing).shares(ahead, truth[None])).all()
 
 
+@pytest.mark.long_run
 def test_where_nothing_is_known_the_truth_is_among_the_places_proposed_and_explains_most():
     building, explanation = office()
     for number, truth in enumerate(PLACES):

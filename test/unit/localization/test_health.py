@@ -8,6 +8,7 @@ import pytest
 from glass_nav.health import Level
 from glass_nav.localization import health
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
+from glass_nav.localization.beam_report import BeamReport
 from glass_nav.localization.health import LocalizationHealth, Situation
 from glass_nav.localization.localizer import BeamCases, Estimate
 from glass_nav.sensing.scan import Scan
@@ -26,17 +27,17 @@ def reporter():
 def estimate(state="LOCALIZED", std=0.05, used_share=0.9, beams=100):
     case = np.ones(beams, np.uint8)
     case[: beams // 4] = 3
+    cases = BeamCases(case, *(np.ones(beams),) * 3)
+    surfaces = SurfaceScan(np.ones(beams), np.zeros(beams, bool), True)
     return Estimate(
         7,
         np.zeros(3),
         np.eye(3) * std**2,
         np.zeros(3),
-        BeamCases(case, *(np.ones(beams),) * 3),
-        SurfaceScan(np.ones(beams), np.zeros(beams, bool), True),
+        lambda: BeamReport(cases, surfaces, used_share),
         np.zeros((5, 3)),
         state,
         "why",
-        used_share,
         True,
         confidence=0.8,
     )

@@ -7,8 +7,7 @@ import pytest
 
 from glass_nav.geometry import se2
 from glass_nav.localization import saved_pose
-from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
-from glass_nav.localization.localizer import BeamCases, Estimate
+from glass_nav.localization.localizer import Estimate
 from glass_nav.localization.pose_memory import PoseMemory
 from glass_nav.localization.saved_pose import PoseFile
 
@@ -16,19 +15,20 @@ DIGEST = "0123456789abcdef"
 MAP_FROM_ODOM, ODOM_FROM_BASE = np.array([1.0, 2.0, 0.5]), np.array([4.0, -1.0, 1.0])
 
 
+def no_beams():
+    raise AssertionError("nobody looks at the beams")
+
+
 def estimate(state, second=1, ahead_m=0.0):
-    none = np.zeros(0)
     return Estimate(
         second * 1_000_000_000,
         se2.compose(MAP_FROM_ODOM, ODOM_FROM_BASE + [ahead_m, 0.0, 0.0]),
         np.diag([0.01, 0.02, 0.003]),
         MAP_FROM_ODOM,
-        BeamCases(none.astype(np.uint8), none, none, none),
-        SurfaceScan(none, none.astype(bool), True),
+        no_beams,
         np.zeros((1, 3)),
         state,
         "why",
-        0.9,
         True,
         confidence=0.9,
     )

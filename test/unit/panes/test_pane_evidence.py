@@ -36,6 +36,7 @@ def kinds_of(kinds: str, mapped: Sequence[int] = ()) -> str:
         pytest.param("ggggggpgggggg", "ggggggpgggggg", id="a post between two panes"),
         pytest.param("ggggggoooooooogggggg", "ggggggoooooooogggggg", id="an open door between two panes"),
         pytest.param("gggggg????gggggg", "gggggggggggggggg", id="a stretch that nobody saw head-on"),
+        pytest.param("oooooooooo", "oooooooooo", id="no piece that was seen head-on"),
     ],
 )
 def test_pieces_are_told_apart_along_a_line(line: str, found: str) -> None:

@@ -174,9 +174,11 @@ def test_a_reference_stands_in_where_no_pose_is_sure_if_it_agrees_where_one_is(o
     assert np.array_equal(with_truth.trajectory.poses, without.trajectory.poses) == (not used)
 
 
-def test_a_reference_alone_will_do_and_without_one_nothing_follows():
+def test_a_reference_alone_will_do_if_scans_fit_there_and_without_one_nothing_follows():
     true = drive()
     smoother = listened(true, true + 5.0, true, sure=np.zeros(len(true), bool))
     assert smoother.smooth_sure() is None
     found = smoother.smooth_sure(Trajectory(np.arange(len(true)) * 10**8, true))
     assert off_m(found.trajectory.poses, true).max() < 0.02
+    assert smoother.smooth_sure(Trajectory(np.arange(len(true)) * 10**8, true + [1.0, 1.0, 0.5])) is None
+    assert smoother.smooth_sure(Trajectory(np.arange(2) + 10**12, true[:2])) is None

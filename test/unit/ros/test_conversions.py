@@ -26,6 +26,7 @@ from std_msgs.msg import Header
 
 from glass_nav.geometry import angles
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
+from glass_nav.localization.beam_report import BeamReport
 from glass_nav.localization.integrity.protection_level import ProtectionLevels
 from glass_nav.localization.localizer import BeamCases, Estimate
 from glass_nav.msg import BeamCases as BeamCasesMsg
@@ -175,12 +176,10 @@ def estimate(particles: int = 3) -> Estimate:
         np.array([1.0, 2.0, 0.5]),
         covariance,
         np.zeros(3),
-        cases,
-        surface,
+        lambda: BeamReport(cases, surface, 0.9),
         poses,
         "LOCALIZED",
         "for the test",
-        0.9,
         True,
         0.8,
     )

@@ -24,7 +24,7 @@ NONE = np.zeros(0, np.int64)
 def belief_of(poses: List[List[float]], share: List[float], odom: Optional[np.ndarray] = None) -> Belief:
     count = len(share)
     none = np.zeros(count)
-    return Belief(odom, np.array(poses), np.array(share), 1 - sum(share), none, none, none, np.full(count, -1))
+    return Belief(odom, np.array(poses), np.array(share), 1 - sum(share), none, none, none, none, np.full(count, -1))
 
 
 def drawn(shapes: List[Union[Shape, Text]]) -> Tuple[Dict[str, np.ndarray], Dict[str, List[str]]]:

@@ -550,11 +550,11 @@ def test_scans_find_the_place_once_there_is_a_map_and_before_the_first_meetpoint
     told = [each for k in range(3) for each in seen(session, 0.0, T_0 + k)]
     assert states(told) == [SearchState.WAITING] and session.status.belief is not None
     np.testing.assert_allclose(session.status.belief.poses, [[50.0, 0.0, 0.0]])
-    end = [each for k in range(3) for each in seen(session, 1.0 + k, T_0 + 10 + k)]
+    end = [each for k in range(3) for each in seen(session, 5.0 + k, T_0 + 10 + k)]
     assert kinds(end) == [SearchStatus, LogLine, InitialPose]
     assert (session.status.state, session.status.stamp_ns) == (SearchState.CONFIRMED, T_0 + 10)
     assert session.status.estimate is not None and session.status.estimate.depth == 0
-    np.testing.assert_allclose(only(end, InitialPose).map_from_base, [51.0, 0.0, 0.0])
+    np.testing.assert_allclose(only(end, InitialPose).map_from_base, [55.0, 0.0, 0.0])
     assert not session.is_looking and seen(session, 9.0, T_0 + 20) == []
     session.restart()
     assert session.status.belief is None and session.is_looking
@@ -572,7 +572,7 @@ def test_a_robot_of_another_building_may_be_lost_before_the_first_meetpoint(monk
 def test_a_goal_may_succeed_on_the_way_to_a_meetpoint(monkeypatch: pytest.MonkeyPatch) -> None:
     session = looking(monkeypatch)
     session.goal(Goal())
-    told = [each for k in range(6) for each in seen(session, max(0.0, k - 2.0), T_0 + k)]
+    told = [each for k in range(6) for each in seen(session, max(0.0, 2.0 * (k - 2)), T_0 + k)]
     assert only(told, GoalEnd).outcome == GoalOutcome.SUCCEEDED
 
 

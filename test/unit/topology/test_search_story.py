@@ -16,7 +16,9 @@ from glass_nav.topology.search.search_params import SearchParams
 def belief(*share: float) -> Belief:
     none = np.zeros(len(share))
     poses = np.zeros((len(share), 3))
-    return Belief(None, poses, np.array(share), 1.0 - sum(share), none, none, none, none.astype(int), driven_m=4.2)
+    return Belief(
+        None, poses, np.array(share), 1.0 - sum(share), none, none, none, none, none.astype(int), driven_m=4.2
+    )
 
 
 def test_each_meetpoint_is_a_line_of_what_was_seen_what_is_known_and_what_is_asked() -> None:

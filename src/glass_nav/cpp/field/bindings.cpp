@@ -128,9 +128,7 @@ py::array_t<double> log_weights(const DistanceField& field, const Array<double>&
   py::array_t<double> result(static_cast<py::ssize_t>(at.size()));
   double* to = result.mutable_data();
   py::gil_scoped_release unlocked;
-  const LogDensity density(sigma_m, z_hit, z_rand);
-  const double reach_m = reach_of(points);
-  for (const Pose& pose : at) *to++ = log_weight_at(field, points, reach_m, pose, density);
+  log_weights_at(field, points, at, LogDensity(sigma_m, z_hit, z_rand), to);
   return result;
 }
 

@@ -1,37 +1,39 @@
 #include "field_weights.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 
 namespace glass_nav {
 
-LogDensity::LogDensity(double sigma_m, double z_hit, double z_rand) : per_m_(kParts / (kMaxSigmas * sigma_m)) {
-  for (int part = 0; part <= kParts; ++part) {
+LogDensity::LogDensity(double sigma_m, double z_hit, double z_rand)
+    : per_m_(static_cast<float>(kParts / (kMaxSigmas * sigma_m))) {
+  const auto value_at = [&](int part) {
     const double sigmas = kMaxSigmas * part / kParts;
-    values_.push_back(std::log(z_hit * std::exp(-0.5 * sigmas * sigmas) + z_rand));
+    return std::log(z_hit * std::exp(-0.5 * sigmas * sigmas) + z_rand);
+  };
+  const int parts = static_cast<int>(kParts);
+  for (int part = 0; part < parts; ++part) {
+    const double value = value_at(part);
+    parts_.push_back({static_cast<float>(value), static_cast<float>(value_at(part + 1) - value)});
   }
+  parts_.push_back({static_cast<float>(value_at(parts)), 0.0F});
 }
 
-double reach_of(const Points& points) {
-  double squared = 0.0;
-  for (std::size_t i = 0; i < points.count; ++i) {
-    const double x = points.xy_m[2 * i], y = points.xy_m[2 * i + 1];
-    squared = std::max(squared, x * x + y * y);
+void log_weights_at(const DistanceField& field, const Points& points, const std::vector<Pose>& poses,
+                    const LogDensity& density, double* log_w) {
+  using Frames = DistanceField::Frames;
+  std::array<float, Frames::kMost> distance_m;
+  std::fill_n(log_w, poses.size(), 0.0);
+  for (std::size_t first = 0; first < poses.size(); first += Frames::kMost) {
+    const std::size_t count = std::min(Frames::kMost, poses.size() - first);
+    const Frames from_poses(field, poses.data() + first, count);
+    for (std::size_t i = 0; i < points.count; ++i) {
+      from_poses.distances(points.xy_m[2 * i], points.xy_m[2 * i + 1], distance_m.data());
+      for (std::size_t k = 0; k < count; ++k) log_w[first + k] += density.at(distance_m[k]);
+    }
   }
-  return std::sqrt(squared);
-}
-
-double log_weight_at(const DistanceField& field, const Points& points, double reach_m, const Pose& pose,
-                     const LogDensity& density) {
-  const DistanceField::Placed from_pose(field, pose);
-  const bool is_inside = from_pose.is_inside(reach_m);
-  double total = 0.0;
-  for (std::size_t i = 0; i < points.count; ++i) {
-    const double x = points.xy_m[2 * i], y = points.xy_m[2 * i + 1];
-    total += density.at(is_inside ? from_pose.distance_inside(x, y) : from_pose.distance(x, y));
-  }
-  return total;
 }
 
 }  // namespace glass_nav

@@ -2,6 +2,8 @@
 /// localization/particle_filter/importance_weights.py.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <vector>
 
 #include "distance_field.hpp"
@@ -14,26 +16,26 @@ class LogDensity {
  public:
   LogDensity(double sigma_m, double z_hit, double z_rand);
 
-  double at(double distance_m) const {
-    const double place = distance_m * per_m_;
-    if (!(place < kParts)) return values_[kParts];  // also NaN
+  float at(float distance_m) const {
+    const float place = std::min(distance_m * per_m_, kParts);
     const int left = static_cast<int>(place);
-    return values_[left] + (place - left) * (values_[left + 1] - values_[left]);
+    return parts_[left].value + (place - static_cast<float>(left)) * parts_[left].growth;
   }
 
  private:
-  static constexpr int kParts = 2048;
+  static constexpr float kParts = 2048.0F;
   static constexpr double kMaxSigmas = 10.0;  // beyond, the density is that at so many
 
-  double per_m_;
-  std::vector<double> values_;
+  struct Part {
+    float value, growth;  // at its beginning, and up to its end
+  };
+
+  float per_m_;
+  std::vector<Part> parts_;
 };
 
-/// How far the farthest point is from the robot [m].
-double reach_of(const Points& points);
-
-/// Sum over the points, none farther than reach_m, of the log density, with the scan at that pose.
-double log_weight_at(const DistanceField& field, const Points& points, double reach_m, const Pose& pose,
-                     const LogDensity& density);
+/// Writes for each pose the sum over the points of the log density, with the scan at that pose.
+void log_weights_at(const DistanceField& field, const Points& points, const std::vector<Pose>& poses,
+                    const LogDensity& density, double* log_w);
 
 }  // namespace glass_nav

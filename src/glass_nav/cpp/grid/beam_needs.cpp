@@ -44,7 +44,7 @@ class Neighbourhoods {
     }
   }
 
-  PathChoice need(std::size_t beam, BeamEnd& end) const {
+  BeamNeed need(std::size_t beam, BeamEnd& end) const {
     const double turn = 2.0 * spread_.cells / std::min(seen_.at[kFirst][beam].range, end.range) + spread_.yaw_rad;
     std::size_t from = beam, to = beam;
     if (!(turn <= kMaxTurn) || !find(turn, from, to)) return {};  // nothing can be left out
@@ -60,7 +60,7 @@ class Neighbourhoods {
       }
     }
     end.reach = std::min(end.reach, reach);
-    return {may_end[kThird] ? 3 : may_end[kSecond] ? 2 : 1, may_end[kMirrored]};
+    return {{may_end[kThird] ? 3 : may_end[kSecond] ? 2 : 1, may_end[kMirrored]}, {from, to}, true};
   }
 
  private:
@@ -83,9 +83,9 @@ class Neighbourhoods {
 
 }  // namespace
 
-std::vector<PathChoice> needs_of(const SeenSurfaces& seen, const PoseSpread& spread, const EndGate& gate,
-                                 std::vector<BeamEnd>& ends) {
-  std::vector<PathChoice> needs(seen.beams, PathChoice{0, false});
+std::vector<BeamNeed> needs_of(const SeenSurfaces& seen, const PoseSpread& spread, const EndGate& gate,
+                               std::vector<BeamEnd>& ends) {
+  std::vector<BeamNeed> needs(seen.beams, BeamNeed{{0, false}, {}, false});
   const Neighbourhoods neighbourhoods(seen, spread, gate);
   for (std::size_t b = 0; b < seen.beams; ++b) {
     if (std::isfinite(ends[b].range)) needs[b] = neighbourhoods.need(b, ends[b]);

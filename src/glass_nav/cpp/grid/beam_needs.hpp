@@ -50,10 +50,22 @@ struct BeamEnd {
   double reach;  // how far the poses nearby look along the beam
 };
 
+/// Neighbouring beams, at least one.
+struct BeamStretch {
+  std::size_t first = 0, last = 0;
+};
+
+/// What one beam needs.
+struct BeamNeed {
+  PathChoice paths;
+  BeamStretch beside;      // the beams by which that was decided
+  bool is_known = false;   // that there are such beams; else all paths are needed, or none
+};
+
 /// What each beam needs, by what the pose sees along it and along the beams beside it, as far as the spread turns and
 /// moves it: paths to surfaces that may have ended it, and the first surface; none if it did not return. Where less
 /// than its reach is enough, the reach is shortened.
-std::vector<PathChoice> needs_of(const SeenSurfaces& seen, const PoseSpread& spread, const EndGate& gate,
-                                 std::vector<BeamEnd>& ends);
+std::vector<BeamNeed> needs_of(const SeenSurfaces& seen, const PoseSpread& spread, const EndGate& gate,
+                               std::vector<BeamEnd>& ends);
 
 }  // namespace glass_nav

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ray_stream.hpp"
+#include "straight_walls.hpp"
 #include "wall_lines.hpp"
 
 namespace glass_nav {
@@ -118,19 +119,22 @@ class ExpectedRanges {
 
   void look_from_others() {
     see_nothing();
-    choices_ = needs_of_beams();
-    std::vector<std::size_t> first, more;
+    needs_ = needs_of_beams();
+    const StraightWalls walls = straight_walls();
+    std::vector<std::size_t> straight, first, more;
     for (std::size_t b = 0; b < beams_; ++b) {
-      if (choices_[b].surfaces == 0) continue;
-      (choices_[b].surfaces == 1 && !choices_[b].mirrored ? first : more).push_back(b);
+      const PathChoice& paths = needs_[b].paths;
+      if (paths.surfaces == 0) continue;
+      (is_straight(walls, b) ? straight : paths.surfaces == 1 && !paths.mirrored ? first : more).push_back(b);
     }
+    look_along_lines(walls, straight);
     if (!first.empty()) cast_first_along(first);
     if (!more.empty()) cast_paths_along(more);
   }
 
-  std::vector<PathChoice> needs_of_beams() {
+  std::vector<BeamNeed> needs_of_beams() {
     reach_m_.assign(wanted_.reach_m, wanted_.reach_m + beams_);
-    if (!std::isfinite(wanted_.gate_m)) return std::vector<PathChoice>(beams_);
+    if (!std::isfinite(wanted_.gate_m)) return std::vector<BeamNeed>(beams_);
     const double cell_m = grid_.resolution_m();
     PoseSpread spread;
     const double* pose = wanted_.rays.poses;
@@ -143,9 +147,63 @@ class ExpectedRanges {
     for (std::size_t b = 0; b < beams_; ++b) {
       ends[b] = {wanted_.measured_m[b] / cell_m, reach_m_[b] / cell_m};
     }
-    std::vector<PathChoice> needs = needs_of(seen_, spread, {wanted_.gate_m / cell_m, wanted_.depth_share}, ends);
+    std::vector<BeamNeed> needs = needs_of(seen_, spread, {wanted_.gate_m / cell_m, wanted_.depth_share}, ends);
     for (std::size_t b = 0; b < beams_; ++b) reach_m_[b] = ends[b].reach * cell_m;
     return needs;
+  }
+
+  StraightWalls straight_walls() const {
+    std::vector<Ray> rays;
+    rays.reserve(beams_);
+    for (std::size_t b = 0; b < beams_; ++b) rays.push_back(ray(0, b));
+    return {seen_,
+            {out_.cell + index(kFirst, 0, 0), out_.cell + index(kMirrored, 0, 0), out_.cell + index(kSecond, 0, 0),
+             out_.cell + index(kThird, 0, 0)},
+            rays,
+            grid_.width()};
+  }
+
+  static bool is_needed(std::size_t path, const PathChoice& paths) {
+    constexpr std::array<int, kPathCount> kSurfaces{1, 0, 2, 3};  // up to that of the path
+    return path == kMirrored ? paths.mirrored : paths.surfaces >= kSurfaces[path];
+  }
+
+  /// Whether all that a beam needs can be told by the lines of walls.
+  bool is_straight(const StraightWalls& walls, std::size_t beam) const {
+    const BeamNeed& need = needs_[beam];
+    if (!need.is_known || (need.paths.mirrored && !wanted_.mirrored_by_line)) return false;
+    for (std::size_t path = 0; path < kPathCount; ++path) {
+      if (is_needed(path, need.paths) && !walls.one_wall(path, need.beside, beam)) return false;
+    }
+    return true;
+  }
+
+  void look_along_lines(const StraightWalls& walls, const std::vector<std::size_t>& beams) {
+    for (std::size_t path = 0; path < kPathCount; ++path) {
+      for (const std::size_t b : beams) {
+        const std::int32_t cell = out_.cell[index(path, 0, b)];
+        if (!is_needed(path, needs_[b].paths) || cell < 0) continue;
+        const NearFace face = walls.face(path, needs_[b].beside, b);
+        for (std::size_t n = 1; n < samples_; ++n) {
+          const Ray from = ray(n, b);
+          double range = 0.0, cos = 0.0;
+          if (path == kMirrored) {
+            const MirroredRange mirrored = mirrored_range(seen_.at[kFirst][b].line, face.line, from);
+            range = mirrored.range;
+            cos = mirrored.cos;
+          } else {
+            range = face.range(from);
+            cos = std::abs(face.line.projection(from));
+          }
+          if (!(range > 0.0 && cos >= kGrazingCos)) continue;
+          const std::size_t at = index(path, n, b);
+          out_.range_m[at] = range * grid_.resolution_m();
+          out_.cos[at] = cos;
+          out_.cell[at] = cell;
+          out_.thickness_m[at] = out_.thickness_m[index(path, 0, b)];
+        }
+      }
+    }
   }
 
   /// What is not met is not written again.
@@ -171,7 +229,7 @@ class ExpectedRanges {
     for (const std::size_t b : beams) {
       some.angles.push_back(wanted_.rays.angles[b]);
       some.reach_m.push_back(std::max(reach_m_[b], kNowhere_m));
-      some.choices.push_back(choices_[b]);
+      some.choices.push_back(needs_[b].paths);
     }
     some.rays.poses += 3;
     some.rays.pose_count = samples_ - 1;
@@ -340,7 +398,7 @@ class ExpectedRanges {
   std::size_t samples_, beams_;
   SeenSurfaces seen_{};          // from the pose
   std::vector<double> reach_m_;  // of the other samples, as what they look for
-  std::vector<PathChoice> choices_;
+  std::vector<BeamNeed> needs_;
 };
 
 }  // namespace

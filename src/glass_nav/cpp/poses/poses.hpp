@@ -13,28 +13,39 @@ inline double wrap(double angle_rad) {
   return wrapped < -kPi ? -kPi : wrapped;  // a last bit below is not let through
 }
 
-/// a_from_c = a_from_b, b_from_c: three numbers each.
-inline void compose(const double* a_from_b, const double* b_from_c, double* a_from_c) {
-  const double cos = std::cos(a_from_b[2]), sin = std::sin(a_from_b[2]);
-  const double x = a_from_b[0] + cos * b_from_c[0] - sin * b_from_c[1];
-  const double y = a_from_b[1] + sin * b_from_c[0] + cos * b_from_c[1];
-  a_from_c[2] = wrap(a_from_b[2] + b_from_c[2]);
-  a_from_c[0] = x;
-  a_from_c[1] = y;
-}
+/// Moves what is given in b to a, one after the other; worked out once for each a_from_b that stays where it is in memory.
+class Motion {
+ public:
+  /// A point: two numbers.
+  void point(const double* a_from_b, const double* point_b, double* point_a) {
+    turn_to(a_from_b);
+    point_a[0] = a_from_b[0] + cos_ * point_b[0] - sin_ * point_b[1];
+    point_a[1] = a_from_b[1] + sin_ * point_b[0] + cos_ * point_b[1];
+  }
+
+  /// a_from_c of b_from_c: three numbers each.
+  void pose(const double* a_from_b, const double* b_from_c, double* a_from_c) {
+    point(a_from_b, b_from_c, a_from_c);
+    a_from_c[2] = wrap(a_from_b[2] + b_from_c[2]);
+  }
+
+ private:
+  void turn_to(const double* a_from_b) {
+    if (a_from_b == turned_) return;
+    turned_ = a_from_b;
+    cos_ = std::cos(a_from_b[2]);
+    sin_ = std::sin(a_from_b[2]);
+  }
+
+  const double* turned_ = nullptr;
+  double cos_ = 1.0, sin_ = 0.0;
+};
 
 inline void invert(const double* a_from_b, double* b_from_a) {
   const double cos = std::cos(a_from_b[2]), sin = std::sin(a_from_b[2]);
   b_from_a[0] = -cos * a_from_b[0] - sin * a_from_b[1];
   b_from_a[1] = sin * a_from_b[0] - cos * a_from_b[1];
   b_from_a[2] = wrap(-a_from_b[2]);
-}
-
-/// A point: two numbers.
-inline void transform_point(const double* a_from_b, const double* point_b, double* point_a) {
-  const double cos = std::cos(a_from_b[2]), sin = std::sin(a_from_b[2]);
-  point_a[0] = a_from_b[0] + cos * point_b[0] - sin * point_b[1];
-  point_a[1] = a_from_b[1] + sin * point_b[0] + cos * point_b[1];
 }
 
 }  // namespace glass_nav

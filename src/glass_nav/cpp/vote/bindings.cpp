@@ -1,15 +1,18 @@
 /// The Python module _beam_vote. Private: docstrings, checks and defaults are in
-/// localization/beam_classification/case_votes.py and behind_panes.py.
+/// localization/beam_classification/: case_votes.py, behind_panes.py, glass_map.py, beam_evidence.py, surface_scan.py.
 #include <algorithm>
 #include <stdexcept>
 #include <vector>
 
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
 
 #include "case_decision.hpp"
 #include "case_votes.hpp"
+#include "glass_odds.hpp"
 #include "pane_echoes.hpp"
+#include "scan_report.hpp"
 #include "soft_vote.hpp"
 
 namespace py = pybind11;
@@ -169,6 +172,123 @@ py::tuple pane_echoes(const Array<double>& measured_m, const Array<double>& rang
   return py::make_tuple(mirrored, unmapped);
 }
 
+py::array_t<double> reflectance(const Array<double>& incidence_rad, double index) {
+  py::array_t<double> result(std::vector<py::ssize_t>(incidence_rad.shape(), incidence_rad.shape() + incidence_rad.ndim()));
+  for (py::ssize_t i = 0; i < result.size(); ++i) {
+    result.mutable_data()[i] = reflectance_of(incidence_rad.data()[i], index);
+  }
+  return result;
+}
+
+// -- what is learnt of walls
+
+WallCells make_walls(const Array<std::int64_t>& wall, std::int64_t rows, std::int64_t columns) {
+  const std::int64_t size = (rows + 2 * WallCells::kBorder) * (columns + 2 * WallCells::kBorder);
+  const std::int64_t *first = wall.data(), *last = first + wall.size();
+  if (rows < 1 || columns < 1 || !std::is_sorted(first, last) || (first != last && (*first < 0 || last[-1] >= size))) {
+    throw std::invalid_argument("walls must be ascending cells of the map with its border");
+  }
+  return {rows, columns, CellSet(first, static_cast<std::size_t>(wall.size()), size)};
+}
+
+std::vector<py::ssize_t> shape_of(const py::array& array) { return {array.shape(), array.shape() + array.ndim()}; }
+
+void check_memory(const py::array& log_odds) {
+  if (log_odds.ndim() != 2 || log_odds.shape(0) != static_cast<py::ssize_t>(kQuestions)) {
+    throw std::invalid_argument("log odds must be (2, W)");
+  }
+}
+
+py::array_t<double> glass_chances(const WallCells& walls, const Array<float>& log_odds, double through, double there,
+                                  const Array<std::int64_t>& cell) {
+  check_memory(log_odds);
+  std::vector<py::ssize_t> shape = shape_of(cell);
+  shape.insert(shape.begin(), kQuestions);
+  py::array_t<double> chances(shape);
+  const std::array<double, kQuestions> priors{through, there};
+  const py::ssize_t count = cell.size(), wall_count = log_odds.shape(1);
+  const std::array<double, kQuestions> unknown{chance_of(through), chance_of(there)};
+  for (py::ssize_t i = 0; i < count; ++i) {
+    const std::int64_t wall = walls.number(cell.data()[i]);
+    for (std::size_t k = 0; k < kQuestions; ++k) {
+      const py::ssize_t row = static_cast<py::ssize_t>(k);
+      chances.mutable_data()[row * count + i] =
+          wall == CellSet::kNone ? unknown[k] : chance_of(priors[k] + log_odds.data()[row * wall_count + wall]);
+    }
+  }
+  return chances;
+}
+
+py::array_t<bool> gone(const WallCells& walls, const Array<float>& log_odds, const Array<std::int64_t>& cell,
+                       const Array<double>& axis_rad, const Array<bool>& opaque, double resolution_m,
+                       double grid_yaw_rad, double prior, double limit, double opaque_prior, double opaque_limit,
+                       double spread, int reach) {
+  if (axis_rad.size() != cell.size() || opaque.size() != cell.size()) {
+    throw std::invalid_argument("cells, axes and which are opaque must be (B,)");
+  }
+  const Openings openings{resolution_m, grid_yaw_rad, prior, limit, opaque_prior, opaque_limit, spread, reach};
+  py::array_t<bool> found(shape_of(cell));
+  for (py::ssize_t i = 0; i < cell.size(); ++i) {
+    found.mutable_data()[i] =
+        is_gone(walls, log_odds.data(), openings, cell.data()[i], axis_rad.data()[i], opaque.data()[i]);
+  }
+  return found;
+}
+
+void learn_glass(const WallCells& walls, py::array_t<float, py::array::c_style>& log_odds,
+                 py::array_t<bool, py::array::c_style>& crossed, const Array<std::int64_t>& cell,
+                 const Array<double>& evidence, const std::array<double, WallCells::kBorder + 1>& spread,
+                 const std::array<double, kQuestions>& scan_share, double limit) {
+  check_memory(log_odds);
+  const auto count = static_cast<std::size_t>(cell.size()), wall_count = static_cast<std::size_t>(log_odds.shape(1));
+  if (evidence.size() != 2 * cell.size()) throw std::invalid_argument("evidence must be (2, B)");
+  learn_crossings(walls, {count, cell.data(), {evidence.data(), evidence.data() + count}},
+                  {spread, scan_share, limit},
+                  {{log_odds.mutable_data(), log_odds.mutable_data() + wall_count}, crossed.mutable_data()});
+}
+
+// -- what a scan says of the pose, and where it is cut
+
+CaseBeams beams_of(const Array<double>& measured_m, const Array<std::uint8_t>& beam_case) {
+  if (measured_m.ndim() != 1 || beam_case.size() != measured_m.size()) {
+    throw std::invalid_argument("measured and cases must be (B,)");
+  }
+  return {static_cast<std::size_t>(measured_m.size()), measured_m.data(), beam_case.data()};
+}
+
+void check_beams(const py::array& array, const CaseBeams& scan) {
+  if (array.size() != static_cast<py::ssize_t>(scan.beams)) throw std::invalid_argument("arrays must be (B,)");
+}
+
+py::tuple evidence(const Array<double>& measured_m, const Array<std::uint8_t>& beam_case, const Array<double>& first_m,
+                   const Array<double>& seen_through, const Array<bool>& known_end) {
+  const CaseBeams scan = beams_of(measured_m, beam_case);
+  check_beams(first_m, scan);
+  check_beams(seen_through, scan);
+  check_beams(known_end, scan);
+  const Evidence sums = evidence_of(scan, first_m.data(), seen_through.data(), known_end.data());
+  return py::make_tuple(sums.answered, sums.explained, sums.short_of, sums.passed);
+}
+
+py::tuple cut(const Array<double>& measured_m, const Array<std::uint8_t>& beam_case, const Array<double>& range_m,
+              const Array<double>& cos, const Array<double>& axis_rad, const Array<double>& glass,
+              const Array<double>& gate_m, double max_range_m, double sure, double no_return_glass, double no_return_wall,
+              double dark_to_dim, double same_wall_m, double same_wall_rad) {
+  const CaseBeams scan = beams_of(measured_m, beam_case);
+  for (const py::array& array : {py::array(range_m), py::array(cos), py::array(axis_rad), py::array(gate_m)}) {
+    check_beams(array, scan);
+  }
+  if (glass.size() != 2 * measured_m.size()) throw std::invalid_argument("chances of glass must be (2, B)");
+  py::array_t<double> ranges_m(measured_m.size());
+  py::array_t<bool> is_cut(measured_m.size());
+  cut_at_surfaces(scan,
+                  {range_m.data(), cos.data(), axis_rad.data(), glass.data(), glass.data() + scan.beams,
+                   gate_m.data()},
+                  {sure, no_return_glass, no_return_wall, dark_to_dim, max_range_m, same_wall_m, same_wall_rad},
+                  ranges_m.mutable_data(), is_cut.mutable_data());
+  return py::make_tuple(ranges_m, is_cut);
+}
+
 }  // namespace
 }  // namespace glass_nav
 
@@ -192,4 +312,19 @@ PYBIND11_MODULE(_beam_vote, module) {
   module.def("pane_echoes", &pane_echoes, py::arg("measured_m"), py::arg("range_m"), py::arg("mirrored_cos"),
              py::arg("turned_rad"), py::arg("reflectance"), py::arg("seen_side"), py::arg("unmapped_end"),
              py::arg("gains"), py::arg("frequencies"), py::arg("sigma_m"), py::arg("max_range_m"), py::arg("min_cos"));
+  module.def("reflectance", &reflectance, py::arg("incidence_rad"), py::arg("index"));
+  py::class_<WallCells>(module, "WallCells")
+      .def(py::init(&make_walls), py::arg("wall"), py::arg("rows"), py::arg("columns"))
+      .def("chances", &glass_chances, py::arg("log_odds"), py::arg("through"), py::arg("there"), py::arg("cell"))
+      .def("gone", &gone, py::arg("log_odds"), py::arg("cell"), py::arg("axis_rad"), py::arg("opaque"),
+           py::arg("resolution_m"), py::arg("grid_yaw_rad"), py::arg("prior"), py::arg("limit"),
+           py::arg("opaque_prior"), py::arg("opaque_limit"), py::arg("spread"), py::arg("reach"))
+      .def("learn", &learn_glass, py::arg("log_odds").noconvert(), py::arg("crossed").noconvert(), py::arg("cell"),
+           py::arg("evidence"), py::arg("spread"), py::arg("scan_share"), py::arg("limit"));
+  module.def("evidence", &evidence, py::arg("measured_m"), py::arg("case"), py::arg("first_m"),
+             py::arg("seen_through"), py::arg("known_end"));
+  module.def("cut", &cut, py::arg("measured_m"), py::arg("case"), py::arg("range_m"), py::arg("cos"),
+             py::arg("axis_rad"), py::arg("glass"), py::arg("gate_m"), py::arg("max_range_m"),
+             py::arg("sure"), py::arg("no_return_glass"), py::arg("no_return_wall"), py::arg("dark_to_dim"),
+             py::arg("same_wall_m"), py::arg("same_wall_rad"));
 }

@@ -11,6 +11,24 @@ constexpr std::size_t kFirst = 0, kMirrored = 1, kSecond = 2;
 constexpr std::size_t kGone = kPaths, kElsewhere = kPaths + 1;  // rows of the priors
 constexpr double kMostSquare = 100.0;                           // of a residual in sigmas
 
+/// Logarithm of a product, with a call of log() only now and then.
+class LogProduct {
+ public:
+  void multiply(double factor) {
+    const double before = product_;
+    product_ *= factor;
+    if (product_ > kLeast && product_ < kMost) return;
+    log_ += std::log(before) + std::log(factor);
+    product_ = 1.0;
+  }
+  double log() const { return log_ + std::log(product_); }
+
+ private:
+  static constexpr double kLeast = 1e-150, kMost = 1e150;
+
+  double product_ = 1.0, log_ = 0.0;
+};
+
 /// Weights of the samples, sum 1, from their log evidence.
 void weigh(std::vector<double>& log_evidence, double temper) {
   const double best = *std::max_element(log_evidence.begin(), log_evidence.end());
@@ -27,6 +45,7 @@ void count_case_votes(const Offers& offers, const Chances& chances, double* shar
   std::vector<double> joint((kPaths + 1) * plane);  // nothing, then the paths
   std::vector<double> weight(offers.samples, 0.0);
   for (std::size_t n = 0; n < offers.samples; ++n) {
+    LogProduct evidence;
     for (std::size_t b = 0; b < beams; ++b) {
       const std::size_t i = n * beams + b;
       const double z = offers.measured_m[b];
@@ -54,8 +73,9 @@ void count_case_votes(const Offers& offers, const Chances& chances, double* shar
       const double nothing =
           uncertain + chances.prior[kGone * beams + b] * at_second + chances.prior[kElsewhere * beams + b];
       joint[i] = nothing;
-      weight[n] += std::log(total + nothing);
+      evidence.multiply(total + nothing);
     }
+    weight[n] = evidence.log();
   }
   weigh(weight, chances.temper);
   std::fill(share, share + (kPaths + 1) * beams, 0.0);

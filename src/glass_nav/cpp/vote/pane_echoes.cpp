@@ -27,6 +27,15 @@ double or_zero(double value) { return std::isnan(value) ? 0.0 : value; }
 
 }  // namespace
 
+double reflectance_of(double incidence_rad, double index) {
+  const double angle = or_zero(incidence_rad), inside = std::sin(angle) / index;
+  const double cos = std::cos(angle), cos_inside = std::sqrt(1.0 - inside * inside);
+  const double across = (cos - index * cos_inside) / (cos + index * cos_inside);
+  const double parallel = (cos_inside - index * cos) / (cos_inside + index * cos);
+  const double surface = 0.5 * (across * across + parallel * parallel);
+  return 2.0 * surface / (1.0 + surface);
+}
+
 PaneEcho pane_echo(const PaneBeam& beam, const PaneModel& model) {
   const double first_m = beam.range_m[kFirst], mirrored_m = beam.range_m[kMirrored], behind_m = beam.range_m[kSecond];
   const bool perpendicular = !(std::abs(std::cos(beam.turned_rad)) >= std::sin(kPerpendicular));  // also a corner

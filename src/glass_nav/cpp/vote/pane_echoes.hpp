@@ -34,6 +34,9 @@ struct PaneEcho {
   double unmapped;  // density [1/m] at the measured range of ends behind the pane at what no map shows
 };
 
+/// Share of the light that a sheet of that refractive index mirrors: Fresnel, unpolarised, both surfaces; NaN: head on.
+double reflectance_of(double incidence_rad, double index);
+
 PaneEcho pane_echo(const PaneBeam& beam, const PaneModel& model);
 
 }  // namespace glass_nav

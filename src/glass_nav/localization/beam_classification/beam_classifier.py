@@ -37,7 +37,7 @@ from glass_nav.world.grid_map import GridMap
 from glass_nav.world.pane import Pane
 
 _DEPTH_SHARE = 0.5  # of a wall's drawn thickness at which beams end, until it is learnt
-_FEWER_SAMPLES = 2  # times, where no particle is weighed by the cases
+_FEWER_SAMPLES = 3  # times, where no particle is weighed by the cases
 
 
 @dataclass(frozen=True)

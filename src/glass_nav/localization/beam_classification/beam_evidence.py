@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from glass_nav import _beam_vote
 from glass_nav.localization.beam_classification.expected_ranges import ExpectedRanges
 
 
@@ -51,14 +52,4 @@ def of(
         seen_through: (B,) probability that the first surface along the beam can be seen through.
         known_end: (B,) bool: the map knows something of where the beam ended.
     """
-    answered = np.isfinite(measured_m)
-    unexplained = answered & (case == 0)
-    with np.errstate(invalid="ignore"):
-        crossed = measured_m > expected.line_m[0]
-    weight = np.where(known_end, 1.0, np.where(crossed, 1.0 - seen_through, 0.0))
-    return BeamEvidence(
-        float(np.count_nonzero(answered)),
-        float(np.count_nonzero(answered & (case > 0))),
-        float(weight[unexplained & ~crossed].sum()),
-        float(weight[unexplained & crossed].sum()),
-    )
+    return BeamEvidence(*_beam_vote.evidence(measured_m, case, expected.line_m[0], seen_through, known_end))

@@ -125,10 +125,4 @@ def _wins(over: np.ndarray, steepness: float) -> np.ndarray:
 
 def reflectance(incidence_rad: np.ndarray) -> np.ndarray:
     """Share of the light that a sheet of clear glass mirrors: Fresnel, unpolarised, two surfaces; NaN: head on."""
-    incidence_rad = np.nan_to_num(incidence_rad)
-    inside = np.arcsin(np.sin(incidence_rad) / _PANE_INDEX)
-    parallel, across = np.cos(incidence_rad), np.cos(inside)
-    r_s = ((parallel - _PANE_INDEX * across) / (parallel + _PANE_INDEX * across)) ** 2
-    r_p = ((across - _PANE_INDEX * parallel) / (across + _PANE_INDEX * parallel)) ** 2
-    surface = 0.5 * (r_s + r_p)
-    return 2.0 * surface / (1.0 + surface)
+    return _beam_vote.reflectance(incidence_rad, _PANE_INDEX)

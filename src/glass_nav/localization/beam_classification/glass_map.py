@@ -13,6 +13,7 @@ from typing import Dict, Mapping, Sequence, Tuple
 
 import numpy as np
 
+from glass_nav import _beam_vote
 from glass_nav.localization.beam_classification import glass_return_model
 from glass_nav.localization.beam_classification.expected_ranges import ExpectedRanges
 from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
@@ -87,11 +88,10 @@ class GlassMap:
         self._stride = self._shape[1] + 4  # cells are counted as if the map had a border of 2
         self._mapped = self._walls(grid_map)
         self._drawn_in = np.zeros(0, np.int64)  # cells of panes that the map lacks
-        self._wall = self._mapped  # (W,) cells of the walls and of those panes, ascending; what follows is of each
-        # Log odds that beams added: can be seen through, and is there though it can.
+        self._look_at(self._mapped)
+        # Of each wall: log odds that beams added: can be seen through, and is there though it can.
         self._log_odds = np.zeros((2, len(self._wall)), np.float32)
         self._crossed = np.zeros(len(self._wall), bool)
-        self._kernel = self._neighbours()
         self.weigh_by(evidence)
 
     def weigh_by(self, evidence: GlassEvidence) -> None:
@@ -114,7 +114,7 @@ class GlassMap:
             odds.update(dict.fromkeys(np.setdiff1d(cells, before).tolist(), believed))
             self._drawn_in = np.union1d(self._drawn_in, cells)
         old, log_odds, crossed = self._wall, self._log_odds, self._crossed
-        self._wall = np.union1d(self._walls(grid_map), self._mapped)
+        self._look_at(np.union1d(self._walls(grid_map), self._mapped))
         self._log_odds = np.zeros((2, len(self._wall)), np.float32)
         self._crossed = np.zeros(len(self._wall), bool)
         kept, at = self._numbers(old)
@@ -127,10 +127,8 @@ class GlassMap:
         """(2, ...) probabilities for flat cells (...) of the map: that it can be seen through, and if so that it is there,
         that is glass and no object that is gone; the priors for -1.
         """
-        found, at = self._numbers(np.where(cell >= 0, self._bordered(cell), -1).ravel())
-        log_odds = np.zeros((2, cell.size))
-        log_odds[:, found] = self._log_odds[:, at[found]]
-        return _chance(self._prior + log_odds).reshape(2, *cell.shape)
+        through, there = self._prior[:, 0].tolist()
+        return self._cells_of_walls.chances(self._log_odds, through, there, cell)
 
     def is_gone(self, cell: np.ndarray, axis_rad: np.ndarray, opaque: np.ndarray) -> np.ndarray:
         """Whether what the map shows is no longer there, so that a beam behind it passed nothing.
@@ -145,29 +143,20 @@ class GlassMap:
             axis_rad: (B,) of the normals of the wall there in map; NaN: none, and then it is no door.
             opaque: (B,) bool: it cannot be glass, by its shape: it is gone unless beams returned from it.
         """
-        walls, at = self._numbers(np.where(cell >= 0, self._bordered(cell), -1))
-        own = np.where(walls, self._log_odds[1, at], 0.0) if len(self._wall) else np.zeros(len(cell))
-        gone = opaque & (_chance(np.log(_OPAQUE_THERE / (1.0 - _OPAQUE_THERE)) + own) < _OPAQUE_GONE)
-        known = np.flatnonzero((own < 0.0) & ~gone & np.isfinite(axis_rad))  # only few: the rest costs milliseconds
-        if not len(known):
-            return gone
-        normal_rad = (axis_rad[known] - self._grid_yaw_rad)[:, None, None]
-        reach = max(1, round(_OPENING_M / self._resolution_m))
-        along, across = np.arange(-reach, reach + 1)[:, None], np.arange(-1, 2)  # walls of cells are staircases
-        row, column = (index[:, None, None] for index in np.divmod(cell[known], self._shape[1]))
-        rows = np.rint(row + along * np.cos(normal_rad) + across * np.sin(normal_rad)).astype(int)
-        columns = np.rint(column - along * np.sin(normal_rad) + across * np.cos(normal_rad)).astype(int)
-        np.clip(rows, 0, self._shape[0] - 1, out=rows)
-        np.clip(columns, 0, self._shape[1] - 1, out=columns)
-        found, at = self._numbers(self._bordered(rows * self._shape[1] + columns).ravel())
-        learnt = np.zeros(rows.shape)  # (B, 2 reach + 1, 3)
-        learnt.flat[found] = self._log_odds[1, at[found]]
-        odds = np.where(learnt.max(axis=2) > -learnt.min(axis=2), learnt.max(axis=2), learnt.min(axis=2))
-        after, before = odds[:, reach + 1 :], odds[:, reach - 1 :: -1]
-        opening = odds[:, reach] + sum(np.minimum(side.cumsum(axis=1).min(axis=1), 0.0) for side in (before, after))
-        spread = 2.0 * sum(self._SPREAD) - self._SPREAD[0]  # so many cells learn from a beam
-        gone[known] = _chance(self._prior[1] + opening / spread) < _GONE
-        return gone
+        return self._cells_of_walls.gone(
+            self._log_odds[1],
+            cell,
+            axis_rad,
+            opaque,
+            self._resolution_m,
+            self._grid_yaw_rad,
+            self._prior[1, 0],
+            _GONE,
+            np.log(_OPAQUE_THERE / (1.0 - _OPAQUE_THERE)),
+            _OPAQUE_GONE,
+            2.0 * sum(self._SPREAD) - self._SPREAD[0],  # so many cells learn from a beam
+            max(1, round(_OPENING_M / self._resolution_m)),
+        )
 
     def occupancy(self) -> np.ndarray:
         """(H, W) int8 [percent]: probability of glass for each wall cell; -1 where no beam crossed it.
@@ -210,21 +199,10 @@ class GlassMap:
         """
         if not len(cell):
             return
-        evidence = self._evidence_of(incidence_rad, passed)
-        offsets, weights = self._kernel
-        at = (self._bordered(cell)[:, None] + offsets).ravel()
-        share = np.tile(weights, len(cell))
-        touched, group = np.unique(at, return_inverse=True)
-        walls, number = self._numbers(touched)
-        number = number[walls]
-        total = np.bincount(group, share)
-        limit = self._evidence.glass_memory
-        for log_odds, added_odds, scan_share in zip(self._log_odds, evidence, self._SCAN_SHARE):
-            # Many beams of one scan at a wall cell are one piece of evidence.
-            mean = np.bincount(group, share * np.repeat(added_odds, len(offsets))) / total
-            added = scan_share * mean[walls] * np.minimum(total[walls], 1.0)
-            log_odds[number] = np.clip(log_odds[number] + added, -limit, limit)
-        self._crossed[number] = True
+        evidence = np.stack(self._evidence_of(incidence_rad, passed))
+        self._cells_of_walls.learn(
+            self._log_odds, self._crossed, cell, evidence, self._SPREAD, self._SCAN_SHARE, self._evidence.glass_memory
+        )
 
     def _evidence_of(self, incidence_rad: np.ndarray, passed: np.ndarray) -> "Tuple[np.ndarray, np.ndarray]":
         """(B,) log odds of glass against wall, and against gone. The lidar is not known: it may be any."""
@@ -239,6 +217,11 @@ class GlassMap:
     def _cells(self) -> int:
         """Of the map with its border."""
         return (self._shape[0] + 4) * self._stride
+
+    def _look_at(self, wall: np.ndarray) -> None:
+        """(W,) cells of the walls and of those panes, ascending."""
+        self._wall = wall
+        self._cells_of_walls = _beam_vote.WallCells(wall, *self._shape)
 
     def _walls(self, grid_map: GridMap) -> np.ndarray:
         """(W,) occupied cells, ascending."""
@@ -255,12 +238,6 @@ class GlassMap:
     def _bordered(self, cell: np.ndarray) -> np.ndarray:
         row, column = np.divmod(cell, self._shape[1])
         return (row + 2) * self._stride + column + 2
-
-    def _neighbours(self) -> Tuple[np.ndarray, np.ndarray]:
-        """Offsets (25,) of the cells around one, and what a crossing counts there."""
-        step = np.arange(-2, 3)
-        ring = np.maximum(np.abs(step)[:, None], np.abs(step))
-        return ((step[:, None] * self._stride + step).ravel(), np.array(self._SPREAD)[ring].ravel())
 
 
 def _chance(log_odds: np.ndarray) -> np.ndarray:

@@ -41,13 +41,20 @@ class RangeResiduals:
         if np.count_nonzero(near) < _MIN_BEAMS:
             return self
         near = _unless_few(near & (off < _SIGMAS * self.sigma_m + thickness_m), near)
-        share = float(np.clip(np.median(across_m[near] / thickness_m[near]), 0.0, 1.0))
+        share = min(max(_median(across_m[near] / thickness_m[near]), 0.0), 1.0)
         at_wall = _unless_few(near & (off < _SIGMAS * self.sigma_m), near)
-        sigma = _MAD * float(np.median(off[at_wall]))
+        sigma = _MAD * _median(off[at_wall])
         return RangeResiduals(
             _MEMORY * self.depth_share + (1.0 - _MEMORY) * share,
-            float(np.clip(_MEMORY * self.sigma_m + (1.0 - _MEMORY) * sigma, min_sigma_m, max_sigma_m)),
+            min(max(_MEMORY * self.sigma_m + (1.0 - _MEMORY) * sigma, min_sigma_m), max_sigma_m),
         )
+
+
+def _median(values: np.ndarray) -> float:
+    """Of some that are no NaN; np.median takes four times as long for those of a scan."""
+    middle = len(values) // 2
+    parted = np.partition(values, [max(middle - 1, 0), middle])
+    return float(parted[middle] if len(values) % 2 else 0.5 * (parted[middle - 1] + parted[middle]))
 
 
 def _unless_few(chosen: np.ndarray, otherwise: np.ndarray) -> np.ndarray:

@@ -7,10 +7,11 @@ the lidar sees behind. Where what is drawn is gone, the next surface behind it c
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Callable, Tuple
+from typing import Callable
 
 import numpy as np
 
+from glass_nav import _beam_vote
 from glass_nav.localization.beam_classification.expected_ranges import ExpectedRanges
 from glass_nav.vocabulary import BeamCase
 
@@ -38,20 +39,20 @@ def standing(expected: ExpectedRanges, is_gone: "Callable[[np.ndarray, np.ndarra
         expected: of the pose, its sample 0.
         is_gone: for cells (G,) and axes (G,): (G,) bool.
     """
-    beams = np.arange(expected.line_m.shape[1])
-    row = np.full(len(beams), _ALONG[0])
-    asked = beams
-    for after in (*_ALONG[1:], None):
-        at = row[asked]
-        asked = asked[is_gone(expected.cell[at, 0, asked], expected.axis_rad[at, asked])]
-        if after is None or not len(asked):
-            break
-        row[asked] = after
-    range_m = expected.line_m[row, beams]
-    range_m[asked] = np.inf
-    return FirstSurfaces(
-        range_m, expected.cos_incidence[row, 0, beams], expected.axis_rad[row, beams], expected.cell[row, 0, beams]
+    first = _ALONG[0]
+    gone = np.flatnonzero(is_gone(expected.cell[first, 0], expected.axis_rad[first]))
+    surfaces = FirstSurfaces(
+        expected.line_m[first], expected.cos_incidence[first, 0], expected.axis_rad[first], expected.cell[first, 0]
     )
+    if not len(gone):
+        return surfaces
+    range_m, cos, axis_rad, cell = (value.copy() for value in vars(surfaces).values())
+    for row in _ALONG[1:]:
+        range_m[gone], cos[gone] = expected.line_m[row, gone], expected.cos_incidence[row, 0, gone]
+        axis_rad[gone], cell[gone] = expected.axis_rad[row, gone], expected.cell[row, 0, gone]
+        gone = gone[is_gone(cell[gone], axis_rad[gone])]
+    range_m[gone] = np.inf
+    return FirstSurfaces(range_m, cos, axis_rad, cell)
 
 
 @dataclass(frozen=True)
@@ -89,41 +90,20 @@ def of(
     """
     if not trusted:
         return SurfaceScan(ranges_m, np.zeros(len(ranges_m), bool), False)
-    seen_through, there = glass
-    beside, within = _walls_beside(first)
-    with np.errstate(invalid="ignore"):
-        behind = np.isfinite(first.range_m) & (ranges_m > first.range_m + gate_m)  # also without a return
-    explained = np.isin(case, (BeamCase.SPECULAR, BeamCase.FIRST_PENETRATION, BeamCase.SECOND_PENETRATION))
-    lost = np.isposinf(ranges_m) & _would_answer(first, max_range_m)
-    silent = _NO_RETURN_GLASS * seen_through
-    gone_through = silent > _SURE * (silent + _NO_RETURN_WALL * (1.0 - seen_through))
-    known = seen_through * there > _SURE
-    passed = (there > _SURE) & np.where(
-        np.isfinite(ranges_m), within, beside & gone_through & lost & _has_beside(behind)
+    as_cut_m, cut = _beam_vote.cut(
+        ranges_m,
+        case,
+        first.range_m,
+        first.cos_incidence,
+        first.axis_rad,
+        glass,
+        gate_m,
+        max_range_m,
+        _SURE,
+        _NO_RETURN_GLASS,
+        _NO_RETURN_WALL,
+        _DARK_TO_DIM,
+        _SAME_WALL_M,
+        _SAME_WALL_RAD,
     )
-    cut = behind & (explained | known | passed)
-    return SurfaceScan(np.where(cut, first.range_m, ranges_m), cut, True)
-
-
-def _walls_beside(first: FirstSurfaces) -> "Tuple[np.ndarray, np.ndarray]":
-    """(B,) bool each: a beam beside it, and both of them, meet the same straight wall first.
-
-    Where both do, no edge is near that a beam could have missed the wall at.
-    """
-    with np.errstate(invalid="ignore"):
-        apart_m = np.abs(np.diff(first.range_m * first.cos_incidence))  # as distances from the lidar
-        turned_rad = np.abs(np.diff(first.axis_rad))
-        same = (apart_m < _SAME_WALL_M) & (np.minimum(turned_rad, np.pi - turned_rad) < _SAME_WALL_RAD)
-    before, after = np.append(False, same), np.append(same, False)
-    return before | after, before & after
-
-
-def _would_answer(first: FirstSurfaces, max_range_m: float) -> np.ndarray:
-    """(B,) bool: a wall instead of the first surface would be bright enough: power falls with cosine and distance."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return _DARK_TO_DIM * first.cos_incidence > (first.range_m / max_range_m) ** 2
-
-
-def _has_beside(beams: np.ndarray) -> np.ndarray:
-    """(B,) bool: one of the beams is beside it; a single one without a return may be a fault of the lidar."""
-    return np.append(False, beams[:-1]) | np.append(beams[1:], False)
+    return SurfaceScan(as_cut_m, cut, True)

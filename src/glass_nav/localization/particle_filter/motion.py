@@ -129,7 +129,7 @@ def _diff(step: np.ndarray, noise: OdometryNoise) -> Tuple[np.ndarray, np.ndarra
     """Mean (3,) and deviations (3,) of first turn [rad], distance [m], second turn [rad]."""
     distance, _ = se2.travelled(step)
     turn_1 = math.atan2(step[1], step[0]) if distance >= _ON_THE_SPOT_M else 0.0
-    turn_2 = float(angles.wrap(float(step[2]) - turn_1))
+    turn_2 = angles.wrap_one(float(step[2]) - turn_1)
     square_1, square_2 = _turn_either_way(turn_1) ** 2, _turn_either_way(turn_2) ** 2
     a1, a2, a3, a4 = noise.odom_alpha1, noise.odom_alpha2, noise.odom_alpha3, noise.odom_alpha4
     variances = (
@@ -142,7 +142,7 @@ def _diff(step: np.ndarray, noise: OdometryNoise) -> Tuple[np.ndarray, np.ndarra
 
 def _turn_either_way(turn: float) -> float:
     """A robot that backs up turned little, although its direction of travel turned by pi."""
-    return min(abs(float(angles.wrap(turn))), abs(float(angles.wrap(turn - math.pi))))
+    return min(abs(angles.wrap_one(turn)), abs(angles.wrap_one(turn - math.pi)))
 
 
 def _omni(step: np.ndarray, noise: OdometryNoise) -> Tuple[float, np.ndarray, np.ndarray]:

@@ -32,8 +32,10 @@ import threading
 import time
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Optional, Tuple, TypeVar
+from xmlrpc.client import MultiCall, ServerProxy
 
 import numpy as np
+import rosgraph
 import rospkg
 import rospy
 import tf2_ros
@@ -278,7 +280,6 @@ class LocalizationNode:
         except ValueError as err:  # ScanError, or the filter fails: the robot drives on by odometry
             self._pass_over(raw.stamp_ns, str(err))
             return
-        self._health.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
         if estimate is None:
             self._scans.counts.refused += 1
             self._log.error("the filter's pose is not finite: nothing is published")
@@ -288,6 +289,7 @@ class LocalizationNode:
         self._segments.send_quality(session.grid_map, scan, estimate)
         session.pose_is_news = False
         self._memory.take(estimate, session.grid_map.digest, self._p.node.save_pose_rate, self._clock.now_s)
+        self._health.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
 
     def _pass_over(self, stamp_ns: int, why: str) -> None:
         """A scan was rejected: the pose still moves on with the odometry."""
@@ -363,11 +365,13 @@ class LocalizationNode:
 
 
 def _keep_on_server(saved: SavedPose) -> None:
-    """As AMCL does; OSError without a parameter server."""
-    for name, value in zip(("x", "y", "a"), saved.map_from_base):
-        rospy.set_param(f"~initial_pose_{name}", float(value))
-    for name, value in zip(("xx", "yy", "aa"), np.diag(saved.covariance)):
-        rospy.set_param(f"~initial_cov_{name}", float(value))
+    """As AMCL does, but with one request for all six; OSError without a parameter server."""
+    requests = MultiCall(ServerProxy(rosgraph.get_master_uri()))
+    pose = zip(("pose_x", "pose_y", "pose_a"), saved.map_from_base)
+    covariance = zip(("cov_xx", "cov_yy", "cov_aa"), np.diag(saved.covariance))
+    for name, value in (*pose, *covariance):
+        requests.setParam(rospy.get_name(), rospy.resolve_name(f"~initial_{name}"), float(value))
+    requests()
 
 
 def _parameter_file() -> Optional[Path]:

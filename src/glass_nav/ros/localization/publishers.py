@@ -26,6 +26,7 @@ from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
 
 NOT_KNOWN = float("nan")
+UNHEARD_STATUS_S = 1.0  # the latched status is renewed that often while nobody listens
 
 
 class Publishers:
@@ -37,6 +38,7 @@ class Publishers:
         self._was_localized = False
         self._map_to_odom, self._sending = MapToOdom(), threading.Lock()  # callbacks send too
         self._particles_pace, self._beams_pace, self._glass_pace = RateLimiter(), RateLimiter(), RateLimiter()
+        self._status_pace = RateLimiter()
         self._glass_is_news = False  # changed since it was last sent
         self._broadcaster = tf2_ros.TransformBroadcaster()
         self._poses = rospy.Publisher("amcl_pose", PoseWithCovarianceStamped, queue_size=2, latch=True)
@@ -68,7 +70,7 @@ class Publishers:
     def send(self, placed: PlacedScan, estimate: Estimate, now_s: float, pose_is_news: bool) -> None:
         """Publish everything about one scan that was used: first what the robot drives by, last what people look at.
 
-        A topic that is not latched costs nothing while nobody listens.
+        A topic that is not latched costs nothing while nobody listens, and a latched one little.
 
         Args:
             placed: the scan.
@@ -83,17 +85,19 @@ class Publishers:
             self._poses.publish(conversions.pose_msg(estimate, self._frame))
         if self._surfaces.get_num_connections():
             self._surfaces.publish(conversions.surface_scan_msg(placed, estimate.surface_scan))
-        self._status.publish(
-            conversions.status_msg(
-                estimate.stamp_ns,
-                self._frame,
-                estimate.state,
-                estimate.reason,
-                estimate.inlier_ratio,
-                estimate.confidence,
-                estimate.levels,
+        is_heard = self._status.get_num_connections() > 0
+        if is_heard or estimate.updated or self._status_pace.is_due(now_s, UNHEARD_STATUS_S):
+            self._status.publish(
+                conversions.status_msg(
+                    estimate.stamp_ns,
+                    self._frame,
+                    estimate.state,
+                    estimate.reason,
+                    estimate.inlier_ratio,
+                    estimate.confidence,
+                    estimate.levels,
+                )
             )
-        )
         if pose_goes_out and (self._particles_pace.is_due(now_s, period_s(self._p.gui_publish_rate)) or pose_is_news):
             self._particles.publish(conversions.pose_array(estimate.stamp_ns, self._frame, estimate.particles))
         self._glass_is_news = self._glass_is_news or estimate.updated

@@ -33,6 +33,7 @@ class Belief:
     share: np.ndarray  # (K,) probability; with elsewhere the sum is 1
     elsewhere: float  # probability that the robot is at none of them
     scan_nats: np.ndarray  # (K,) log likelihood ratio to elsewhere by all scans
+    checked_nats: np.ndarray  # (K,) ... by those that did not choose the pose
     graph_nats: np.ndarray  # (K,) ... by meetpoints and edges
     explained: np.ndarray  # (K,) share of the walls seen that the map explains; NaN: none was seen
     dart: np.ndarray  # (K,) along which the robot came to the last meetpoint; NO_DART: the atlas has none there

@@ -117,6 +117,7 @@ class JointBelief:
             share,
             elsewhere,
             evidence.nats[first],
+            evidence.checked_nats[first],
             evidence.other_nats[first],
             evidence.share[first],
             evidence.label[first],

@@ -245,6 +245,7 @@ def test_what_it_cannot_do_it_says_and_changes_nothing():
         drive.driver.leave(1)
 
 
+@pytest.mark.long_run
 def test_reset_forgets_all():
     drive, _ = at_the_junction()
     assert drive.driver.local_grid is not None and drive.driver.local_graph is not None

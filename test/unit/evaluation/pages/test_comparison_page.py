@@ -62,6 +62,7 @@ def test_names_are_no_markup(tmp_path):
     assert "&lt;b&gt;" in page and "a&amp;b" in page
 
 
+@pytest.mark.long_run
 def test_numbers_of_a_table_are_aligned(tmp_path):
     found = compared({"old": (0.4, 0.5), "new": (0.3, 0.4)})
     drawn = comparison_pictures.draw_all(tmp_path, found, {})
@@ -82,6 +83,7 @@ def test_a_sweep_over_many_logs_has_pictures_of_the_first_ones(tmp_path):
     assert "<p>2 more logs have no pictures of their own.</p>" in (tmp_path / "page.html").read_text()
 
 
+@pytest.mark.long_run
 def test_a_run_that_never_came_back_and_one_without_an_end_are_drawn(tmp_path):
     found = compared({"old": (0.0, 0.5), "new": (np.nan, np.nan)})
     assert {picture.path.name for picture in comparison_pictures.draw_all(tmp_path, found, {})} == {

@@ -169,6 +169,7 @@ def test_a_kept_scan_comes_back_as_it_was(tmp_path):
 NAMED = re.compile(r".+ \[.+\]$")
 
 
+@pytest.mark.long_run
 def test_every_axis_of_a_report_has_a_name_and_a_unit(tmp_path, monkeypatch):
     figures = []
     made = Figure.__init__

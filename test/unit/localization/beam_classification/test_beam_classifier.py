@@ -38,7 +38,7 @@ def test_fewer_samples_vote_where_no_particle_is_weighed():
     scan, _ = seen(False)
     classifier = BeamClassifier(PARAMS, MAP)
     counts = [classifier.classify(scan, POSE, NARROW, each)[1].range_m.shape[1] for each in (True, False)]
-    assert counts == [37, 19]
+    assert counts == [37, 13]
     paper = BeamClassifier(replace(PARAMS, vote=replace(PARAMS.vote, vote_mode="paper")), MAP)
     assert paper.classify(scan, POSE, NARROW, False)[1].range_m.shape[1] == 37
 

@@ -75,6 +75,7 @@ def test_a_wrong_pose_is_doubted_within_a_metre_and_the_right_one_is_found():
     assert watched.searches == 1
 
 
+@pytest.mark.long_run
 def test_a_pose_that_odometry_leads_to_is_no_poor_one_amid_visitors():
     """They hide three quarters of the room; nothing broke the way there."""
     true = loop_drive(30)
@@ -132,6 +133,7 @@ def turned_by_half(true):
     return [se2.compose(np.array([3.0, 3.0, np.pi]), np.array([*(pose[:2] - 3.0), pose[2]])) for pose in true]
 
 
+@pytest.mark.long_run
 def test_of_places_that_look_alike_odometry_leads_to_one():
     """The tracked pose was dragged away; four places fit, and odometry since the last sure pose knows which it is."""
     true = loop_drive(40, (3.0, 3.0))
@@ -153,6 +155,7 @@ def test_of_places_that_look_alike_none_is_found_after_a_kidnapping():
     assert verdicts[-1].contested
 
 
+@pytest.mark.long_run
 def test_odometry_does_not_hide_a_kidnapping_for_ever():
     watched = Watched()
     watched.drive(loop_drive(30), reckoned=loop_drive(30))

@@ -26,7 +26,7 @@ def test_where_nothing_speaks_for_any_place_the_robot_is_elsewhere() -> None:
 
 def test_a_place_is_ruled_out_by_being_less_likely_than_the_first_by_the_risk() -> None:
     nothing = np.zeros(3)
-    some = Belief(None, np.zeros((3, 3)), np.array([0.9, 0.05, 0.0005]), 0.05, nothing, nothing, nothing, nothing)
+    some = Belief(None, np.zeros((3, 3)), np.array([0.9, 0.05, 0.0005]), 0.05, *[nothing] * 5)
     assert some.left(0.001).tolist() == [0, 1] and len(some) == 3
-    none = Belief(None, np.zeros((0, 3)), np.zeros(0), 1.0, *[np.zeros(0)] * 4)
+    none = Belief(None, np.zeros((0, 3)), np.zeros(0), 1.0, *[np.zeros(0)] * 5)
     assert none.left(0.001).tolist() == []
