@@ -277,7 +277,11 @@ def evidence_points(scan: Scan) -> Optional[np.ndarray]:
     if np.count_nonzero(scan.answered) < MIN_BEAMS:
         return None
     pieces = one_of_each_piece(scan)
-    beams = pieces[spread_evenly(np.ones(len(pieces)), _BEAMS)] if len(pieces) >= MIN_BEAMS else spread_evenly(scan.answered, _BEAMS)
+    beams = (
+        pieces[spread_evenly(np.ones(len(pieces)), _BEAMS)]
+        if len(pieces) >= MIN_BEAMS
+        else spread_evenly(scan.answered, _BEAMS)
+    )
     return scan.points_in_base()[beams]
 
 

@@ -110,7 +110,7 @@ class KidnapDetector:
         params: SearchParams,
         usual_fit: Optional[float] = None,
         area: Optional[KnownArea] = None,
-        proven: bool = True,
+        given: bool = False,
     ) -> None:
         """
         Args:
@@ -119,7 +119,7 @@ class KidnapDetector:
             params: whether and when another place is accepted.
             usual_fit: of scans at the pose; None: not known yet.
             area: where the map knows something; None: everywhere.
-            proven: the pose comes from a comparison of all places; False: somebody gave it.
+            given: somebody gave the pose; False: it comes from a comparison of all places.
         """
         self._field, self._matcher, self._params, self._area = field, matcher, params, area
         self._usual, self._spread = _USUAL_FIT if usual_fit is None else usual_fit, _USUAL_SPREAD
@@ -133,7 +133,7 @@ class KidnapDetector:
         self._odom_from_base: Optional[np.ndarray] = None
         self._continuity = ScanContinuity()
         self._moved = False  # without driving, since the last search that found the tracked pose right
-        self._given = not proven
+        self._given = given
         self._left_odometry = False  # since the last search that found the tracked pose right
         self._verdict = Verdict(float("nan"), self._usual, -np.inf, False, None, None)
 
@@ -243,7 +243,9 @@ class KidnapDetector:
     ) -> Verdict:
         """The tracked pose with the best place elsewhere."""
         if np.isnan(candidates.fit):  # the first scan has not been matched everywhere yet
-            return Verdict(self._fit, self._usual, -np.inf, doubted, None, None, None, self._moved, kept, *self._unproven)
+            return Verdict(
+                self._fit, self._usual, -np.inf, doubted, None, None, None, self._moved, kept, *self._unproven
+            )
         here = pose_tracker.same_place(candidates.poses, map_from_base)
         with np.errstate(divide="ignore"):
             log_w = np.log(candidates.weights)
@@ -257,10 +259,10 @@ class KidnapDetector:
         fit_during_search = self._search_fit_m / self._search_m
         steady = self._fit > fit_during_search - _DOUBT[0]
         clear = log_ratio <= -_CLEAR  # scans speak for the tracked pose, whatever it started with
-        settled = clear or (log_ratio <= 0.0 and not self._moved and (not any(self._unproven) or self._search_m > _TWINS_M))
-        best_here = steady and (
-            log_ratio < -self._params.search_margin or (settled and self._search_m > _SETTLED_M)
+        settled = clear or (
+            log_ratio <= 0.0 and not self._moved and (not any(self._unproven) or self._search_m > _TWINS_M)
         )
+        best_here = steady and (log_ratio < -self._params.search_margin or (settled and self._search_m > _SETTLED_M))
         calm = not self._moved and self._calm_m > _CALM_M and log_ratio < self._params.search_margin
         if best_here and doubted:  # scans fit like this here, until they fit better again
             self._usual, self._learnt_m = fit_during_search, _PRIOR_M
@@ -271,11 +273,11 @@ class KidnapDetector:
         if best_here or (not any(unproven) and (calm or (log_ratio <= 0.0 and not doubted and not self._moved))):
             self._search = None
             self._moved = self._given = self._left_odometry = False
-        found = candidates.poses[0] if candidates.found and not here[0] and self._is_fit_for(candidates) else None
+        found = candidates.poses[0] if candidates.found and not here[0] and self.is_fit_for(candidates) else None
         there = None if elsewhere is None else candidates.poses[elsewhere]
         return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates, there, contested, kept, *unproven)
 
-    def _is_fit_for(self, candidates: Candidates) -> bool:
+    def is_fit_for(self, candidates: Candidates) -> bool:
         """Scans fit at the best place as they did before, or nothing comes near it.
 
         Where they fit worse, the map lacks a part of what there is to see: the right place may be none of the candidates.
