@@ -415,7 +415,7 @@ class Localizer:
         covariance = self._integrity.at(step, self._params.odometry, best.covariance)
         judgement = self._quality.judge(best, covariance)
         trusted = judgement.state == LocalizationState.LOCALIZED
-        if seen is not None and trusted and self._filter.fits and not self._quality.left_odometry:
+        if seen is not None and trusted and self._filter.fits:
             self._dead_reckoning = DeadReckoning(map_from_base, covariance)
 
         def report_beams() -> BeamReport:

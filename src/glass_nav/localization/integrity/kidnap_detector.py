@@ -13,8 +13,7 @@ dragged away from it has no advantage. But when the scans say that the robot was
 until it is ahead of all other places.
 
 A pose that was given is a claim. Odometry continues it, and scans fit near it: neither proves it. So it is compared with all
-other places from the first scan on, until it is ahead of them or none has overtaken it over some distance. So is a pose
-that scans led to and odometry did not.
+other places from the first scan on, until it is ahead of them or none has overtaken it over some distance.
 """
 
 from __future__ import annotations
@@ -74,12 +73,6 @@ class Verdict:
         False  # odometry leads from the last sure pose to this one, and the robot was not moved without driving
     )
     given: bool = False  # the tracked pose was not compared with all other places yet
-    left_odometry: bool = False  # nor was it since scans led to it and odometry did not
-
-    @property
-    def proven(self) -> bool:
-        """Nothing but other places speaks against the tracked pose."""
-        return not (self.given or self.left_odometry)
 
     @property
     def fit_there(self) -> float:
@@ -97,7 +90,7 @@ class Verdict:
 
         A given pose is contested by any place that has overtaken it.
         """
-        return self.moved or (self.doubted and self.log_ratio > _CLOSE) or (not self.proven and self.log_ratio > 0.0)
+        return self.moved or (self.doubted and self.log_ratio > _CLOSE) or (self.given and self.log_ratio > 0.0)
 
 
 class KidnapDetector:
@@ -134,7 +127,6 @@ class KidnapDetector:
         self._continuity = ScanContinuity()
         self._moved = False  # without driving, since the last search that found the tracked pose right
         self._given = given
-        self._left_odometry = False  # since the last search that found the tracked pose right
         self._verdict = Verdict(float("nan"), self._usual, -np.inf, False, None, None)
 
     def decide_by(self, params: SearchParams) -> None:
@@ -142,11 +134,6 @@ class KidnapDetector:
         self._params = params
         if self._search is not None:
             self._search.decide_by(params)
-
-    @property
-    def _unproven(self) -> Tuple[bool, bool]:
-        """Verdict.given, Verdict.left_odometry."""
-        return self._given, self._left_odometry
 
     @property
     def _tolerance(self) -> float:
@@ -177,23 +164,20 @@ class KidnapDetector:
         points = global_search.evidence_points(scan)
         if points is None:
             return self._verdict
-        known = points if self._area is None else points[self._area.ends(points, map_from_base[None])[0]]
-        if len(known) < global_search.MIN_BEAMS:  # what ends where the map knows nothing agrees with every pose
+        fit = self._fit_at(points, map_from_base)
+        if fit is None:  # what ends where the map knows nothing agrees with every pose
             return self._verdict
-        fit = float(global_search.fit(self._field, known, map_from_base[None])[0])
         self._fit = fit if np.isnan(self._fit) else self._fit + (fit - self._fit) * -np.expm1(-step_m / _FORGET_M)
         doubted = self._usual - self._fit > self._tolerance
         matcher = self._matcher if self._params.recover_when_lost else None
         if matcher is not None and self._continuity.observe(scan, odom_from_base, map_from_base):
             self._moved, self._search = True, None  # what a search gathered before is about another place
         if matcher is None:  # nothing can be compared
-            self._given = self._left_odometry = False
+            self._given = False
         kept = dead_reckoning is not None and bool(dead_reckoning.mahalanobis(map_from_base[None])[0] < _KEPT)
-        if matcher is not None and dead_reckoning is not None and not (kept or self._left_odometry):
-            self._left_odometry, self._search = True, None
         if self._moved or self._given:
             dead_reckoning, kept = None, False
-        if matcher is not None and self._search is None and (doubted or self._moved or any(self._unproven)):
+        if matcher is not None and self._search is None and (doubted or self._moved or self._given):
             self._begin_search(matcher, map_from_base, dead_reckoning)
         if self._search is None:
             if not doubted:
@@ -207,7 +191,6 @@ class KidnapDetector:
                 None,
                 kept=kept,
                 given=self._given,
-                left_odometry=self._left_odometry,
             )
         else:
             self._search_m += step_m
@@ -215,7 +198,7 @@ class KidnapDetector:
             self._calm_m = 0.0 if doubted else self._calm_m + step_m
             prior = None if dead_reckoning is None else partial(dead_reckoning.log_likelihood, least=_CARRIED_AWAY)
             candidates = self._search.update(scan, odom_from_base, log_prior=prior)
-            self._verdict = self._compare(candidates, map_from_base, doubted, dead_reckoning, kept)
+            self._verdict = self._compare(candidates, points, map_from_base, doubted, dead_reckoning, kept)
             if self._search is not None:
                 self._search.correct(map_from_base)
         return self._verdict
@@ -236,6 +219,7 @@ class KidnapDetector:
     def _compare(
         self,
         candidates: Candidates,
+        points: np.ndarray,
         map_from_base: np.ndarray,
         doubted: bool,
         dead_reckoning: Optional[DeadReckoning],
@@ -244,7 +228,7 @@ class KidnapDetector:
         """The tracked pose with the best place elsewhere."""
         if np.isnan(candidates.fit):  # the first scan has not been matched everywhere yet
             return Verdict(
-                self._fit, self._usual, -np.inf, doubted, None, None, None, self._moved, kept, *self._unproven
+                self._fit, self._usual, -np.inf, doubted, None, None, None, self._moved, kept, self._given
             )
         here = pose_tracker.same_place(candidates.poses, map_from_base)
         with np.errstate(divide="ignore"):
@@ -260,7 +244,7 @@ class KidnapDetector:
         steady = self._fit > fit_during_search - _DOUBT[0]
         clear = log_ratio <= -_CLEAR  # scans speak for the tracked pose, whatever it started with
         settled = clear or (
-            log_ratio <= 0.0 and not self._moved and (not any(self._unproven) or self._search_m > _TWINS_M)
+            log_ratio <= 0.0 and not self._moved and (not self._given or self._search_m > _TWINS_M)
         )
         best_here = steady and (log_ratio < -self._params.search_margin or (settled and self._search_m > _SETTLED_M))
         calm = not self._moved and self._calm_m > _CALM_M and log_ratio < self._params.search_margin
@@ -269,21 +253,33 @@ class KidnapDetector:
         elif self._learnt_m <= _PRIOR_M and clear:  # nowhere else do they fit as well
             self._usual = min(self._usual, max(self._fit, candidates.fit))
         contested = self._moved and log_ratio > -_CLEAR
-        unproven = self._unproven
-        if best_here or (not any(unproven) and (calm or (log_ratio <= 0.0 and not doubted and not self._moved))):
+        given = self._given
+        if best_here or (not given and (calm or (log_ratio <= 0.0 and not doubted and not self._moved))):
             self._search = None
-            self._moved = self._given = self._left_odometry = False
-        found = candidates.poses[0] if candidates.found and not here[0] and self.is_fit_for(candidates) else None
+            self._moved = self._given = False
+        found = candidates.poses[0] if candidates.found and not here[0] and self.is_fit_for(candidates, points) else None
         there = None if elsewhere is None else candidates.poses[elsewhere]
-        return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates, there, contested, kept, *unproven)
+        return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates, there, contested, kept, given)
 
-    def is_fit_for(self, candidates: Candidates) -> bool:
-        """Scans fit at the best place as they did before, or nothing comes near it.
+    def is_fit_for(self, candidates: Candidates, points: np.ndarray) -> bool:
+        """Scans fit at the best place as they did before, or no other comes near it.
 
         Where they fit worse, the map lacks a part of what there is to see: the right place may be none of the candidates.
+
+        Args:
+            candidates: the best of them first.
+            points: (B, 2) end points [m] of the present scan, in the robot's frame.
         """
-        usual = candidates.fit >= self._usual - self._tolerance
+        fit = self._fit_at(points, candidates.poses[0])
+        usual = fit is not None and fit >= self._usual - self._tolerance
         return usual or candidates.lead > _POOR_LEAD * self._params.search_margin
+
+    def _fit_at(self, points: np.ndarray, map_from_base: np.ndarray) -> Optional[float]:
+        """Of the points (B, 2) that end where the map knows something, at a pose (3,); None: they are too few."""
+        known = points if self._area is None else points[self._area.ends(points, map_from_base[None])[0]]
+        if len(known) < global_search.MIN_BEAMS:
+            return None
+        return float(global_search.fit(self._field, known, map_from_base[None])[0])
 
     def _learn(self, fit: float, step_m: float) -> None:
         """How well scans fit where the pose is right, and how much that varies."""

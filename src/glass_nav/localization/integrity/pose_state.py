@@ -21,7 +21,7 @@ from glass_nav.vocabulary import LocalizationState
 
 _POSSIBLE = 8.0  # log likelihood ratio of the best place to one that is still counted as possible
 _MIN_RELIABILITY = 0.05  # of a pose that nothing else speaks against
-_MIN_UNPROVEN = 0.5  # of a pose that was not compared with all other places yet: not rather wrong than right
+_MIN_GIVEN = 0.5  # of a given pose that was not compared with all other places yet: not rather wrong than right
 _LOST = 3.0  # log likelihood ratio of another place to the tracked pose
 _KEPT = (
     3.0,
@@ -98,11 +98,6 @@ class PoseQuality:
         """What the kidnap detector says about the tracked pose."""
         self._verdict = verdict
 
-    @property
-    def left_odometry(self) -> bool:
-        """Scans led to the tracked pose and odometry did not, and it was not compared with all other places since."""
-        return self._verdict is not None and self._verdict.left_odometry
-
     def judge(self, best: PoseEstimate, covariance: Optional[np.ndarray] = None) -> Judgement:
         """State of the best cluster of particles.
 
@@ -154,8 +149,8 @@ class PoseQuality:
     def _least_confidence(self) -> float:
         """Of a pose that is reported as LOCALIZED."""
         verdict = self._verdict
-        if verdict is not None and not verdict.proven:
-            return min(_MIN_UNPROVEN, self._limits.localized_min_reliability)
+        if verdict is not None and verdict.given:
+            return min(_MIN_GIVEN, self._limits.localized_min_reliability)
         if verdict is not None and verdict.doubted:
             return self._limits.localized_min_reliability
         return _MIN_RELIABILITY
