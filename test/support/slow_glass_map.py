@@ -19,27 +19,14 @@ class SlowGlassMap(GlassMap):
     """As GlassMap."""
 
     def chances(self, cell: np.ndarray) -> np.ndarray:
-        """(2, ...) probabilities for flat cells (...) of the map: that it can be seen through, and if so that it is there,
-        that is glass and no object that is gone; the priors for -1.
-        """
+        """As GlassMap.chances()."""
         found, at = self._numbers(np.where(cell >= 0, self._bordered(cell), -1).ravel())
         log_odds = np.zeros((2, cell.size))
         log_odds[:, found] = self._log_odds[:, at[found]]
         return _chance(self._prior + log_odds).reshape(2, *cell.shape)
 
     def is_gone(self, cell: np.ndarray, axis_rad: np.ndarray, opaque: np.ndarray) -> np.ndarray:
-        """Whether what the map shows is no longer there, so that a beam behind it passed nothing.
-
-        A door is open if beams passed head on along a piece of wall so often that it is neither glass nor wall.
-
-        The opening is the piece of wall around the cell that speaks most for one, since a door opens as a whole: a robot
-        that drives past meets each cell head on in a scan or two.
-
-        Args:
-            cell: (B,) flat cells of the map, -1: none.
-            axis_rad: (B,) of the normals of the wall there in map; NaN: none, and then it is no door.
-            opaque: (B,) bool: it cannot be glass, by its shape: it is gone unless beams returned from it.
-        """
+        """As GlassMap.is_gone()."""
         walls, at = self._numbers(np.where(cell >= 0, self._bordered(cell), -1))
         own = np.where(walls, self._log_odds[1, at], 0.0) if len(self._wall) else np.zeros(len(cell))
         gone = opaque & (_chance(np.log(_OPAQUE_THERE / (1.0 - _OPAQUE_THERE)) + own) < _OPAQUE_GONE)
@@ -65,13 +52,7 @@ class SlowGlassMap(GlassMap):
         return gone
 
     def learn(self, cell: np.ndarray, incidence_rad: np.ndarray, passed: np.ndarray) -> None:
-        """Learn from one scan.
-
-        Args:
-            cell: (B,) flat cells that beams certainly crossed or ended at.
-            incidence_rad: (B,) angle to the wall's normal there.
-            passed: (B,) bool: went on behind it; else it ended there.
-        """
+        """As GlassMap.learn()."""
         if not len(cell):
             return
         evidence = self._evidence_of(incidence_rad, passed)

@@ -438,7 +438,7 @@ class Localizer:
 
     def _look_for_panes(self, scan: Scan, estimate: Estimate) -> None:
         """Panes that the map lacks are surfaces from the next scan on."""
-        trusted = estimate.surface_scan.trusted
+        trusted = estimate.state == LocalizationState.LOCALIZED
         if trusted and self._panes.observe(scan, estimate.map_from_base, estimate.covariance):
             self._draw_panes()
 

@@ -34,6 +34,7 @@ class KeptScans:
         self._max = np.zeros(_FIRST_ROOM)
         self._measured = np.zeros((_FIRST_ROOM, DIRECTIONS), np.float32)
         self._mapped = np.zeros((_FIRST_ROOM, DIRECTIONS), np.float32)
+        self._beams_of: "Dict[str, Tuple[np.ndarray, np.ndarray, np.ndarray]]" = {}  # angles, beams, directions by lidar
 
     def __len__(self) -> int:
         return len(self._row_of)
@@ -69,11 +70,21 @@ class KeptScans:
         laser = se2.compose(map_from_base, scan.base_from_laser)
         row = self._row(laser)
         self._laser[row], self._max[row] = laser, scan.range_max_m
-        beams, direction = nearest_beams(scan.angles_rad)
+        beams, direction = self._beams(scan)
         for kept, values in ((self._measured, scan.ranges_m), (self._mapped, mapped_m)):
             kept[row] = NO_BEAM
             kept[row, direction] = values[beams]
         return row
+
+    def _beams(self, scan: Scan) -> Tuple[np.ndarray, np.ndarray]:
+        """As nearest_beams(); a lidar's angles are nearly always those of its last scan."""
+        if scan.lidar in self._beams_of:
+            angles_rad, beams, direction = self._beams_of[scan.lidar]
+            if np.array_equal(angles_rad, scan.angles_rad):
+                return beams, direction
+        beams, direction = nearest_beams(scan.angles_rad)
+        self._beams_of[scan.lidar] = scan.angles_rad, beams, direction
+        return beams, direction
 
     def _row(self, laser: np.ndarray) -> int:
         column, line = np.floor(laser[:2] / self._spacing_m).astype(int)

@@ -165,10 +165,9 @@ class PaneFinder:
         returns = self._returns([area, *(_box_of(pane, _SAME_ACROSS_M) for pane in again)])
         for line in pane_lines.traced(returns, _LEAST_VOTES_M, _LEAST_SCANS):
             found += [pane for pane in self._along(line, returns) if not _is_one_of(pane, found)]
-        for pane in self._remembered:
-            if not _is_one_of(pane, found):
-                judged = self._judged_again(pane) if pane in again else pane
-                found += [judged] if judged.probability >= _FORGOTTEN else []
+        kept = [pane for pane, lies in zip(self._remembered, _lie_on(self._remembered, found)) if not lies]
+        kept = [self._judged_again(pane) if pane in again else pane for pane in kept]
+        found += [pane for pane in kept if pane.probability >= _FORGOTTEN]
         found.sort(key=lambda pane: -pane.probability)
         self._new.clear()
         self._remembered = tuple(found)
@@ -207,11 +206,8 @@ class PaneFinder:
 
     def _returns(self, boxes: "Sequence[_Box]") -> Returns:
         """All returns in some boxes."""
-        rows = [
-            row
-            for row, laser in enumerate(self._scans.map_from_laser)
-            if any(box.contains(laser[:2], self._p.pane_reach_m) for box in boxes)
-        ]
+        laser_m = self._scans.map_from_laser[:, :2]
+        rows = np.flatnonzero(np.any([box.contains(laser_m, self._p.pane_reach_m) for box in boxes], axis=0)).tolist()
         parts = [self._unmapped[row] for row in rows] or [(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0))]
         points_m, beam_rad, width_m, excess = (np.concatenate(values) for values in zip(*parts))
         scan = np.repeat(rows or [0], [len(part[1]) for part in parts])
@@ -360,14 +356,26 @@ def _may_be_normal(beam: np.ndarray, points_m: np.ndarray, beam_rad: np.ndarray)
 
 def _is_one_of(pane: Pane, others: Sequence[Pane]) -> bool:
     """Whether its middle lies on one of the others, which runs the same way."""
-    middle_m = 0.5 * (pane.start_m + pane.end_m)
-    for other in others:
-        along, from_start_m = other.direction, middle_m - other.start_m
-        across_m = abs(float(along[0] * from_start_m[1] - along[1] * from_start_m[0]))
-        if across_m < _SAME_ACROSS_M and 0.0 <= float(along @ from_start_m) <= other.length_m:
-            if abs(float(pane.direction @ along)) > _SAME_COS:
-                return True
-    return False
+    return bool(_lie_on([pane], others)[0])
+
+
+def _lie_on(panes: Sequence[Pane], others: Sequence[Pane]) -> np.ndarray:
+    """(P,) bool: whether the middle of each pane lies on one of the O others, which runs the same way."""
+    (start_m, end_m), (other_m, other_end_m) = _ends(panes), _ends(others)
+    length_m, other_length_m = np.hypot(*(end_m - start_m).T), np.hypot(*(other_end_m - other_m).T)
+    along, other_along = (end_m - start_m) / length_m[:, None], (other_end_m - other_m) / other_length_m[:, None]
+    x_m, y_m = np.moveaxis(0.5 * (start_m + end_m)[:, None] - other_m, -1, 0)  # (P, O) of the middles
+    at_m = x_m * other_along[:, 0] + y_m * other_along[:, 1]
+    across_m = np.abs(y_m * other_along[:, 0] - x_m * other_along[:, 1])
+    on_it = (across_m < _SAME_ACROSS_M) & (at_m >= 0.0) & (at_m <= other_length_m)
+    lies: np.ndarray = (on_it & (np.abs(along @ other_along.T) > _SAME_COS)).any(axis=1)
+    return lies
+
+
+def _ends(panes: Sequence[Pane]) -> Tuple[np.ndarray, np.ndarray]:
+    """(P, 2) where they start, (P, 2) where they end."""
+    ends_m = np.array([[pane.start_m, pane.end_m] for pane in panes], float).reshape(-1, 2, 2)
+    return ends_m[:, 0], ends_m[:, 1]
 
 
 def _log_odds(probability: float) -> float:

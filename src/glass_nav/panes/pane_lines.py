@@ -133,18 +133,19 @@ def _grown(returns: Returns, free: np.ndarray, voters: np.ndarray, direction_rad
     from_seed = returns.points_m - seed_m
     offset_m, along_m = from_seed @ across, from_seed @ np.array([across[1], -across[0]])
     near = np.flatnonzero(free & (np.abs(offset_m) < _STRIP_M + _STRIP_SLOPE * np.abs(along_m)))
-    near = near[_incidence(returns.beam_rad[near], direction_rad) < 2.0 * _VOTES_RAD]
+    near = near[_is_within(2.0 * _VOTES_RAD, returns.beam_rad[near], direction_rad)]
     points_m, beam_rad, width_m = returns.points_m[near], returns.beam_rad[near], returns.width_m[near]
     members = np.flatnonzero(np.isin(near, voters))
     near_m = 2.0 * _NEAR_M
     for _ in range(_ROUNDS):
         if len(members) < _LEAST_RETURNS:
             return None
-        centre = np.average(points_m[members], axis=0, weights=width_m[members])
-        direction_rad = _direction(points_m[members] - centre, width_m[members], direction_rad, beam_rad[members])
+        weight = width_m[members] / width_m[members].sum()
+        centre = weight @ points_m[members]
+        direction_rad = _direction(points_m[members] - centre, weight, direction_rad, beam_rad[members])
         along = np.array([np.cos(direction_rad), np.sin(direction_rad)])
         offset_m = (points_m - centre) @ np.array([-along[1], along[0]])
-        held = np.flatnonzero((np.abs(offset_m) < near_m) & (_incidence(beam_rad, direction_rad) < _VOTES_RAD))
+        held = np.flatnonzero((np.abs(offset_m) < near_m) & _is_within(_VOTES_RAD, beam_rad, direction_rad))
         held = held[_connected((points_m[held] - centre) @ along, (points_m[members] - centre) @ along)]
         near_m = _NEAR_M
         if np.array_equal(held, members):
@@ -167,20 +168,19 @@ def _on(line: Line, returns: Returns) -> np.ndarray:
     return on_line
 
 
-def _incidence(beam_rad: np.ndarray, direction_rad: float) -> np.ndarray:
-    """(N,) angles between beams and the normal of a line."""
-    incidence: np.ndarray = np.arcsin(np.minimum(np.abs(np.cos(beam_rad - direction_rad)), 1.0))
-    return incidence
+def _is_within(incidence_rad: float, beam_rad: np.ndarray, direction_rad: float) -> np.ndarray:
+    """(N,) bool: beams that are nearer than an angle to the normal of a line."""
+    within: np.ndarray = np.abs(np.cos(beam_rad - direction_rad)) < np.sin(incidence_rad)
+    return within
 
 
 def _direction(from_centre: np.ndarray, weight: np.ndarray, before_rad: float, beam_rad: np.ndarray) -> float:
-    """Direction of the total least-squares line, with the beams' own as a weak prior for a short one."""
+    """Direction of the total least-squares line, with the beams' own as a weak prior for a short one; weights sum to 1."""
     x, y = from_centre.T
-    prior = 0.02 * weight.sum()  # m^2: as if the line were seen for 0.1 m
+    prior = 0.02 * 0.1  # m^2: as if the line were seen for 0.1 m
     axis = 2.0 * (beam_rad - 0.5 * np.pi)
-    c, s = np.average(np.cos(axis), weights=weight), np.average(np.sin(axis), weights=weight)
-    across = weight @ (x * x - y * y) + prior * c * 0.1
-    twist = 2.0 * (weight @ (x * y)) + prior * s * 0.1
+    across = weight @ (x * x - y * y + prior * np.cos(axis))
+    twist = weight @ (2.0 * x * y + prior * np.sin(axis))
     turned = 0.5 * np.arctan2(twist, across)
     return float(before_rad + 0.5 * angles.wrap(2.0 * (turned - before_rad)))
 
@@ -191,7 +191,7 @@ def _connected(at_m: np.ndarray, seed_m: np.ndarray) -> np.ndarray:
         return np.zeros(0, int)
     order = np.argsort(at_m)
     group = np.cumsum(np.diff(at_m[order], prepend=at_m[order[0]]) > _JOIN_M)
-    middle = float(np.median(seed_m))
+    middle = np.partition(seed_m, len(seed_m) // 2)[len(seed_m) // 2]
     chosen = group[np.argmin(np.abs(at_m[order] - middle))]
     return np.sort(order[group == chosen])
 

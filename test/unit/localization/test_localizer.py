@@ -14,6 +14,7 @@ from buildings import BASE_FROM_LASER, GLASS_ROOM, L_ROOM, SECOND_NS, Building, 
 from glass_nav import params
 from glass_nav.geometry import angles, se2
 from glass_nav.hypotheses import place_search
+from glass_nav.localization.beam_classification.beam_classifier import BeamClassifier
 from glass_nav.localization.localizer import Localizer
 from glass_nav.localization.localizer_params import LaserLimits, LocalizerParams, Schedule
 from glass_nav.sensing import bearings
@@ -539,6 +540,23 @@ def scan_after(drive, step, index, lidar=""):
     """Of the robot that made that step from where the drive begins."""
     pose = se2.compose(drive.true[0], np.asarray(step))
     return replace(L_ROOM.scan(pose, index * SECOND_NS, np.random.default_rng(index)), lidar=lidar)
+
+
+def test_the_beams_of_a_scan_between_updates_are_classified_once_somebody_asks(drive):
+    classified = []
+
+    class Watched(BeamClassifier):
+        def classify(self, scan, *arguments, **options):
+            classified.append(scan.stamp_ns)
+            return super().classify(scan, *arguments, **options)
+
+    localizer = Localizer(parameters(), MAPS[L_ROOM], np.random.default_rng(0), classifier=Watched)
+    localizer.set_pose(drive.true[0], START_COVARIANCE)
+    localizer.update(drive.scans[0], drive.odometry[0])
+    estimate = localizer.update(scan_after(drive, np.zeros(3), 1), drive.odometry[0])
+    assert not estimate.updated and classified == [drive.scans[0].stamp_ns]
+    asked = estimate.cases, estimate.surface_scan, estimate.inlier_ratio
+    assert classified[1:] == [estimate.stamp_ns] and len(asked[0].case) == len(asked[1].cut) and asked[2] > 0.9
 
 
 def test_a_scan_that_no_longer_fits_is_an_update(drive):

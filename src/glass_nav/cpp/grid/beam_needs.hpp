@@ -58,8 +58,8 @@ struct BeamStretch {
 /// What one beam needs.
 struct BeamNeed {
   PathChoice paths;
-  BeamStretch beside;      // the beams by which that was decided
-  bool is_known = false;   // that there are such beams; else all paths are needed, or none
+  BeamStretch beside;     // the beams by which that was decided
+  bool is_known = false;  // that there are such beams; else all paths are needed, or none
 };
 
 /// What each beam needs, by what the pose sees along it and along the beams beside it, as far as the spread turns and

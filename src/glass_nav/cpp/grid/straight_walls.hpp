@@ -1,5 +1,5 @@
-/// Where all beams of a part of a scan end at the same straight wall, poses nearby see that wall where its line is: no ray
-/// need be cast.
+/// Where all beams of a part of a scan end at the same straight wall, poses nearby see that wall where its line is: no
+/// ray need be cast.
 #pragma once
 
 #include <array>
@@ -44,7 +44,8 @@ class StraightWalls {
   const SeenSurfaces& seen_;
   const std::array<const std::int32_t*, kPathCount> cells_;
   int width_;
-  // Sums over all beams before each: changes from one beam to the next, and how far behind the rays' ends the lines are.
+  // Sums over all beams before each: changes from one beam to the next, and how far behind the rays' ends the lines
+  // are.
   std::array<std::vector<std::uint32_t>, kPathCount> changes_;
   std::array<std::vector<double>, kPathCount> behind_;
 };

@@ -93,16 +93,14 @@ py::array_t<double> by_rows(const Rows& one, const Rows& other, const Work& work
 
 py::array_t<double> composed(const Array& a_from_b, const Array& b_from_c) {
   Motion motion;
-  return by_rows(Rows(a_from_b, 3), Rows(b_from_c, 3), [&](const double* by, const double* pose_b, double* pose_a) {
-    motion.pose(by, pose_b, pose_a);
-  });
+  return by_rows(Rows(a_from_b, 3), Rows(b_from_c, 3),
+                 [&](const double* by, const double* pose_b, double* pose_a) { motion.pose(by, pose_b, pose_a); });
 }
 
 py::array_t<double> transformed(const Array& a_from_b, const Array& points_b) {
   Motion motion;
-  return by_rows(Rows(a_from_b, 3), Rows(points_b, 2), [&](const double* by, const double* point_b, double* point_a) {
-    motion.point(by, point_b, point_a);
-  });
+  return by_rows(Rows(a_from_b, 3), Rows(points_b, 2),
+                 [&](const double* by, const double* point_b, double* point_a) { motion.point(by, point_b, point_a); });
 }
 
 py::array_t<double> inverse(const Array& a_from_b) {

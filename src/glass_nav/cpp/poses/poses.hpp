@@ -13,7 +13,8 @@ inline double wrap(double angle_rad) {
   return wrapped < -kPi ? -kPi : wrapped;  // a last bit below is not let through
 }
 
-/// Moves what is given in b to a, one after the other; worked out once for each a_from_b that stays where it is in memory.
+/// Moves what is given in b to a, one after the other; worked out once for each a_from_b that stays where it is in
+/// memory.
 class Motion {
  public:
   /// A point: two numbers.

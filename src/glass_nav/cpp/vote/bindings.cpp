@@ -172,8 +172,10 @@ py::tuple pane_echoes(const Array<double>& measured_m, const Array<double>& rang
   return py::make_tuple(mirrored, unmapped);
 }
 
+std::vector<py::ssize_t> shape_of(const py::array& array) { return {array.shape(), array.shape() + array.ndim()}; }
+
 py::array_t<double> reflectance(const Array<double>& incidence_rad, double index) {
-  py::array_t<double> result(std::vector<py::ssize_t>(incidence_rad.shape(), incidence_rad.shape() + incidence_rad.ndim()));
+  py::array_t<double> result(shape_of(incidence_rad));
   for (py::ssize_t i = 0; i < result.size(); ++i) {
     result.mutable_data()[i] = reflectance_of(incidence_rad.data()[i], index);
   }
@@ -190,8 +192,6 @@ WallCells make_walls(const Array<std::int64_t>& wall, std::int64_t rows, std::in
   }
   return {rows, columns, CellSet(first, static_cast<std::size_t>(wall.size()), size)};
 }
-
-std::vector<py::ssize_t> shape_of(const py::array& array) { return {array.shape(), array.shape() + array.ndim()}; }
 
 void check_memory(const py::array& log_odds) {
   if (log_odds.ndim() != 2 || log_odds.shape(0) != static_cast<py::ssize_t>(kQuestions)) {
@@ -242,8 +242,7 @@ void learn_glass(const WallCells& walls, py::array_t<float, py::array::c_style>&
   check_memory(log_odds);
   const auto count = static_cast<std::size_t>(cell.size()), wall_count = static_cast<std::size_t>(log_odds.shape(1));
   if (evidence.size() != 2 * cell.size()) throw std::invalid_argument("evidence must be (2, B)");
-  learn_crossings(walls, {count, cell.data(), {evidence.data(), evidence.data() + count}},
-                  {spread, scan_share, limit},
+  learn_crossings(walls, {count, cell.data(), {evidence.data(), evidence.data() + count}}, {spread, scan_share, limit},
                   {{log_odds.mutable_data(), log_odds.mutable_data() + wall_count}, crossed.mutable_data()});
 }
 
@@ -272,8 +271,8 @@ py::tuple evidence(const Array<double>& measured_m, const Array<std::uint8_t>& b
 
 py::tuple cut(const Array<double>& measured_m, const Array<std::uint8_t>& beam_case, const Array<double>& range_m,
               const Array<double>& cos, const Array<double>& axis_rad, const Array<double>& glass,
-              const Array<double>& gate_m, double max_range_m, double sure, double no_return_glass, double no_return_wall,
-              double dark_to_dim, double same_wall_m, double same_wall_rad) {
+              const Array<double>& gate_m, double max_range_m, double sure, double no_return_glass,
+              double no_return_wall, double dark_to_dim, double same_wall_m, double same_wall_rad) {
   const CaseBeams scan = beams_of(measured_m, beam_case);
   for (const py::array& array : {py::array(range_m), py::array(cos), py::array(axis_rad), py::array(gate_m)}) {
     check_beams(array, scan);
@@ -282,8 +281,7 @@ py::tuple cut(const Array<double>& measured_m, const Array<std::uint8_t>& beam_c
   py::array_t<double> ranges_m(measured_m.size());
   py::array_t<bool> is_cut(measured_m.size());
   cut_at_surfaces(scan,
-                  {range_m.data(), cos.data(), axis_rad.data(), glass.data(), glass.data() + scan.beams,
-                   gate_m.data()},
+                  {range_m.data(), cos.data(), axis_rad.data(), glass.data(), glass.data() + scan.beams, gate_m.data()},
                   {sure, no_return_glass, no_return_wall, dark_to_dim, max_range_m, same_wall_m, same_wall_rad},
                   ranges_m.mutable_data(), is_cut.mutable_data());
   return py::make_tuple(ranges_m, is_cut);
@@ -321,10 +319,10 @@ PYBIND11_MODULE(_beam_vote, module) {
            py::arg("opaque_prior"), py::arg("opaque_limit"), py::arg("spread"), py::arg("reach"))
       .def("learn", &learn_glass, py::arg("log_odds").noconvert(), py::arg("crossed").noconvert(), py::arg("cell"),
            py::arg("evidence"), py::arg("spread"), py::arg("scan_share"), py::arg("limit"));
-  module.def("evidence", &evidence, py::arg("measured_m"), py::arg("case"), py::arg("first_m"),
-             py::arg("seen_through"), py::arg("known_end"));
+  module.def("evidence", &evidence, py::arg("measured_m"), py::arg("case"), py::arg("first_m"), py::arg("seen_through"),
+             py::arg("known_end"));
   module.def("cut", &cut, py::arg("measured_m"), py::arg("case"), py::arg("range_m"), py::arg("cos"),
-             py::arg("axis_rad"), py::arg("glass"), py::arg("gate_m"), py::arg("max_range_m"),
-             py::arg("sure"), py::arg("no_return_glass"), py::arg("no_return_wall"), py::arg("dark_to_dim"),
-             py::arg("same_wall_m"), py::arg("same_wall_rad"));
+             py::arg("axis_rad"), py::arg("glass"), py::arg("gate_m"), py::arg("max_range_m"), py::arg("sure"),
+             py::arg("no_return_glass"), py::arg("no_return_wall"), py::arg("dark_to_dim"), py::arg("same_wall_m"),
+             py::arg("same_wall_rad"));
 }

@@ -56,10 +56,10 @@ void count_case_votes(const Offers& offers, const Chances& chances, double* shar
         const std::size_t at = path * plane + i;
         if (!std::isfinite(offers.range_m[at])) continue;
         const double cos = std::max(offers.cos[at], chances.min_cos);
-        double end_m = offers.range_m[at] + chances.depth_share * offers.thickness_m[at] / cos;
+        // Beams end that deep in the wall, along the normal.
+        double across = (z - offers.range_m[at]) * cos - chances.depth_share * offers.thickness_m[at];
         if (path == kMirrored)
-          end_m += 2.0 * first_depth * offers.cos[kFirst * plane + i];  // a mirror lies that much deeper
-        const double across = (z - end_m) * cos;
+          across -= 2.0 * first_depth * offers.cos[kFirst * plane + i] * cos;  // a mirror lies that much deeper
         if (!(std::abs(across) <= chances.gate_m)) continue;
         // An error of the mirror's own place counts twice, along its normal.
         const double widening = path == kMirrored ? std::hypot(1.0, 2.0 * offers.cos[kFirst * plane + i]) : 1.0;

@@ -48,8 +48,7 @@ void learn_crossings(const WallCells& walls, const Crossings& crossings, const G
   for (const Sums& sums : sums_by_wall(walls, crossings, learning)) {
     for (std::size_t k = 0; k < kQuestions; ++k) {
       // Many beams of one scan at a wall cell are one piece of evidence.
-      const double added =
-          learning.scan_share[k] * (sums.evidence[k] / sums.weight) * std::min(sums.weight, 1.0);
+      const double added = learning.scan_share[k] * (sums.evidence[k] / sums.weight) * std::min(sums.weight, 1.0);
       float& log_odds = memory.log_odds[k][sums.wall];
       log_odds = static_cast<float>(std::clamp(log_odds + added, -learning.limit, learning.limit));
     }

@@ -1,5 +1,5 @@
-/// What beams tell of the wall cells of a map: can they be seen through, and are they still there? The formulation is in
-/// localization/beam_classification/glass_map.py.
+/// What beams tell of the wall cells of a map: can they be seen through, and are they still there? The formulation is
+/// in localization/beam_classification/glass_map.py.
 #pragma once
 
 #include <array>
@@ -19,9 +19,7 @@ struct WallCells {
   CellSet numbers;             // of the cells with the border
 
   /// The number of the wall at a cell of the map without its border; CellSet::kNone: there is none.
-  std::int64_t number(std::int64_t cell) const {
-    return cell < 0 ? CellSet::kNone : numbers.number(with_border(cell));
-  }
+  std::int64_t number(std::int64_t cell) const { return cell < 0 ? CellSet::kNone : numbers.number(with_border(cell)); }
   std::int64_t with_border(std::int64_t cell) const {
     return (cell / columns + kBorder) * stride() + cell % columns + kBorder;
   }
@@ -57,11 +55,11 @@ void learn_crossings(const WallCells& walls, const Crossings& crossings, const G
 /// When a wall is gone.
 struct Openings {
   double resolution_m, grid_yaw_rad;
-  double prior;                      // log odds that what can be seen through is there
-  double limit;                      // chance of being there below which it is gone
-  double opaque_prior, opaque_limit; // the same for what cannot be glass
-  double spread;                     // so many cells learn from a beam
-  int reach;                         // cells from one to the ends of its opening, at most
+  double prior;                       // log odds that what can be seen through is there
+  double limit;                       // chance of being there below which it is gone
+  double opaque_prior, opaque_limit;  // the same for what cannot be glass
+  double spread;                      // so many cells learn from a beam
+  int reach;                          // cells from one to the ends of its opening, at most
 };
 
 /// @param log_odds  of being there, of each wall

@@ -55,9 +55,9 @@ void cut_at_surfaces(const CaseBeams& scan, const StandingSurfaces& first, const
     const double share = first.range_m[b] / rules.max_range_m;
     const bool lost = std::isinf(measured_m) && measured_m > 0.0 && rules.dark_to_dim * first.cos[b] > share * share;
     const bool beside_lost = behind[b] || behind[b + 2];  // a single one may be a fault of the lidar
-    const bool passed = there > rules.sure && (std::isfinite(measured_m) ? before && after
-                                                                         : (before || after) && gone_through && lost &&
-                                                                               beside_lost);
+    const bool passed =
+        there > rules.sure &&
+        (std::isfinite(measured_m) ? before && after : (before || after) && gone_through && lost && beside_lost);
     cut[b] = behind[b + 1] && (explained || known || passed);
     range_m[b] = cut[b] ? first.range_m[b] : measured_m;
   }

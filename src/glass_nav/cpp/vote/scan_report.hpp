@@ -36,10 +36,10 @@ struct StandingSurfaces {
 
 /// When a beam is cut.
 struct CutRules {
-  double sure;                                  // chance from which a wall counts as glass, and as being there
-  double no_return_glass, no_return_wall;       // shares of the beams that do not return
-  double dark_to_dim, max_range_m;              // how far a wall of which reflectance is seen
-  double same_wall_m, same_wall_rad;            // apart: neighbouring beams meet one wall
+  double sure;                             // chance from which a wall counts as glass, and as being there
+  double no_return_glass, no_return_wall;  // shares of the beams that do not return
+  double dark_to_dim, max_range_m;         // how far a wall of which reflectance is seen
+  double same_wall_m, same_wall_rad;       // apart: neighbouring beams meet one wall
 };
 
 /// Writes the ranges of the cut scan, and which beams were cut.

@@ -7,7 +7,7 @@ itself, on which everything else relies, never changes.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import List, Sequence, Tuple
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -82,12 +82,14 @@ class UnmappedPanes:
 
     def _believed(self) -> List[Pane]:
         """The probable panes; one that hardly changed stays as it is drawn."""
+        found = self._finder.panes()
+        least = self._use.pane_min_probability
         believed = []
-        for pane in self._finder.panes():
-            old = next((old for old in self._drawn if _alike(pane, old)), None)
-            least = self._use.pane_min_probability * (1.0 if old is None else _KEPT_PROBABILITY)
-            if pane.probability >= least and self._in_map(pane):
-                believed.append(pane if old is None else old)
+        for pane, old in zip(found, _alike(found, self._drawn)):
+            if old is not None and pane.probability >= _KEPT_PROBABILITY * least:
+                believed.append(old)
+            elif pane.probability >= least and self._in_map(pane):
+                believed.append(pane)
         return believed
 
     def _in_map(self, pane: Pane) -> bool:
@@ -97,8 +99,25 @@ class UnmappedPanes:
             return False
 
 
-def _alike(pane: Pane, other: Pane) -> bool:
-    """The same pane, and hardly longer or elsewhere."""
-    ends, others = np.array([pane.start_m, pane.end_m]), np.array([other.start_m, other.end_m])
-    moved_m = [float(np.hypot(*(ends - each).T).max()) for each in (others, others[::-1])]
-    return min(moved_m) < _SAME_M
+def _alike(panes: Sequence[Pane], drawn: Sequence[Pane]) -> List[Optional[Pane]]:
+    """Of each pane the drawn one that is the same, and hardly shorter or elsewhere; None: there is none."""
+    if not drawn:
+        return [None] * len(panes)
+    ends_m = _ends(panes)[:, None]  # (P, 1, 2, 2)
+    moved_m = np.minimum(*(np.hypot(*np.moveaxis(ends_m - each, -1, 0)).max(axis=-1) for each in _both_ways(drawn)))
+    nearest = moved_m.argmin(axis=1)
+    return [
+        drawn[number] if moved < _SAME_M else None
+        for number, moved in zip(nearest.tolist(), moved_m.min(axis=1).tolist())
+    ]
+
+
+def _both_ways(panes: Sequence[Pane]) -> Tuple[np.ndarray, np.ndarray]:
+    """(P, 2, 2) ends from start to end, and from end to start."""
+    ends_m = _ends(panes)
+    return ends_m, ends_m[:, ::-1]
+
+
+def _ends(panes: Sequence[Pane]) -> np.ndarray:
+    """(P, 2, 2)."""
+    return np.array([[pane.start_m, pane.end_m] for pane in panes], float).reshape(-1, 2, 2)

@@ -25,7 +25,8 @@ from glass_nav.topology.search.search_forest import SearchForest
 from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.vocabulary import SearchState
 
-_MIN_CHECKED = 1.0  # nats for a place that is confirmed, by scans that did not choose it: some 4 m of wall
+_MIN_CHECKED, _MIN_DRIVEN_M = 1.0, 1.0  # before a place is confirmed: nats by scans that did not choose it, which some
+# 4 m of wall give, or a distance over which odometry agreed with it
 _LOST_SEARCHES, _LOST_M = 3, 4.0  # of the whole map, and driven, before it is given up
 _PLACED = 8  # places, the likeliest first, whose node is looked up though it does not match
 _NODE_M, _EDGE_RAD = 0.7, 0.6  # from where a pose expects a meetpoint, and the directions of its edges in the mean
@@ -61,7 +62,7 @@ class JointVerdict:
         if (
             1.0 - share < risk
             and self._scans_agree(belief)
-            and belief.checked_nats[0] >= _MIN_CHECKED
+            and (belief.checked_nats[0] >= _MIN_CHECKED or belief.driven_m >= _MIN_DRIVEN_M)
             and (np.isnan(explained) or explained >= self._params.least_explained)
         ):
             dart = self._on_path(belief.dart[:1])

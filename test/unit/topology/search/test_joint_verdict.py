@@ -43,14 +43,16 @@ def test_no_edge_is_told_where_the_atlas_has_no_such_node(pose: "list[float]", d
     assert joint_verdict.darts_near(CROSS, np.array([pose]), meetpoint).tolist() == [NO_DART]
 
 
-def is_confirmed(scans: "tuple[float, float]", checked: float, graph: "tuple[float, float]" = (0.0, 0.0)) -> bool:
+def is_confirmed(
+    scans: "tuple[float, float]", checked: float, graph: "tuple[float, float]" = (0.0, 0.0), driven_m: float = 0.0
+) -> bool:
     """Of two places with such evidence by scans, by those of them that did not choose the first, and by meetpoints."""
     params, matcher = SearchParams(), Matcher(CROSS, SearchParams().tolerances, use_angles=True)
     nats = np.array(scans) + graph
     poses = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]])
     _, share, elsewhere = belief.places(poses, nats)
     evidence = np.array(scans), np.full(2, checked), np.array(graph), np.ones(2)
-    told = Belief(np.zeros(3), poses, share, elsewhere, *evidence, np.full(2, NO_DART), 5.0, 3)
+    told = Belief(np.zeros(3), poses, share, elsewhere, *evidence, np.full(2, NO_DART), driven_m, 3)
     verdict = JointVerdict(matcher, SearchForest(matcher, 2), PassedEdges(), params)
     final = verdict.final(told, 0)
     return final is not None and final.state == SearchState.CONFIRMED
@@ -70,6 +72,10 @@ def test_scans_must_have_their_part_in_the_lead_over_another_place(
     assert is_confirmed(scans, 5.0, graph) == confirmed
 
 
-@pytest.mark.parametrize("checked, confirmed", [(1.5, True), (0.5, False), (-1.0, False)])
-def test_the_scan_that_chose_a_place_does_not_confirm_it_alone(checked: float, confirmed: bool) -> None:
-    assert is_confirmed((20.0, 5.0), checked) == confirmed
+@pytest.mark.parametrize(
+    "checked, driven_m, confirmed", [(1.5, 0.0, True), (0.5, 0.0, False), (-1.0, 0.9, False), (-1.0, 1.1, True)]
+)
+def test_the_scan_that_chose_a_place_does_not_confirm_it_alone(
+    checked: float, driven_m: float, confirmed: bool
+) -> None:
+    assert is_confirmed((20.0, 5.0), checked, driven_m=driven_m) == confirmed
