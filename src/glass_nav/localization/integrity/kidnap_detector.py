@@ -227,9 +227,7 @@ class KidnapDetector:
     ) -> Verdict:
         """The tracked pose with the best place elsewhere."""
         if np.isnan(candidates.fit):  # the first scan has not been matched everywhere yet
-            return Verdict(
-                self._fit, self._usual, -np.inf, doubted, None, None, None, self._moved, kept, self._given
-            )
+            return Verdict(self._fit, self._usual, -np.inf, doubted, None, None, None, self._moved, kept, self._given)
         here = pose_tracker.same_place(candidates.poses, map_from_base)
         with np.errstate(divide="ignore"):
             log_w = np.log(candidates.weights)
@@ -243,9 +241,7 @@ class KidnapDetector:
         fit_during_search = self._search_fit_m / self._search_m
         steady = self._fit > fit_during_search - _DOUBT[0]
         clear = log_ratio <= -_CLEAR  # scans speak for the tracked pose, whatever it started with
-        settled = clear or (
-            log_ratio <= 0.0 and not self._moved and (not self._given or self._search_m > _TWINS_M)
-        )
+        settled = clear or (log_ratio <= 0.0 and not self._moved and (not self._given or self._search_m > _TWINS_M))
         best_here = steady and (log_ratio < -self._params.search_margin or (settled and self._search_m > _SETTLED_M))
         calm = not self._moved and self._calm_m > _CALM_M and log_ratio < self._params.search_margin
         if best_here and doubted:  # scans fit like this here, until they fit better again
@@ -257,7 +253,9 @@ class KidnapDetector:
         if best_here or (not given and (calm or (log_ratio <= 0.0 and not doubted and not self._moved))):
             self._search = None
             self._moved = self._given = False
-        found = candidates.poses[0] if candidates.found and not here[0] and self.is_fit_for(candidates, points) else None
+        found = (
+            candidates.poses[0] if candidates.found and not here[0] and self.is_fit_for(candidates, points) else None
+        )
         there = None if elsewhere is None else candidates.poses[elsewhere]
         return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates, there, contested, kept, given)
 
