@@ -28,9 +28,9 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 
 def pytest_collection_modifyitems(items: List[pytest.Item]) -> None:
-    """Only short unit tests are traced for coverage: it costs a fifth of the time of a long run, which reaches no more."""
+    """Unit tests alone are traced for coverage: it costs a fifth of the time of the others, which reach no more."""
     for item in items:
-        if UNIT not in item.path.parents or item.get_closest_marker("long_run"):
+        if UNIT not in item.path.parents:
             item.add_marker("no_cover")
 
 

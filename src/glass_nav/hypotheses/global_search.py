@@ -30,7 +30,7 @@ from glass_nav.params import number
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.known_area import KnownArea
-from glass_nav.sensing.scan import Scan, spread_evenly
+from glass_nav.sensing.scan import Scan, one_of_each_piece, spread_evenly
 from glass_nav.world.landmark_map import LandmarkMap
 
 _BEAMS = 60
@@ -269,9 +269,20 @@ def _aligned(field: DistanceField, points: np.ndarray, poses: np.ndarray, noise:
 
 
 def evidence_points(scan: Scan) -> Optional[np.ndarray]:
-    """(B, 2) end points [m], in the robot's frame, of the beams that are evidence; None: too few returned."""
-    beams = spread_evenly(scan.answered, _BEAMS)
-    return scan.points_in_base()[beams] if len(beams) >= MIN_BEAMS else None
+    """(B, 2) end points [m], in the robot's frame, of the beams that are evidence; None: too few returned.
+
+    They are on different pieces of surfaces. Most beams, taken by angle, end at the walls beside the robot, and those of a
+    corridor look the same from everywhere in it.
+    """
+    if np.count_nonzero(scan.answered) < MIN_BEAMS:
+        return None
+    pieces = one_of_each_piece(scan)
+    beams = (
+        pieces[spread_evenly(np.ones(len(pieces)), _BEAMS)]
+        if len(pieces) >= MIN_BEAMS
+        else spread_evenly(scan.answered, _BEAMS)
+    )
+    return scan.points_in_base()[beams]
 
 
 def fit(field: DistanceField, points_m: np.ndarray, poses: np.ndarray, area: Optional[KnownArea] = None) -> np.ndarray:

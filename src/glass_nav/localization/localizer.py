@@ -236,6 +236,7 @@ class Localizer:
             near = start_area.around(self._grid_map, pose[:2], covariance[:2, :2])
             self._search = self._new_search(near) if np.any(self._grid_map.free & near) else None
         if self._search is None:
+            self._kidnap_detector = self._new_kidnap_detector(given=True)
             self._integrity.start(covariance)
 
     def scatter(self, area: Optional[np.ndarray] = None) -> None:
@@ -470,5 +471,5 @@ class Localizer:
         assert matcher is not None  # there are free cells
         return GlobalSearch(matcher, self._field, self._params.search, self._known_area)
 
-    def _new_kidnap_detector(self, usual_fit: Optional[float] = None) -> KidnapDetector:
-        return KidnapDetector(self._field, self._everywhere, self._params.search, usual_fit, self._known_area)
+    def _new_kidnap_detector(self, usual_fit: Optional[float] = None, given: bool = False) -> KidnapDetector:
+        return KidnapDetector(self._field, self._everywhere, self._params.search, usual_fit, self._known_area, given)

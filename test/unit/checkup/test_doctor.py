@@ -262,9 +262,16 @@ def test_a_fault_that_every_message_shows_is_named(request, named, which, name, 
     assert found <= {name} | also
 
 
-@pytest.mark.parametrize("name, change, also", ON_THE_WAY, ids=[name for name, _, _ in ON_THE_WAY])
-def test_a_fault_that_the_drive_shows_is_named(good, named, name, change, also):
-    records, grid_map = good
+@pytest.mark.parametrize(
+    "which, name, change, also",
+    [
+        pytest.param(which, *fault, id=f"{which}-{fault[0]}")
+        for which, some in (("simulated", ON_THE_WAY[::2]), ("real", ON_THE_WAY))
+        for fault in some
+    ],
+)
+def test_a_fault_that_the_drive_shows_is_named(request, named, which, name, change, also):
+    records, grid_map = request.getfixturevalue(which)
     found = named(change()(short(records, FOR_A_DRIVE)), grid_map if name in NEED_A_MAP else None)
     assert name in found
     assert found <= {name} | also

@@ -31,7 +31,7 @@ def robot_at(seed: int, lines: List[str], search: SearchParams = SearchParams())
 @pytest.mark.long_run
 def test_a_robot_finds_its_place_is_localized_and_takes_goals() -> None:
     lines: List[str] = []
-    robot = robot_at(1, lines, SearchParams(confirm_edges=0))
+    robot = robot_at(1, lines, SearchParams(confirm_edges=0, use_scans=False))
     assert robot.restart_search() == "" and robot.takes_goals() and not robot.is_ending()
     assert WakeUpDemo(ATLAS, WakeUpDemoParams(atlas="house", tour=0), robot.heard, robot).run(), lines
     assert any("match node M0: degree " in line for line in lines)

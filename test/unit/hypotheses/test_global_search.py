@@ -9,6 +9,7 @@ import pytest
 from buildings import L_ROOM, SECOND_NS, Building, loop_drive, odometry, off
 
 from glass_nav.geometry import angles, se2
+from glass_nav.hypotheses import global_search
 from glass_nav.hypotheses.global_search import GlobalSearch, SearchParams
 from glass_nav.hypotheses.pose_tracker import same_place
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
@@ -171,6 +172,15 @@ def test_with_too_few_answers_candidates_only_move():
     after = search.update(blind, np.array([0.5, 0.0, 0.0]))
     np.testing.assert_allclose(after.poses, se2.compose(before.poses, np.array([0.5, 0.0, 0.0])), atol=1e-12)
     assert after.lead == before.lead
+
+
+def test_a_person_beside_the_robot_is_little_of_the_evidence():
+    """Half of the beams end at one thing 0.4 m away."""
+    scan = L_ROOM.scan(np.array([2.0, 1.5, 0.3]))
+    hidden = scan.angles_rad > 0.0
+    points = global_search.evidence_points(replace(scan, ranges_m=np.where(hidden, 0.4, scan.ranges_m)))
+    assert np.mean(hidden) > 0.45 and len(points) <= 60
+    assert np.mean(np.hypot(*points.T) < 0.41) < 0.3
 
 
 @pytest.mark.long_run

@@ -25,8 +25,8 @@ def rooms(cells):
     return GridMap(occupancy, 0.05, np.zeros(3))
 
 def localizer(grid_map, particles=100):
-    count = {"min_particles": particles, "max_particles": particles}
-    return Localizer(params.load(LocalizerParams, count, "test"), grid_map, np.random.default_rng(0))
+    values = {"min_particles": particles, "max_particles": particles, "recover_when_lost": False}  # no search runs
+    return Localizer(params.load(LocalizerParams, values, "test"), grid_map, np.random.default_rng(0))
 
 def update(localizer, stamp_ns):
     localizer.set_pose(POSE, np.diag([0.05, 0.05, 0.02]) ** 2)

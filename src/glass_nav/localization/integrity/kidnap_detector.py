@@ -11,6 +11,9 @@ carried away. Of two halls that look alike the one that odometry leads to is rig
 dragged away from it has no advantage. But when the scans say that the robot was moved without driving
 (scan_continuity.py), neither odometry nor the tracked pose says anything about where it is: then the pose is contested
 until it is ahead of all other places.
+
+A pose that was given is a claim. Odometry continues it, and scans fit near it: neither proves it. So it is compared with all
+other places from the first scan on, until it is ahead of them or none has overtaken it over some distance.
 """
 
 from __future__ import annotations
@@ -46,9 +49,11 @@ _KEPT_START = (
 )
 _KEPT = 3.0  # deviations of dead reckoning within which it leads to the tracked pose
 _CARRIED_AWAY = -10.0  # log likelihood ratio of any other place to where odometry leads: for a new pose
+_TWINS_M = 20.0  # after this distance without an end, a given pose is believed though another place fits as well
 _SETTLED_M = 6.0  # after this distance as the best candidate, the fit at the tracked pose is the usual one
 _CALM_M = 2.0  # after this distance of usual fits nothing was wrong
 _CLEAR = 3.0  # log likelihood ratio of the tracked pose to all others: it is trusted though the robot was moved
+_POOR_LEAD = 2.0  # times the margin that a place needs where scans fit worse than they did
 _CLOSE = -1.0  # log likelihood ratio of another place to the tracked pose from which it may be the right one
 
 
@@ -67,6 +72,7 @@ class Verdict:
     kept: bool = (
         False  # odometry leads from the last sure pose to this one, and the robot was not moved without driving
     )
+    given: bool = False  # the tracked pose was not compared with all other places yet
 
     @property
     def fit_there(self) -> float:
@@ -80,8 +86,11 @@ class Verdict:
 
     @property
     def contested(self) -> bool:
-        """The scans fit worse than they used to, or the robot was moved, and they fit about as well or better elsewhere."""
-        return self.moved or (self.doubted and self.log_ratio > _CLOSE)
+        """The scans fit worse than they used to, or the robot was moved, and they fit about as well or better elsewhere.
+
+        A given pose is contested by any place that has overtaken it.
+        """
+        return self.moved or (self.doubted and self.log_ratio > _CLOSE) or (self.given and self.log_ratio > 0.0)
 
 
 class KidnapDetector:
@@ -94,6 +103,7 @@ class KidnapDetector:
         params: SearchParams,
         usual_fit: Optional[float] = None,
         area: Optional[KnownArea] = None,
+        given: bool = False,
     ) -> None:
         """
         Args:
@@ -102,6 +112,7 @@ class KidnapDetector:
             params: whether and when another place is accepted.
             usual_fit: of scans at the pose; None: not known yet.
             area: where the map knows something; None: everywhere.
+            given: somebody gave the pose; False: it comes from a comparison of all places.
         """
         self._field, self._matcher, self._params, self._area = field, matcher, params, area
         self._usual, self._spread = _USUAL_FIT if usual_fit is None else usual_fit, _USUAL_SPREAD
@@ -115,6 +126,7 @@ class KidnapDetector:
         self._odom_from_base: Optional[np.ndarray] = None
         self._continuity = ScanContinuity()
         self._moved = False  # without driving, since the last search that found the tracked pose right
+        self._given = given
         self._verdict = Verdict(float("nan"), self._usual, -np.inf, False, None, None)
 
     def decide_by(self, params: SearchParams) -> None:
@@ -122,6 +134,11 @@ class KidnapDetector:
         self._params = params
         if self._search is not None:
             self._search.decide_by(params)
+
+    @property
+    def _tolerance(self) -> float:
+        """That a fit may be below the usual one without being in doubt."""
+        return max(_DOUBT[0], _DOUBT[1] * self._spread)
 
     @property
     def is_matching(self) -> bool:
@@ -147,31 +164,41 @@ class KidnapDetector:
         points = global_search.evidence_points(scan)
         if points is None:
             return self._verdict
-        known = points if self._area is None else points[self._area.ends(points, map_from_base[None])[0]]
-        if len(known) < global_search.MIN_BEAMS:  # what ends where the map knows nothing agrees with every pose
+        fit = self._fit_at(points, map_from_base)
+        if fit is None:  # what ends where the map knows nothing agrees with every pose
             return self._verdict
-        fit = float(global_search.fit(self._field, known, map_from_base[None])[0])
         self._fit = fit if np.isnan(self._fit) else self._fit + (fit - self._fit) * -np.expm1(-step_m / _FORGET_M)
-        doubted = self._usual - self._fit > max(_DOUBT[0], _DOUBT[1] * self._spread)
+        doubted = self._usual - self._fit > self._tolerance
         matcher = self._matcher if self._params.recover_when_lost else None
         if matcher is not None and self._continuity.observe(scan, odom_from_base, map_from_base):
             self._moved, self._search = True, None  # what a search gathered before is about another place
-        if self._moved:
-            dead_reckoning = None
+        if matcher is None:  # nothing can be compared
+            self._given = False
         kept = dead_reckoning is not None and bool(dead_reckoning.mahalanobis(map_from_base[None])[0] < _KEPT)
-        if matcher is not None and self._search is None and (doubted or self._moved):
+        if self._moved or self._given:
+            dead_reckoning, kept = None, False
+        if matcher is not None and self._search is None and (doubted or self._moved or self._given):
             self._begin_search(matcher, map_from_base, dead_reckoning)
         if self._search is None:
             if not doubted:
                 self._learn(fit, step_m)
-            self._verdict = Verdict(self._fit, self._usual, -np.inf, doubted, None, None, kept=kept)
+            self._verdict = Verdict(
+                self._fit,
+                self._usual,
+                -np.inf,
+                doubted,
+                None,
+                None,
+                kept=kept,
+                given=self._given,
+            )
         else:
             self._search_m += step_m
             self._search_fit_m += step_m * fit
             self._calm_m = 0.0 if doubted else self._calm_m + step_m
             prior = None if dead_reckoning is None else partial(dead_reckoning.log_likelihood, least=_CARRIED_AWAY)
             candidates = self._search.update(scan, odom_from_base, log_prior=prior)
-            self._verdict = self._compare(candidates, map_from_base, doubted, dead_reckoning, kept)
+            self._verdict = self._compare(candidates, points, map_from_base, doubted, dead_reckoning, kept)
             if self._search is not None:
                 self._search.correct(map_from_base)
         return self._verdict
@@ -192,6 +219,7 @@ class KidnapDetector:
     def _compare(
         self,
         candidates: Candidates,
+        points: np.ndarray,
         map_from_base: np.ndarray,
         doubted: bool,
         dead_reckoning: Optional[DeadReckoning],
@@ -199,7 +227,7 @@ class KidnapDetector:
     ) -> Verdict:
         """The tracked pose with the best place elsewhere."""
         if np.isnan(candidates.fit):  # the first scan has not been matched everywhere yet
-            return Verdict(self._fit, self._usual, -np.inf, doubted, None, None, None, self._moved, kept)
+            return Verdict(self._fit, self._usual, -np.inf, doubted, None, None, None, self._moved, kept, self._given)
         here = pose_tracker.same_place(candidates.poses, map_from_base)
         with np.errstate(divide="ignore"):
             log_w = np.log(candidates.weights)
@@ -212,21 +240,44 @@ class KidnapDetector:
         log_ratio = float(log_there - log_w[here].max()) if here.any() else np.inf
         fit_during_search = self._search_fit_m / self._search_m
         steady = self._fit > fit_during_search - _DOUBT[0]
-        ahead = -_CLEAR if self._moved else 0.0
-        best_here = steady and (
-            log_ratio < -self._params.search_margin or (log_ratio <= ahead and self._search_m > _SETTLED_M)
-        )
+        clear = log_ratio <= -_CLEAR  # scans speak for the tracked pose, whatever it started with
+        settled = clear or (log_ratio <= 0.0 and not self._moved and (not self._given or self._search_m > _TWINS_M))
+        best_here = steady and (log_ratio < -self._params.search_margin or (settled and self._search_m > _SETTLED_M))
         calm = not self._moved and self._calm_m > _CALM_M and log_ratio < self._params.search_margin
         if best_here and doubted:  # scans fit like this here, until they fit better again
             self._usual, self._learnt_m = fit_during_search, _PRIOR_M
-        elif self._learnt_m <= _PRIOR_M and here[0] and not self._moved:  # nowhere else do they fit better
+        elif self._learnt_m <= _PRIOR_M and clear:  # nowhere else do they fit as well
             self._usual = min(self._usual, max(self._fit, candidates.fit))
         contested = self._moved and log_ratio > -_CLEAR
-        if best_here or calm or (log_ratio <= 0.0 and not doubted and not self._moved):
-            self._search, self._moved = None, False
-        found = candidates.poses[0] if candidates.found and not here[0] else None
+        given = self._given
+        if best_here or (not given and (calm or (log_ratio <= 0.0 and not doubted and not self._moved))):
+            self._search = None
+            self._moved = self._given = False
+        found = (
+            candidates.poses[0] if candidates.found and not here[0] and self.is_fit_for(candidates, points) else None
+        )
         there = None if elsewhere is None else candidates.poses[elsewhere]
-        return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates, there, contested, kept)
+        return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates, there, contested, kept, given)
+
+    def is_fit_for(self, candidates: Candidates, points: np.ndarray) -> bool:
+        """Scans fit at the best place as they did before, or no other comes near it.
+
+        Where they fit worse, the map lacks a part of what there is to see: the right place may be none of the candidates.
+
+        Args:
+            candidates: the best of them first.
+            points: (B, 2) end points [m] of the present scan, in the robot's frame.
+        """
+        fit = self._fit_at(points, candidates.poses[0])
+        usual = fit is not None and fit >= self._usual - self._tolerance
+        return usual or candidates.lead > _POOR_LEAD * self._params.search_margin
+
+    def _fit_at(self, points: np.ndarray, map_from_base: np.ndarray) -> Optional[float]:
+        """Of the points (B, 2) that end where the map knows something, at a pose (3,); None: they are too few."""
+        known = points if self._area is None else points[self._area.ends(points, map_from_base[None])[0]]
+        if len(known) < global_search.MIN_BEAMS:
+            return None
+        return float(global_search.fit(self._field, known, map_from_base[None])[0])
 
     def _learn(self, fit: float, step_m: float) -> None:
         """How well scans fit where the pose is right, and how much that varies."""

@@ -21,6 +21,7 @@ from glass_nav.vocabulary import LocalizationState
 
 _POSSIBLE = 8.0  # log likelihood ratio of the best place to one that is still counted as possible
 _MIN_RELIABILITY = 0.05  # of a pose that nothing else speaks against
+_MIN_GIVEN = 0.5  # of a given pose that was not compared with all other places yet: not rather wrong than right
 _LOST = 3.0  # log likelihood ratio of another place to the tracked pose
 _KEPT = (
     3.0,
@@ -137,14 +138,22 @@ class PoseQuality:
             return Judgement(LocalizationState.UNCERTAIN, f"{elsewhere}; {explained}; {spread}", confidence)
         if wide or self._inlier_ratio < limits.uncertain_used_share:
             return Judgement(LocalizationState.UNCERTAIN, f"{explained}; {spread}", confidence)
-        doubted = self._verdict is not None and self._verdict.doubted
-        if confidence < (limits.localized_min_reliability if doubted else _MIN_RELIABILITY):
+        if confidence < self._least_confidence():
             return Judgement(
                 LocalizationState.UNCERTAIN,
                 f"the pose is right with a chance of only {confidence:.0%}; {explained}; {spread}",
                 confidence,
             )
         return Judgement(LocalizationState.LOCALIZED, f"{explained}; {spread}", confidence)
+
+    def _least_confidence(self) -> float:
+        """Of a pose that is reported as LOCALIZED."""
+        verdict = self._verdict
+        if verdict is not None and verdict.given:
+            return min(_MIN_GIVEN, self._limits.localized_min_reliability)
+        if verdict is not None and verdict.doubted:
+            return self._limits.localized_min_reliability
+        return _MIN_RELIABILITY
 
 
 def _possible(candidates: Candidates) -> int:

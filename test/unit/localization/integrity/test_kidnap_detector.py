@@ -9,7 +9,8 @@ import pytest
 from buildings import L_ROOM, SECOND_NS, Building, loop_drive, odometry, off
 
 from glass_nav.geometry import se2
-from glass_nav.hypotheses.global_search import SearchParams
+from glass_nav.hypotheses import global_search
+from glass_nav.hypotheses.global_search import Candidates, SearchParams
 from glass_nav.hypotheses.pose_tracker import same_place
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.localization.integrity.dead_reckoning import DeadReckoning
@@ -23,11 +24,11 @@ SQUARE = Building([(0, 0), (6, 0), (6, 6), (0, 6)])
 class Watched:
     """A robot, the pose that is believed, and what the watch says of it after each step."""
 
-    def __init__(self, building=L_ROOM, usual_fit=None, seed=0, **values):
+    def __init__(self, building=L_ROOM, usual_fit=None, seed=0, given=False, **values):
         self.building, self.rng = building, np.random.default_rng(seed)
         grid_map = building.grid_map()
         field = DistanceField(grid_map)
-        self.watch = KidnapDetector(field, ScanMatcher(grid_map, field), SearchParams(**values), usual_fit)
+        self.watch = KidnapDetector(field, ScanMatcher(grid_map, field), SearchParams(**values), usual_fit, given=given)
         self.stamp_ns = 0
         self.searches, self._searching = 0, False
 
@@ -96,6 +97,39 @@ def test_a_pose_that_odometry_leads_to_is_no_poor_one_amid_visitors():
     assert all(verdict.kept for verdict in kept) and not any(verdict.poor or verdict.contested for verdict in kept)
 
 
+def test_a_given_pose_is_compared_with_all_other_places_until_it_is_ahead():
+    true = loop_drive(60)
+    verdicts = Watched(given=True).drive(true, reckoned=true)
+    given = [verdict.given for verdict in verdicts]
+    assert given == sorted(given, reverse=True) and given[0] and not given[-1]
+    assert verdicts[-1].candidates is None and verdicts[-1].kept and not verdicts[0].kept
+    assert not any(verdict.contested or verdict.found is not None for verdict in verdicts)
+
+
+def test_a_wrong_pose_that_was_given_is_contested_though_scans_always_fitted_so_badly_there():
+    true, wrong = carried(30)
+    verdicts = Watched(given=True, usual_fit=0.0).drive(true, wrong, reckoned=wrong)
+    assert not any(verdict.doubted or verdict.kept for verdict in verdicts)
+    first = next(index for index, verdict in enumerate(verdicts) if verdict.contested)
+    assert first < 10 and verdicts[first].given
+    assert any(verdict.found is not None for verdict in verdicts)
+
+
+def test_twins_are_no_reason_to_search_for_ever():
+    """In a square room a place fits as well on every side, however far the robot drives: the word of the operator counts."""
+    verdicts = Watched(SQUARE, given=True).drive(loop_drive(60, (3.0, 3.0)))
+    assert verdicts[0].given and not verdicts[-1].given and verdicts[-1].candidates is None
+    assert not any(verdict.contested for verdict in verdicts)
+
+
+@pytest.mark.parametrize("moved_m, lead, accepted", [(0.0, 9.0, True), (0.4, 9.0, False), (0.4, 17.0, True)])
+def test_where_scans_fit_worse_than_they_did_a_place_needs_twice_the_margin(moved_m, lead, accepted):
+    pose = loop_drive(1)[0]
+    points = global_search.evidence_points(L_ROOM.scan(pose))
+    best = Candidates(pose[None] + [moved_m, moved_m, 0.0], np.ones(1), 0.8, lead, True)
+    assert Watched(usual_fit=0.95).watch.is_fit_for(best, points) == accepted
+
+
 def test_dead_reckoning_vouches_for_no_pose_away_from_it():
     watched = Watched()
     far = [pose + np.array([1.0, 0.0, 0.0]) for pose in loop_drive(3)]
@@ -108,6 +142,7 @@ def test_told_not_to_it_does_not_look_elsewhere():
     verdicts = watched.drive(*carried())
     assert watched.searches == 0 and verdicts[-1].found is None and not verdicts[-1].contested
     assert verdicts[-1].doubted and verdicts[-1].poor
+    assert not any(verdict.given for verdict in Watched(given=True, recover_when_lost=False).drive(loop_drive(3)))
 
 
 @pytest.mark.long_run

@@ -109,6 +109,21 @@ def test_a_scan_without_answers_says_nothing():
     assert judged([0.9, np.nan, np.nan]) == judged([0.9])
 
 
+def test_a_given_pose_that_was_not_compared_with_other_places_must_be_rather_right_than_wrong():
+    told = judgement([0.55] * 3, best(0.1), given=True)
+    assert told.state == "UNCERTAIN" and 0.05 < told.confidence < 0.5
+    assert told.reason.startswith(f"the pose is right with a chance of only {told.confidence:.0%}; ")
+    assert judgement([0.55] * 3, best(0.1)).state == "LOCALIZED"
+    assert judgement([0.9] * 3, best(0.05), given=True).state == "LOCALIZED"
+
+
+def test_a_place_that_overtook_a_given_pose_contests_it():
+    places = dict(candidates=candidates(), elsewhere=np.array([5.0, 1.0, 0.0]))
+    assert judgement([0.9] * 3, given=True, log_ratio=0.5, **places).state == "UNCERTAIN"
+    assert judgement([0.9] * 3, given=True, log_ratio=-0.5, **places).state == "LOCALIZED"
+    assert judgement([0.9] * 3, log_ratio=0.5, **places).state == "LOCALIZED"
+
+
 def test_the_fewer_beams_say_something_the_less_a_scan_counts():
     quality = PoseQuality(LIMITS)
     quality.observe(0.9)
