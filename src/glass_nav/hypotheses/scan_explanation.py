@@ -57,6 +57,12 @@ class ScanExplanation:
         self._near_m = _NEAR_CELLS * grid_map.resolution_m
         self._known_area = KnownArea(grid_map)
 
+    def prepare(self) -> None:
+        """Make now what the first scan would wait for, 0.4 s on a map of two million cells: normals of walls, matcher."""
+        self._caster.cast_surfaces(np.zeros((1, 3)), np.zeros(1), self._near_m)
+        if self._matcher is None:
+            self._matcher = ScanMatcher(self._grid_map, self._field)
+
     def shares(self, scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
         """Of the beams that returned from mapped space, the share that the map explains.
 

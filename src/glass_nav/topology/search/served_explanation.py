@@ -21,6 +21,7 @@ class ServedExplanation:
     def take(self, grid_map: GridMap) -> None:
         """Use this map from now on."""
         self._explanation = ScanExplanation(grid_map)
+        self._explanation.prepare()
 
     @property
     def has_map(self) -> bool:

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
+from glass_nav.hypotheses import scan_explanation
 from glass_nav.hypotheses.scan_explanation import ScanExplanation
 from glass_nav.sensing.scan import Scan
 from glass_nav.topology.search.served_explanation import ServedExplanation
@@ -21,6 +23,13 @@ def test_without_a_map_scans_tell_nothing():
     served = ServedExplanation()
     assert not served.has_map
     assert served.search(SCAN, np.zeros(3)) is None and served.beams(SCAN, POSES, 0.5, 0.5) is None
+
+
+def test_the_map_is_prepared_before_the_first_scan(monkeypatch: pytest.MonkeyPatch) -> None:
+    served = ServedExplanation()
+    served.take(room())
+    monkeypatch.setattr(scan_explanation, "ScanMatcher", None)  # another one cannot be made
+    assert served.search(SCAN, np.zeros(3)) is not None
 
 
 def test_with_a_map_they_tell_what_they_tell_in_that_map():
