@@ -30,9 +30,9 @@ _LOST_FIT, _LOST_SCANS = 0.6, 10  # a pose that fits less is not trusted, and af
 _COVARIANCE = np.diag([0.03**2, 0.03**2, 0.01**2])  # of a pose that fits
 _GLASS_PROBABILITY = 0.9  # of a pane that is named
 _MAX_DOUBT = 0.01  # probability that none of the panes is real, above which none is named
+_MIN_LENGTH_M = 1.5  # of panes, or of a wall that is gone: an open door is shorter
 _LEAST_PASSES, _LEAST_HEAD_ON = 3, 8  # beams through a cell of a wall that is gone, and along the normal of all of it
 _MOST_RETURNS = 0.1  # of a wall that is gone, over the beams that pass
-_MIN_GONE_M = 1.5  # an open door is shorter
 _HEAD_ON_COS = np.cos(np.radians(3.0))
 _BEHIND_M, _AT_WALL_M, _MIN_COS, _MIN_LINEARITY = 0.3, 0.15, 0.3, 0.9
 _NAMED = 3  # places in a finding
@@ -61,8 +61,9 @@ def check(grid_map: GridMap, scans: Sequence[Scan], odom_from_base: np.ndarray) 
     for scan, pose in zip(followed.scans, followed.map_from_base):
         finder.observe(scan, pose, _COVARIANCE)
     panes = [pane for pane in finder.panes() if pane.probability >= _GLASS_PROBABILITY]
-    if np.prod([1.0 - pane.probability for pane in panes]) <= _MAX_DOUBT:
-        yield _glass_not_mapped(panes)
+    length_m = sum(pane.length_m for pane in panes)
+    if length_m >= _MIN_LENGTH_M and np.prod([1.0 - pane.probability for pane in panes]) <= _MAX_DOUBT:
+        yield _glass_not_mapped(panes, length_m)
     gone = _gone_walls(grid_map, followed)
     if gone:
         yield _wall_is_gone(gone)
@@ -154,7 +155,7 @@ def _gone_walls(grid_map: GridMap, followed: Followed) -> List[Tuple[np.ndarray,
         length_m = float(np.hypot(*np.ptp(points, axis=0))) + grid_map.resolution_m
         let_pass = int(head_on_passes[cells].sum())
         answers_nowhere = head_on_returns[cells].sum() <= _MOST_RETURNS * let_pass
-        if length_m >= _MIN_GONE_M and let_pass >= _LEAST_HEAD_ON and answers_nowhere:
+        if length_m >= _MIN_LENGTH_M and let_pass >= _LEAST_HEAD_ON and answers_nowhere:
             walls.append((points.mean(axis=0), length_m))
     return sorted(walls, key=lambda wall: -wall[1])
 
@@ -180,8 +181,7 @@ def _crossings(grid_map: GridMap, followed: Followed) -> np.ndarray:
     return np.array(counts).reshape(4, *grid_map.occupancy.shape)
 
 
-def _glass_not_mapped(panes: Sequence[Pane]) -> Finding:
-    length_m = sum(pane.length_m for pane in panes)
+def _glass_not_mapped(panes: Sequence[Pane], length_m: float) -> Finding:
     longest = sorted(panes, key=lambda pane: -pane.length_m)
     return Finding(
         "glass-not-mapped",

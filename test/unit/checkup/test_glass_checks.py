@@ -47,16 +47,17 @@ def test_glass_that_the_map_lacks_is_named_with_its_length_and_place(drive):
 
 
 @pytest.mark.parametrize(
-    ("probabilities", "named"),
+    ("probabilities", "end_m", "named"),
     [
-        pytest.param((0.98,), False, id="one pane, which one time in fifty is none"),
-        pytest.param((0.995,), True, id="one pane that is certain"),
-        pytest.param((0.92, 0.92), True, id="two panes, one of which is real almost certainly"),
-        pytest.param((0.92, 0.6, 0.6), False, id="panes that are not probable do not count"),
+        pytest.param((0.98,), 2.0, False, id="one pane, which one time in fifty is none"),
+        pytest.param((0.995,), 2.0, True, id="one pane that is certain"),
+        pytest.param((0.995,), 1.0, False, id="one that is no longer than a door"),
+        pytest.param((0.92, 0.92), 1.0, True, id="two panes, one of which is real almost certainly"),
+        pytest.param((0.92, 0.6, 0.6), 2.0, False, id="panes that are not probable do not count"),
     ],
 )
-def test_glass_is_named_once_it_is_certain_that_some_of_it_is_real(monkeypatch, drive, probabilities, named):
-    panes = [found.Pane(np.zeros(2), np.ones(2), probability) for probability in probabilities]
+def test_glass_is_named_once_it_is_certain_that_some_of_it_is_real(monkeypatch, drive, probabilities, end_m, named):
+    panes = [found.Pane(np.zeros(2), np.array([end_m, 0.0]), probability) for probability in probabilities]
 
     class Finder:
         def __init__(self, grid_map):
