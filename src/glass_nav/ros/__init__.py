@@ -1,1 +1,8 @@
 """The only room that knows rospy, tf2 and messages: nodes are wiring."""
+
+import threading
+
+if not hasattr(threading.Thread, "isAlive"):
+    # rospy 1.15.9, which Debian 11 has, calls it when a node ends, and the node would end with a traceback: Python 3.9
+    # knows only the other name.
+    threading.Thread.isAlive = threading.Thread.is_alive  # type: ignore[attr-defined]
