@@ -39,6 +39,7 @@ _MOVED_M, _TURNED_RAD = 0.5, 0.5  # then poses slide to where the scan fits, new
 _SLIDES_M, _SLIDES_RAD = 0.5, np.radians(15.0)  # a pose that is new
 _OFF_M, _OFF_SHARE, _OFF_RAD = 0.2, 0.04, np.radians(10.0)  # a pose carried by odometry: at most, and per metre
 _MAX_BEHIND = 14.0  # log likelihood ratio of the best pose to one that is dropped
+_BY_SCANS = 7.0  # by scans alone; one that is less behind by them is kept, whatever else speaks against it
 _MAX_POSES = 600
 _AT_ONCE, _JUDGED_FIRST = 400, 2000  # poses found that are judged while one scan comes: 60 ms; of the first search
 _TRACED = 40  # new poses that are traced back: up to 0.1 ms for each of the views
@@ -313,7 +314,9 @@ class PoseBelief:
         self.evidence = self.evidence.then(evidence)
 
     def _keep_distinct(self) -> None:
-        self.evidence = self.evidence[self._tracker.keep_distinct(self.evidence.total)]
+        nats = self.evidence.nats
+        held_by_scans = nats >= nats.max(initial=-np.inf) - _BY_SCANS
+        self.evidence = self.evidence[self._tracker.keep_distinct(self.evidence.total, held_by_scans)]
 
 
 class _SearchedScan:

@@ -49,17 +49,19 @@ class PoseTracker:
         """More poses (N, 3), behind those that are followed."""
         self.poses = np.concatenate([self.poses, poses])
 
-    def keep_distinct(self, score: np.ndarray) -> np.ndarray:
+    def keep_distinct(self, score: np.ndarray, has_chance: Optional[np.ndarray] = None) -> np.ndarray:
         """Of poses that have become one keep the best, of all of them those that have a chance, the best first.
 
         Args:
             score: (K,) of the poses, more is better.
+            has_chance: (K,) bool: poses that are kept however far their score is behind; None: there are none.
 
         Returns:
             Indices of the poses that are kept, in their new order.
         """
         order = np.argsort(-score, kind="stable")
-        order = order[score[order] >= score[order[0]] - self._max_behind] if len(order) else order
+        kept = score >= score.max(initial=-np.inf) - self._max_behind
+        order = order[(kept if has_chance is None else kept | has_chance)[order]]
         chosen = order[first_of_each_cell(self.poses[order])][: self._max_poses]
         self.poses = self.poses[chosen]
         return chosen

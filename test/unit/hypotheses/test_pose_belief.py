@@ -110,6 +110,15 @@ def test_poses_are_proposed_by_others_and_weighed_by_what_is_no_scan() -> None:
     assert belief.evidence.label.tolist() == [4, 3]
 
 
+def test_what_is_no_scan_drops_no_pose_that_scans_hold() -> None:
+    belief = begun(world(proposed=[WRONG], wrong=0.9))
+    belief.propose(np.array([TRUTH, WRONG]))
+    behind = belief.evidence.nats.max() - belief.evidence.nats.min()
+    assert len(belief.poses) == 2 and behind < 7.0
+    belief.weigh(np.array([0.0, -100.0]), np.array([3, 4]))
+    assert len(belief.poses) == 2
+
+
 def test_a_scan_without_returns_moves_the_poses_and_tells_nothing() -> None:
     nothing = Scan(0, np.full(3, np.inf), np.zeros(3), 0.1, 10.0, np.zeros(3))
     belief = PoseBelief(world())

@@ -45,6 +45,12 @@ def test_the_best_of_poses_that_became_one_stays_and_the_best_comes_first():
     np.testing.assert_array_equal(tracker.poses, np.array(poses)[[2, 1]])
 
 
+def test_a_pose_that_has_a_chance_by_another_measure_stays_behind_the_others():
+    tracker = tracking()
+    chosen = tracker.keep_distinct(np.array([0.0, -20.0, -20.0]), np.array([False, False, True]))
+    assert chosen.tolist() == [0, 2]
+
+
 def test_of_equal_poses_the_first_stays_and_no_more_than_allowed():
     tracker = tracking(max_poses=2)
     assert tracker.keep_distinct(np.zeros(3)).tolist() == [0, 1]
