@@ -134,7 +134,8 @@ class Publishers:
         try:
             self._broadcaster.sendTransform(message)
         except rospy.ROSException:
-            if not rospy.is_shutdown():  # else the topic was closed while a scan arrived
+            # is_shutdown() is true only some time after the topic was closed
+            if not rospy.core.is_shutdown_requested():
                 raise
 
     def send_trouble(self, estimate: Optional[Estimate], state: LocalizationState, trouble: str) -> None:
