@@ -164,11 +164,7 @@ class LocalizationNode:
 
     def _take_scan(self, msg: LaserScan) -> None:
         self._inbox.put("scans", msg)
-        try:
-            self._outputs.send_transform_again(conversions.ns_from_stamp(msg.header.stamp), rospy.Time.now().to_nsec())
-        except rospy.ROSException:  # the topic was closed meanwhile
-            if not rospy.is_shutdown():
-                raise
+        self._outputs.send_transform_again(conversions.ns_from_stamp(msg.header.stamp), rospy.Time.now().to_nsec())
 
     def _command(self, handle: Callable[[Any], None]) -> Callable[[Any], None]:
         return lambda msg: self._inbox.put("commands", lambda: handle(msg))
