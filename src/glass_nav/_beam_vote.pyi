@@ -97,7 +97,6 @@ class WallCells:
         cell: np.ndarray,  # (B,) int
         axis_rad: np.ndarray,  # (B,) float64
         opaque: np.ndarray,  # (B,) bool
-        resolution_m: float,
         grid_yaw_rad: float,
         prior: float,
         limit: float,

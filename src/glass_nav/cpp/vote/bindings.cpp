@@ -220,13 +220,12 @@ py::array_t<double> glass_chances(const WallCells& walls, const Array<float>& lo
 }
 
 py::array_t<bool> gone(const WallCells& walls, const Array<float>& log_odds, const Array<std::int64_t>& cell,
-                       const Array<double>& axis_rad, const Array<bool>& opaque, double resolution_m,
-                       double grid_yaw_rad, double prior, double limit, double opaque_prior, double opaque_limit,
-                       double spread, int reach) {
+                       const Array<double>& axis_rad, const Array<bool>& opaque, double grid_yaw_rad, double prior,
+                       double limit, double opaque_prior, double opaque_limit, double spread, int reach) {
   if (axis_rad.size() != cell.size() || opaque.size() != cell.size()) {
     throw std::invalid_argument("cells, axes and which are opaque must be (B,)");
   }
-  const Openings openings{resolution_m, grid_yaw_rad, prior, limit, opaque_prior, opaque_limit, spread, reach};
+  const Openings openings{grid_yaw_rad, prior, limit, opaque_prior, opaque_limit, spread, reach};
   py::array_t<bool> found(shape_of(cell));
   for (py::ssize_t i = 0; i < cell.size(); ++i) {
     found.mutable_data()[i] =
@@ -315,8 +314,8 @@ PYBIND11_MODULE(_beam_vote, module) {
       .def(py::init(&make_walls), py::arg("wall"), py::arg("rows"), py::arg("columns"))
       .def("chances", &glass_chances, py::arg("log_odds"), py::arg("through"), py::arg("there"), py::arg("cell"))
       .def("gone", &gone, py::arg("log_odds"), py::arg("cell"), py::arg("axis_rad"), py::arg("opaque"),
-           py::arg("resolution_m"), py::arg("grid_yaw_rad"), py::arg("prior"), py::arg("limit"),
-           py::arg("opaque_prior"), py::arg("opaque_limit"), py::arg("spread"), py::arg("reach"))
+           py::arg("grid_yaw_rad"), py::arg("prior"), py::arg("limit"), py::arg("opaque_prior"),
+           py::arg("opaque_limit"), py::arg("spread"), py::arg("reach"))
       .def("learn", &learn_glass, py::arg("log_odds").noconvert(), py::arg("crossed").noconvert(), py::arg("cell"),
            py::arg("evidence"), py::arg("spread"), py::arg("scan_share"), py::arg("limit"));
   module.def("evidence", &evidence, py::arg("measured_m"), py::arg("case"), py::arg("first_m"), py::arg("seen_through"),

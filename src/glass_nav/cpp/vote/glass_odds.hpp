@@ -54,7 +54,7 @@ void learn_crossings(const WallCells& walls, const Crossings& crossings, const G
 
 /// When a wall is gone.
 struct Openings {
-  double resolution_m, grid_yaw_rad;
+  double grid_yaw_rad;
   double prior;                       // log odds that what can be seen through is there
   double limit;                       // chance of being there below which it is gone
   double opaque_prior, opaque_limit;  // the same for what cannot be glass

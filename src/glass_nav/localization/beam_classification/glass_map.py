@@ -148,7 +148,6 @@ class GlassMap:
             cell,
             axis_rad,
             opaque,
-            self._resolution_m,
             self._grid_yaw_rad,
             self._prior[1, 0],
             _GONE,
