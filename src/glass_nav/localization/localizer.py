@@ -359,7 +359,7 @@ class Localizer:
         self._filter.weigh(scan, cases, registration, self._classifier)
         self._filter.estimate()
         self._filter.resample()
-        if not self._filter.has_evidence:
+        if not registration.fits:
             self._keep_to_odometry()
         suspect = self._filter.suspect
         self._integrity.update(
@@ -367,7 +367,7 @@ class Localizer:
             self._filter.best.map_from_base,
             step,
             self._params.odometry,
-            registration.fits,
+            registration.worth,
             None if suspect is None else se2.compose(suspect, odom_from_base),
         )
         return cases

@@ -39,7 +39,12 @@ class PoseCovariance:
         self._noise_scale = np.ones(3)  # of the variances along, across and of the heading
 
     def update(
-        self, step: Optional[np.ndarray], map_from_base: np.ndarray, fit: Optional[FitInformation], noise: OdometryNoise
+        self,
+        step: Optional[np.ndarray],
+        map_from_base: np.ndarray,
+        fit: Optional[FitInformation],
+        noise: OdometryNoise,
+        worth: float = 1.0,
     ) -> None:
         """The particles were moved.
 
@@ -48,10 +53,11 @@ class PoseCovariance:
             map_from_base: (3,) the pose after it.
             fit: of the scan there; None: the scan says nothing about the pose.
             noise: of odometry.
+            worth: of the fit as evidence about odometry, 0..1.
         """
         if step is not None and self._last is not None:
             if fit is not None:
-                self._learn(step, map_from_base, noise)
+                self._learn(step, map_from_base, noise, 1.0 - worth * (1.0 - _MEMORY))
             self._at_update = self.carried(step, noise)
         if fit is not None:
             self._at_update = better_of(self._at_update, fit.covariance)
@@ -67,7 +73,7 @@ class PoseCovariance:
             return self._at_update
         return DeadReckoning(self._last, self._at_update).carried(step, noise, self._noise_scale).covariance
 
-    def _learn(self, step: np.ndarray, map_from_base: np.ndarray, noise: OdometryNoise) -> None:
+    def _learn(self, step: np.ndarray, map_from_base: np.ndarray, noise: OdometryNoise, memory: float) -> None:
         """How large this correction is in the model of odometry."""
         assert self._last is not None
         predicted = DeadReckoning(self._last, np.zeros((3, 3))).carried(step, noise)
@@ -77,7 +83,7 @@ class PoseCovariance:
         variance = np.diag(turned.T @ predicted.covariance @ turned)
         known = variance > 1e-10
         squared = np.minimum((turned.T @ off)[known] ** 2 / variance[known], _MAX_CORRECTION**2)
-        scale = _MEMORY * self._noise_scale[known] + (1.0 - _MEMORY) * squared
+        scale = memory * self._noise_scale[known] + (1.0 - memory) * squared
         self._noise_scale[known] = np.maximum(scale, _MIN_SCALE)
 
 

@@ -17,7 +17,14 @@ from glass_nav.hypotheses.scan_alignment import Alignment
 from glass_nav.localization.beam_classification.beam_classifier import BeamClassifier
 from glass_nav.localization.beam_classification.case_votes import BeamCases
 from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
-from glass_nav.localization.particle_filter import importance_weights, motion, pose_estimate, proposal, resampling
+from glass_nav.localization.particle_filter import (
+    importance_weights,
+    motion,
+    pose_estimate,
+    proposal,
+    resampling,
+    scan_registration,
+)
 from glass_nav.localization.particle_filter.importance_weights import BeamMixture
 from glass_nav.localization.particle_filter.motion import OdometryNoise
 from glass_nav.localization.particle_filter.odometry_prior import OdometryPrior
@@ -62,6 +69,7 @@ class Registration:
     beams: int  # that were aligned
     fits: bool  # as scans usually do: what is seen from there may be learnt
     contradicts_odometry: bool = False  # a wheel may have slipped
+    worth: float = 0.0  # of the scan's fit there as evidence, 0..1
 
 
 class ParticleFilter:
@@ -200,7 +208,14 @@ class ParticleFilter:
         prior = OdometryPrior(best.map_from_base, best.covariance if covariance is None else covariance, slip)
         found = self._with_held(found, points, prior, residuals)
         return Registration(
-            found.poses[0], np.zeros((3, 3)), best, found, len(beams), finder.fits, finder.contradicts_odometry
+            found.poses[0],
+            np.zeros((3, 3)),
+            best,
+            found,
+            len(beams),
+            finder.fits,
+            finder.contradicts_odometry,
+            scan_registration.worth(found.fit[0]) if finder.fits else 0.0,
         )
 
     def weigh(self, scan: Scan, cases: BeamCases, registration: Registration, classifier: BeamClassifier) -> None:
@@ -268,6 +283,11 @@ class ParticleFilter:
             last_scale_m=scale_m,
         )
         held = scan_alignment.at(self._field, points_m, poses, scale_m)
+        near = max(float(held.fit[0]), float(scan_alignment.fit(self._field, points_m, prior.map_from_base[None])[0]))
+        kept = prior.reaches(found.poses) | scan_registration.explains_more(found.fit, near)
+        if not kept.any():
+            return held
+        found = Alignment(found.poses[kept], found.information[kept], found.fit[kept])
         both = np.concatenate([held.poses, found.poses[:1]])
         log_w = importance_weights.by_field(self._field, both, points_m, residuals, self._params.mixture)
         held_log_p, best_log_p = (log_w + prior.log_density(both)).tolist()
