@@ -373,7 +373,7 @@ class Localizer:
         return cases
 
     def _keep_to_odometry(self) -> None:
-        """The scan says nothing about the place: where the scans before led the pose astray, odometry has it back."""
+        """The scan hardly fits: where such scans led the pose astray, odometry has it back."""
         reckoned = self._dead_reckoning
         if reckoned is not None and reckoned.mahalanobis(self._filter.best.map_from_base[None])[0] > _ASTRAY:
             self._filter.move_to(reckoned.map_from_base)

@@ -111,7 +111,7 @@ class IntegrityMonitor:
         if self._covariance is None:
             return spread
         carried = self._covariance.carried(step, noise)
-        covariance = widened_by(carried, spread)
+        covariance = widened_by(carried, spread) + self._covariance.unproven
         if self._now is not None:
             beside = _beside(self._now, carried)
             excess = max(0.0, 1.0 - 4.0 / max(beside**2, 1e-9))  # that is not chance

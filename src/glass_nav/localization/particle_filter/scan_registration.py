@@ -10,7 +10,9 @@ Where the scan leaves a direction free, as in a hall whose ends are out of sight
 a wheel slipped is considered only if the scan says so: it does not fit where odometry leads, and does nearby.
 
 A scan that hardly fits at all, as where the map lacks what is around the robot, fits best at walls that have nothing to
-do with it: it is no evidence, until a scan fits about as well as scans have fitted on the whole.
+do with it: it is no evidence, until a scan fits about as well as scans have fitted on the whole. A scan of which less than
+half fits is evidence only within reach of odometry: one half is the breakdown point of robust estimators (Rousseeuw, Least
+median of squares regression, Journal of the American Statistical Association 79, 1984).
 """
 
 from __future__ import annotations
@@ -45,7 +47,7 @@ _LEVELS = (  # limits of the starts' spread: as predicted, a bad step of odometr
     ),
 )
 _POOR_FIT = 0.75  # of the usual fit: odometry is not trusted
-_HALF, _MOST = 0.5, 0.75  # of a scan: what the map explains less of may fit anywhere by chance (breakdown point of every estimator)
+_HALF, _MOST = 0.5, 0.9  # of a scan that fits: its fit may be chance; it is not
 _REACH = 3.0  # deviations
 _MIN_DEVIATION = np.array([0.01, 0.01, np.radians(0.2)])  # of odometry: m, m, rad
 _CONVINCING_FIT = 0.9  # of the usual fit: a place that odometry did not lead to

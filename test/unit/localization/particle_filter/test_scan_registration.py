@@ -7,6 +7,7 @@ import pytest
 from buildings import CORRIDOR, L_ROOM, Building, loop_drive, off
 
 from glass_nav.geometry import se2
+from glass_nav.localization.particle_filter import scan_registration
 from glass_nav.localization.particle_filter.scan_registration import ScanRegistration
 from glass_nav.sensing.distance_field import DistanceField
 
@@ -232,3 +233,36 @@ def test_scans_that_fit_ever_worse_do_not_make_a_bad_fit_convincing(l_room):
         points[elsewhere] = robot.rng.uniform(-8.0, 8.0, (elsewhere.sum(), 2))
         way_m, turn_rad = off(robot.find(odometry_at(true), points).poses[0], true)
         assert way_m < 0.05 and turn_rad < np.radians(2.0)
+
+
+@pytest.mark.parametrize(
+    ("fit", "near", "believed"),
+    [
+        pytest.param(0.95, 0.4, True, id="a robot that slipped"),
+        pytest.param(0.75, 0.3, True, id="a robot that slipped among some people"),
+        pytest.param(0.54, 0.3, False, id="most of the scan is not in the map, here as there"),
+        pytest.param(0.95, 0.92, False, id="it fits where odometry leads"),
+    ],
+)
+def test_a_place_elsewhere_has_to_explain_half_of_what_does_not_fit(fit, near, believed):
+    assert scan_registration.explains_more(np.array([fit]), near)[0] == believed
+
+
+def test_a_scan_is_worth_the_more_the_more_of_it_fits():
+    worth = [scan_registration.worth(fit) for fit in (0.3, 0.5, 0.7, 0.8, 0.9, 1.0)]
+    assert worth[:2] == [0.0, 0.0]
+    assert worth[4:] == [1.0, 1.0]
+    assert 0.0 < worth[2] < worth[3] < 1.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_scan_of_which_less_than_half_fits_is_not_believed(l_room, seed):
+    """A map that lacks most of what the robot sees: what fits of it may fit by chance."""
+    true = np.array([2.0, 1.6, 0.7])
+    robot = Robot(l_room, true, seed)
+    points = robot.points(true)
+    unmapped = robot.rng.permutation(len(points))[: 2 * len(points) // 3]
+    points[unmapped] *= robot.rng.uniform(0.3, 0.7, (len(unmapped), 1))
+    robot.find(odometry_at(true), points)
+    assert not robot.anchor.fits
+    assert robot.anchor.suspect is None
