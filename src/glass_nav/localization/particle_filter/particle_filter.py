@@ -284,7 +284,7 @@ class ParticleFilter:
         )
         held = scan_alignment.at(self._field, points_m, poses, scale_m)
         near = max(float(held.fit[0]), float(scan_alignment.fit(self._field, points_m, prior.map_from_base[None])[0]))
-        kept = prior.reaches(found.poses) | scan_registration.explains_more(found.fit, near)
+        kept = prior.reaches(found.poses) | (found.fit >= scan_registration.least_fit_elsewhere(near))
         if not kept.any():
             return held
         found = Alignment(found.poses[kept], found.information[kept], found.fit[kept])

@@ -120,7 +120,7 @@ class ScanRegistration:
     def _is_convincing(self, fit: float, fit_near: float) -> bool:
         """Of a place that odometry did not lead to: what fits badly on the way there does not lower it much."""
         usual = fit > _CONVINCING_FIT * max(self._usual_fit, _POOR_FIT * self._lasting_fit)
-        return usual and explains_more(fit, fit_near)
+        return bool(usual and fit >= least_fit_elsewhere(fit_near))
 
     def _confirmed(
         self, suspect: Optional[np.ndarray], odom_from_base: np.ndarray, points_m: np.ndarray
@@ -165,13 +165,13 @@ def worth(fit: float) -> float:
     return float(np.clip((fit - _HALF) / (_MOST - _HALF), 0.0, 1.0)) ** 2
 
 
-def explains_more(fit: np.ndarray, fit_near: float) -> np.ndarray:
-    """Whether a place with that fit explains half of what does not fit where odometry leads.
+def least_fit_elsewhere(fit_near: float) -> float:
+    """Fit that a place needs which odometry did not lead to: half of what does not fit where odometry leads fits there.
 
     A robot that slipped sees all of it explained. What the map lacks, people and panes, stays unexplained anywhere: then a
     place elsewhere that fits a little better does so by chance.
     """
-    return fit - fit_near >= _EXPLAINED * (1.0 - fit_near)
+    return fit_near + _EXPLAINED * (1.0 - fit_near)
 
 
 def _within(poses: np.ndarray, mean: np.ndarray, deviations: np.ndarray) -> np.ndarray:
