@@ -345,9 +345,7 @@ class Localizer:
         reckoned = self._dead_reckoning
         if reckoned is not None and step is not None:
             reckoned = reckoned.carried(step, self._params.odometry)
-        verdict = self._kidnap_detector.observe(
-            scan, odom_from_base, map_from_base, reckoned, self._schedule.period_s
-        )
+        verdict = self._kidnap_detector.observe(scan, odom_from_base, map_from_base, reckoned, self._schedule.period_s)
         self._quality.doubt(verdict)
         return verdict
 
