@@ -17,9 +17,9 @@ from glass_nav.topology.search.distinguishability import Distinguishability
 from glass_nav.topology.search.matching import Tolerances
 from glass_nav.world import map_file
 
-HELP = "validate an atlas, and list places that are indistinguishable"
-DESCRIPTION = """Checks every rule of an atlas, then sends a robot without errors through the search from everywhere:
-which places are indistinguishable from which, and how many edges a robot needs at most and on average."""
+HELP = "validate an atlas, and list places that look alike"
+DESCRIPTION = """Checks every rule of an atlas. Then simulates the search of a robot without measurement errors from all
+starts, and reports which places are indistinguishable and how many edges a robot needs at most and on average."""
 EXAMPLES = (
     "glass_nav atlas check glass_office",
     "glass_nav atlas check atlas/floor --map floor.yaml",
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "atlas", metavar="ATLAS", help="atlas.json, atlas.npz, the folder of one, or the name of a shipped one"
     )
-    parser.add_argument("--map", type=Path, help="the atlas must be one of this map")
+    parser.add_argument("--map", type=Path, help="also check that the atlas was made from this map")
     parser.add_argument("--params", type=Path, metavar="FILE", help="yaml of parameters, names as for topology_node")
     parser.add_argument(
         "--starts",

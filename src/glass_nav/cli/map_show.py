@@ -10,7 +10,7 @@ from glass_nav.evaluation.plots import panes_picture
 from glass_nav.world import map_file, panes_file
 
 HELP = "show a map with its panes"
-DESCRIPTION = "Writes a PNG: the map, and over it the panes of a file by number and probability."
+DESCRIPTION = "Writes a PNG of the map with the panes of a file, by number and probability."
 EXAMPLES = ("glass_nav map show floor.yaml --panes panes.yaml --out pictures",)
 
 

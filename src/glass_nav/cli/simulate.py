@@ -38,10 +38,9 @@ COMPLETE, ERASING = MAPPERS = ("complete", "erasing")
 _MAPPER_STREAM = 0x3A99E4  # of the seed, for the noise of the mapping drive
 
 HELP = "drive a robot through a building of glass and record a bag"
-DESCRIPTION = """Drives a robot along a path through a building, and writes a bag of what it records (/scan, /odom, /tf,
-/clock) with the truth beside (/ground_truth, /true_beams: the case of every beam), and the map of the building.
-Needs no roscore. The same seed gives the same bag. Real mappers erase glass; --glass-erased and --mapper do so to the
-map, and leave the bag as it is: its truth is in terms of the whole building."""
+DESCRIPTION = """Drives a simulated robot along a path through a building. Writes a bag (/scan, /odom, /tf, /clock) with the
+ground truth (/ground_truth, /true_beams: the case of every beam), and the map of the building. Needs no roscore. The same
+seed gives the same bag. --glass-erased and --mapper omit glass from the map, as real mappers do; the bag does not change."""
 EXAMPLES = (
     "glass_nav simulate glass_office --seed 1 --out simulated",
     "glass_nav simulate glass_bridge --lidar coated --speed 0.4 --out bridge.bag",
@@ -103,7 +102,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=0.0,
         metavar="S",
-        help="from the first beam of a scan to the last one, while the robot moves on; default 0",
+        help="time from the first beam of a scan to the last one, while the robot moves; s, default 0",
     )
     parser.add_argument("--beams", type=int, metavar="N", help="of a scan; default: the preset's")
     parser.add_argument("--echo", choices=ECHOES, help="which echo the lidar reports; default: the preset's")
