@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=1,
         metavar="N",
-        help="runs at a time, a process each (default 1; more need the Python package distributed); changes no result",
+        help="runs at a time, a process each (default 1); changes no result",
     )
     parser.add_argument(
         "--scheduler",

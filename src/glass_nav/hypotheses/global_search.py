@@ -125,6 +125,7 @@ class GlobalSearch:
         odom_from_base: np.ndarray,
         bearings: Sequence[Tuple[LandmarkBearings, LandmarkMap]] = (),
         log_prior: Optional[Callable[[np.ndarray], np.ndarray]] = None,
+        period_s: Optional[float] = None,
     ) -> Candidates:
         """One more scan; a scan with too few returns only moves the candidates.
 
@@ -133,6 +134,7 @@ class GlobalSearch:
             odom_from_base: (3,) odometry at its stamp.
             bearings: from the robot's pose at the scan, each with the landmarks that they are of.
             log_prior: poses (K, 3) of the robot at this scan -> (K,) log likelihoods of what else is known of them.
+            period_s: from one scan to the next; None: not known.
         """
         self._move(odom_from_base)
         points = evidence_points(scan)
@@ -142,7 +144,7 @@ class GlobalSearch:
             if self._places is None and (not self._searched or self._is_due(points)):
                 self._places = PlaceSearch(self._matcher, self._field, points, odom_from_base)
                 self._since_places = np.zeros(2)
-            if self._places is not None and self._places.advance():
+            if self._places is not None and self._places.advance(period_s):
                 self._take_in(self._places.places(odom_from_base), points)
         if self._searched:
             for taken, landmarks in bearings:

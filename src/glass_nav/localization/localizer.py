@@ -345,7 +345,7 @@ class Localizer:
         reckoned = self._dead_reckoning
         if reckoned is not None and step is not None:
             reckoned = reckoned.carried(step, self._params.odometry)
-        verdict = self._kidnap_detector.observe(scan, odom_from_base, map_from_base, reckoned)
+        verdict = self._kidnap_detector.observe(scan, odom_from_base, map_from_base, reckoned, self._schedule.period_s)
         self._quality.doubt(verdict)
         return verdict
 
@@ -381,7 +381,9 @@ class Localizer:
     def _find(self, scan: Scan, odom_from_base: np.ndarray) -> BeamCases:
         """The pose is not known: follow all places where it may be. The particles are those places."""
         assert self._search is not None
-        candidates = self._search.update(scan, odom_from_base, self._bearings_from(odom_from_base))
+        candidates = self._search.update(
+            scan, odom_from_base, self._bearings_from(odom_from_base), period_s=self._schedule.period_s
+        )
         self._quality.follow_search(candidates)
         if candidates.found:
             return self._settle(scan, odom_from_base, candidates.poses[0], candidates.fit)

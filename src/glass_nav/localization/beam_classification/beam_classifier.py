@@ -59,6 +59,7 @@ class BeamClassifier:
     def __init__(self, params: BeamClassifierParams, grid_map: GridMap) -> None:
         self._params = params
         self.caster = RayCaster(grid_map, params.raycast_backend, params.raycast_threads)
+        self.caster.walls_at(np.zeros(0, np.int32))  # works out all normals now: that takes longer than a scan may wait
         self.known_area = KnownArea(grid_map)
         self.thickness_m = wall_thickness.wall_thickness(grid_map)  # (H * W,)
         self._opaque = np.flatnonzero(free_standing.walls(grid_map, params.vote.glass_max_thickness_m))  # flat cells

@@ -151,6 +151,7 @@ class KidnapDetector:
         odom_from_base: np.ndarray,
         map_from_base: np.ndarray,
         dead_reckoning: Optional[DeadReckoning] = None,
+        period_s: Optional[float] = None,
     ) -> Verdict:
         """One more scan and the tracked pose after it; with too few returns the verdict stays.
 
@@ -159,6 +160,7 @@ class KidnapDetector:
             odom_from_base: (3,) odometry at its stamp.
             map_from_base: (3,) the tracked pose.
             dead_reckoning: from the last sure pose to this scan; None: no pose was sure yet.
+            period_s: from one scan to the next; None: not known.
         """
         step_m = self._distance(odom_from_base)
         points = global_search.evidence_points(scan)
@@ -197,7 +199,7 @@ class KidnapDetector:
             self._search_fit_m += step_m * fit
             self._calm_m = 0.0 if doubted else self._calm_m + step_m
             prior = None if dead_reckoning is None else partial(dead_reckoning.log_likelihood, least=_CARRIED_AWAY)
-            candidates = self._search.update(scan, odom_from_base, log_prior=prior)
+            candidates = self._search.update(scan, odom_from_base, log_prior=prior, period_s=period_s)
             self._verdict = self._compare(candidates, points, map_from_base, doubted, dead_reckoning, kept)
             if self._search is not None:
                 self._search.correct(map_from_base)
