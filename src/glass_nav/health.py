@@ -1,4 +1,4 @@
-"""What a node tells its operators about itself: the entries of /diagnostics, free of ROS."""
+"""The entries of /diagnostics, without ROS."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A line of the log, as what decides hands it to what writes it."""
+"""A log line, passed from the code that decides to the node that writes it."""
 
 from __future__ import annotations
 

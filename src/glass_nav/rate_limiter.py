@@ -1,4 +1,4 @@
-"""Limits how often a thing is done; the caller says what time it is."""
+"""Limits how often something is done; the caller gives the time."""
 
 from __future__ import annotations
 

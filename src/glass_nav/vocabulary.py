@@ -1,4 +1,4 @@
-"""The words and colours of the package: beam cases, states of localization and search, phases and outcomes of the driver.
+"""Names and colours of beam cases, states of localization and search, phases and outcomes of the driver.
 
 Every terminal line, picture, report, rviz display and message takes its names, its order and its colours from here. The
 numbers of the beam cases are those of the glass document (glass_localization.txt) and of msg/BeamCases.msg; the order of

@@ -1,4 +1,4 @@
-"""What a robot says, and its map -> what is wrong, and what to do about it: calls the checks, in their order."""
+"""Runs all checks on the recorded messages of a robot and its map: faults, with remedies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a check found, and what to do about it."""
+"""A fault that a check found, and its remedy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Odometry and the lidar's place on the robot, against how the lidar moved by its own scans. N pairs of scans."""
+"""Checks odometry and the lidar's mounting against the motion between scans. N pairs of scans."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a lidar's driver writes: angles, limits, ranges, and how it says that a beam met nothing. B beams, S scans."""
+"""Checks what the driver of a lidar sends: angles, limits, ranges, and how no return is encoded. B beams, S scans."""
 
 from __future__ import annotations
 

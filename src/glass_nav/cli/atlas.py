@@ -1,4 +1,4 @@
-"""glass_nav atlas: what can be done with an atlas without a robot, a module for each."""
+"""glass_nav atlas: commands for atlases, a module for each. Need no robot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""glass_nav atlas check: is the file valid, and which places are indistinguishable?"""
+"""glass_nav atlas check: validates an atlas, and lists indistinguishable places."""
 
 from __future__ import annotations
 

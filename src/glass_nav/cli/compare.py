@@ -1,4 +1,4 @@
-"""glass_nav compare: runs, parameters or recorded poses side by side, with confidence over seeds."""
+"""glass_nav compare: compares runs, parameter sets or recorded poses, with confidence intervals."""
 
 from __future__ import annotations
 

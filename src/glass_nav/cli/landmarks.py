@@ -1,4 +1,4 @@
-"""glass_nav landmarks: what positions from landmark bearings will be worth, and where one more tag helps most."""
+"""glass_nav landmarks: expected accuracy of positions from landmarks, and where to add landmarks."""
 
 from __future__ import annotations
 

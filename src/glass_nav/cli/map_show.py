@@ -1,4 +1,4 @@
-"""glass_nav map show: a map with its panes as a picture."""
+"""glass_nav map show: draws a map with its panes as a picture."""
 
 from __future__ import annotations
 

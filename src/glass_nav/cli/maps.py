@@ -1,4 +1,4 @@
-"""glass_nav map: the glass that a map lacks, a module for each thing to do about it."""
+"""glass_nav map: commands for glass that a map lacks, a module for each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The parser of glass_nav: examples at the end of each --help, and suggestions for a mistyped subcommand."""
+"""The parser of glass_nav: examples at the end of each --help, and suggestions for mistyped subcommands."""
 
 from __future__ import annotations
 

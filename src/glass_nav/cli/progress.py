@@ -1,4 +1,4 @@
-"""How far a long job is: a bar on a terminal, a line every few seconds elsewhere. Writes to stderr only."""
+"""Progress of a long job: a bar on a terminal, a line every few seconds elsewhere. Writes to stderr only."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""glass_nav replay: a recorded robot through the filter, and how well it went. No roscore."""
+"""glass_nav replay: runs the filter over a recorded log, and scores it. No roscore."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""glass_nav simulate: a robot drives through a building of walls and glass, and a bag records it. No roscore."""
+"""glass_nav simulate: drives a simulated robot through a building with glass and records a bag. No roscore."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The runs behind a comparison, and one of these runs from start to end."""
+"""The runs of a comparison, and how one of them is done."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Over which logs a comparison goes: those of --log BAG=MAP and those of a list in yaml."""
+"""The logs of a comparison: those of --log BAG=MAP and those of a yaml list."""
 
 from __future__ import annotations
 

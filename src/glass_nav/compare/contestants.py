@@ -1,4 +1,4 @@
-"""Who takes part in a comparison: results of replays, parameters, or poses that a log has."""
+"""The contestants of a comparison: results of replays, parameters, or poses recorded in a log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the demo has heard of a robot that wakes up, by the stamps of the reports."""
+"""The reports that the demo has received from a robot that wakes up, by stamp."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the driver decides, for others to carry out: commands, reports, results, requests, lines of the log."""
+"""The decisions of the driver, for a node to carry out: commands, reports, results, requests, log lines."""
 
 from __future__ import annotations
 

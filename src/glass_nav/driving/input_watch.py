@@ -1,4 +1,4 @@
-"""Scans, odometry, localization: what was heard last, and why the robot cannot be driven by it.
+"""Watches scans, odometry and localization: what came last, and why the robot cannot drive.
 
 Times are those of the data's clock, as the caller gives them.
 """

@@ -1,4 +1,4 @@
-"""The meetpoint where the robot stands: what it answers to, when it is reported again, whether the robot was moved."""
+"""The meetpoint where the robot stands: valid answers, when it is reported again, whether the robot was moved."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A goal in the map that a running move_base drives to.
+"""A goal in the map that is delegated to move_base.
 
 It is sent once move_base is there, called off while the driver has no scan, no odometry or no pose, and sent again after
 that. A move_base that falls silent, because it was killed or hangs, ends the goal after the driver's patience.

@@ -1,4 +1,4 @@
-"""Scans of a robot that knows its pose -> the nodes of the atlas that it passed, as it saw them.
+"""The nodes of the atlas that a localized robot passed, with what it measured there.
 
 A robot that searches learns from the meetpoints where it stops; one that drives to a goal passes many more. What it saw
 of them is observed as by edge_tracking/passing.py. A node counts as missed only if no graph around it had any.

@@ -1,4 +1,4 @@
-"""A goal in the map -> the task that drives there, or one line that says why none can."""
+"""Turns a goal in the map into the task that drives there, or says in one line why it cannot."""
 
 from __future__ import annotations
 

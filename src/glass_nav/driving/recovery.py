@@ -1,4 +1,4 @@
-"""Blocked -> what to try: wait, back off, turn in place, the next choice, abort. Each step can be called off at once.
+"""Recovery of a blocked robot: wait, back off, turn in place, next choice, abort. Each step can be cancelled.
 
 A state machine without a clock of its own. After each step that moves the robot's view of things the drive is tried
 again (RETRY); one that comes far enough forgets what was tried before. Velocities (3,) forward, left [m/s], turn

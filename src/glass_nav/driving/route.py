@@ -1,4 +1,4 @@
-"""atlas, pose, goal -> the shortest path along edges: darts, and a polyline in the frame map.
+"""The shortest path along the edges of the atlas from a pose to a goal.
 
 A robot may stand beside the graph, and so may its goal: the path begins at the nearest point of the nearest edge that is
 reached in a straight line, and ends likewise. Dijkstra's shortest path, by scipy. N nodes, E edges, darts as in

@@ -1,4 +1,4 @@
-"""When a driver seeks a meetpoint by itself: at the start, for a search that waits, where an edge led nowhere."""
+"""When the driver seeks a meetpoint by itself: at the start, for a waiting search, after an edge that led nowhere."""
 
 from __future__ import annotations
 

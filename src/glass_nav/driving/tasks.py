@@ -1,4 +1,4 @@
-"""What somebody asked the driver to do: an edge, or a place of the map. A command at each step, then an outcome.
+"""The tasks of the driver: along an edge, or to a goal in the map. A command at each step, then an outcome.
 
 Recovery is part of a task: what blocks the robot is waited for, backed off from, looked around at and driven round,
 each step to be called off at any time. Velocities (3,) forward, left [m/s], turn [rad/s].

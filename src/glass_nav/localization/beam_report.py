@@ -1,4 +1,4 @@
-"""What the beams of a scan say at the reported pose: what each met, the scan cut at glass, how much the map explains."""
+"""The beams of a scan at the reported pose: case of each, the scan cut at glass, share explained by the map."""
 
 from __future__ import annotations
 

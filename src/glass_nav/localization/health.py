@@ -1,4 +1,4 @@
-"""How well the localization is doing, for /diagnostics: the pose, the scans, the beams, the time, the map."""
+"""The entries of the localization for /diagnostics: pose, scans, beams, time, map."""
 
 from __future__ import annotations
 

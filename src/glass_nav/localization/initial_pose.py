@@ -1,4 +1,4 @@
-"""Where the robot starts: by default, in AMCL's names, and as somebody says."""
+"""The initial pose: default, AMCL's parameters, or as requested."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which pose the localization starts from: the one given last, the one of the pose file, or the default."""
+"""Chooses the initial pose: the one given last, the one of the pose file, or the default."""
 
 from __future__ import annotations
 

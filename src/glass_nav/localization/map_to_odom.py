@@ -1,4 +1,4 @@
-"""Scans as they arrive, corrections as they are computed -> when tf map -> odom is sent, with which stamp.
+"""When tf map -> odom is sent, and with which stamp, from scans and corrections as they arrive.
 
 Navigation asks tf for "now" and does not wait. So the last correction is sent again the moment a scan arrives, before the
 filter has worked on it, and the new correction follows when it is computed. Each transform is stamped ahead of its scan

@@ -1,4 +1,4 @@
-"""Panes that the map lacks, and the glass map: told to people, and kept in a file for the next run on the same map."""
+"""Reports the panes that the map lacks, and stores them with the glass map in a file for the next run."""
 
 from __future__ import annotations
 

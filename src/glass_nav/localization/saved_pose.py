@@ -1,4 +1,4 @@
-"""The last pose of a robot in a file, for the next start, and whether it is still valid then.
+"""The file with the last pose of a robot, and the check whether it is still valid at the next start.
 
 It is valid if the map is the same, it is not too old, and odometry either continues from it or began anew when the
 robot was switched on.

@@ -1,4 +1,4 @@
-"""What the localization node decides: when a localizer begins and where, when it starts over, and what is missing."""
+"""The decisions of the localization node: when a localizer starts and where, when it restarts, what is missing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What has to be started, for somebody who launched the localization alone."""
+"""Hints which programs to start, for users who launched the localization alone."""
 
 from __future__ import annotations
 

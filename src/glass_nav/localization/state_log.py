@@ -1,4 +1,4 @@
-"""What is logged about the state of the localization: each change once, with where and why."""
+"""The log lines about the state of the localization: each change once, with place and reason."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scans at trusted poses -> a bounded memory of them: one for each place and heading of the robot, the newest.
+"""A bounded memory of scans at trusted poses: the newest for each place and heading of the robot.
 
 Each scan is kept on a fixed circle of directions, whatever the lidar. S scans, D directions.
 """

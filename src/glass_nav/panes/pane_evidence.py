@@ -1,4 +1,4 @@
-"""A line, kept scans -> is it a pane?
+"""Decides from the kept scans whether a line is a pane.
 
 Pieces of the line are looked up in every scan that saw them: a beam returned there, passed, or ended before. A pane
 returns what comes along its normal and lets the rest pass; a thing returns what comes from anywhere; clutter and people

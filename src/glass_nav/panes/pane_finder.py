@@ -1,4 +1,4 @@
-"""Scans at trusted poses -> the panes that the map lacks, each with its probability.
+"""Finds the panes that the map lacks, each with its probability, from scans at trusted poses.
 
 A beam that ended in front of the first mapped surface met something that the map lacks, and time shows what: a pane
 answers within some degrees of its normal only, wherever the robot looks at it head-on, and lets beams pass at other

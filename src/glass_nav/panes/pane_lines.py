@@ -1,4 +1,4 @@
-"""Returns that the map does not explain -> lines that they trace.
+"""Finds lines among the returns that the map does not explain.
 
 A pane returns beams near its normal only: a beam that came back from it says where the pane is and how it runs. Each
 return votes for the lines through it that are nearly at right angles to its beam (Hough transform with known

@@ -1,4 +1,4 @@
-"""Returns of mapped walls -> how bright walls are for this lidar -> does a return stand out from them?
+"""Learns the intensity of mapped walls, and tells which returns are brighter.
 
 Drivers give intensities in units of their own, of which some fall with range and incidence, some were corrected for it,
 and some are a constant. What the map explains shows which: mean and deviation of the intensities of walls are learnt while

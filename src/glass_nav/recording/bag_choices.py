@@ -1,4 +1,4 @@
-"""A bag and what was asked for -> the topic of the scans, the frames, and where odometry and mountings come from.
+"""Chooses topics, frames, odometry and mountings of a bag, as requested or by what it contains.
 
 What was not asked for is found where there is one candidate, or one with the usual name; each choice is noted.
 """

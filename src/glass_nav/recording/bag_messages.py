@@ -1,4 +1,4 @@
-"""A bag of ROS 1 or ROS 2 -> messages, through rosbags 0.9.23 or later: no ROS is needed.
+"""Reads the messages of a bag of ROS 1 or ROS 2 with rosbags 0.9.23 or later: no ROS is needed.
 
 Several bags of ROS 1 are read as the one run that `rosbag record --split` cut them from: merged by the time of
 recording.

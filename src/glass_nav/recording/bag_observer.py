@@ -1,4 +1,4 @@
-"""A bag -> Observed: every scan, transform and odometry message as it was recorded."""
+"""Reads every scan, transform and odometry message of a bag as recorded."""
 
 from __future__ import annotations
 

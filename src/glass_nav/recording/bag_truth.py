@@ -1,4 +1,4 @@
-"""A bag -> the truth that it knows: where the robot was in the map, and what each beam met."""
+"""Reads the ground truth of a bag: poses in the map, and true cases of the beams."""
 
 from __future__ import annotations
 

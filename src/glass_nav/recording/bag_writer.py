@@ -1,4 +1,4 @@
-"""A simulated robot -> a ROS 1 bag as of a real robot, plus the ground truth.
+"""Writes a simulated robot as a ROS 1 bag, with the ground truth.
 
 /scan, /odom, /tf (odom -> base_link), /joint_states (of two wheels), /tf_static (base_link -> laser), /clock; and the truth: /ground_truth in the
 frame map, /true_beams with the stamps of /scan.

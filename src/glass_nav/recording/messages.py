@@ -1,4 +1,4 @@
-"""Definitions of our messages, and of those that bags of ROS 2 may not bring along; for rosbags 0.9.23 and later."""
+"""Definitions of our messages, and of those that bags of ROS 2 may lack; for rosbags 0.9.23 and later."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a bag has been played, in words: at its start, every few seconds, and at its end."""
+"""The progress of a playing bag as log lines: at the start, every few seconds, and at the end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The results of a replay -> a ROS 1 bag for rviz and PlotJuggler: topics, types and frames of the running node.
+"""Writes the results of a replay as a ROS 1 bag for rviz and PlotJuggler, as the running node would publish them.
 
 The bag is complete: it has the map, tf from map to laser, and the scans. Stamps are those of the scans, map -> odom included, so
 that nothing lies ahead of its data. Not compressed: the player of ROS cannot read what rosbags compresses by lz4.

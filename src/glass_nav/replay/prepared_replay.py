@@ -1,4 +1,4 @@
-"""Options -> a log, a map and a filter, ready to run."""
+"""Prepares a replay: log, map and filter, from its options."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The filter's answers, scan by scan, into the bag of `glass_nav replay --bag`."""
+"""Writes the output of the filter into the bag of `glass_nav replay --bag`."""
 
 from __future__ import annotations
 

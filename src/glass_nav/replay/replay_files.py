@@ -1,4 +1,4 @@
-"""A replay and the files that it leaves: results, glass map, pictures, a bag, and what it passed of an atlas."""
+"""Runs a replay and writes its files: results, glass map, pictures, a bag, nodes passed."""
 
 from __future__ import annotations
 

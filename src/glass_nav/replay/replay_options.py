@@ -1,4 +1,4 @@
-"""What a replay is asked for; the options of `glass_nav replay`, without the command line."""
+"""The options of `glass_nav replay`, without the command line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Logs -> the panes that their map lacks.
+"""Finds the panes that a map lacks in recorded logs.
 
 A log is read twice: first through the filter, whose sure poses are smoothed, then scan by scan into the finder. A stretch
 on which the filter was not sure, because the glass that the map lacks is all that there is to see, counts as far as

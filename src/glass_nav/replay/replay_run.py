@@ -1,4 +1,4 @@
-"""A recording through the filter, scan by scan: the loop of the replay. Drops nothing, knows no clock."""
+"""The loop of a replay: every scan of a recording through the filter. Drops nothing, uses no clock."""
 
 from __future__ import annotations
 

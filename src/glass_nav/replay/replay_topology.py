@@ -1,4 +1,4 @@
-"""glass_nav replay --topology: which nodes of an atlas a recorded robot drove through, and which of them it saw.
+"""glass_nav replay --topology: which nodes of an atlas a recorded robot passed, and which of them it detected.
 
 The robot's eyes are those of the driver (driving/edge_tracking/passing.py), which knows no map; they are compared with the atlas
 where the robot truly was.

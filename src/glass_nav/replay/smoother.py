@@ -1,4 +1,4 @@
-"""All scans and odometry steps of a log -> the trajectory that they agree on best.
+"""Smooths a trajectory over all scans and odometry steps of a log.
 
 Maximum a posteriori smoothing on SE(2), by Gauss-Newton, after Thrun, Burgard, Fox, Probabilistic Robotics (2005), ch. 11:
 odometry ties each pose to the next, the likelihood field of the map ties each scan to the walls. Both are robust

@@ -1,4 +1,4 @@
-"""Pose -> the bearings that it would give, and how they change with it. N bearings; poses (..., 3).
+"""The bearings expected at a pose, and their derivatives. N bearings; poses (..., 3).
 
 The bearing to a landmark at L, taken by a sensor at the place o and turned by psi on the robot (both change from
 bearing to bearing while the robot drives and the sensor turns), is

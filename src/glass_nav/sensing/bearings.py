@@ -1,4 +1,4 @@
-"""Directions in which landmarks were seen, N of them, and where on the robot's path each was taken."""
+"""Directions in which landmarks were seen, N of them, and where on the path each was measured."""
 
 from __future__ import annotations
 

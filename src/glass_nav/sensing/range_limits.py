@@ -1,4 +1,4 @@
-"""How far a lidar sees: its range_max, or what its scans show where the driver sets no limit.
+"""The longest range of a lidar: its range_max, or what its scans show if the driver sets no limit.
 
 pointcloud_to_laserscan writes range_max inf by default, other drivers the largest float. B beams.
 """

@@ -1,4 +1,4 @@
-"""GridMap, poses -> what beams would meet: the face of the compiled modules _grid and _mrpt_rays.
+"""Ray casts on a GridMap: the Python interface of the compiled modules _grid and _mrpt_rays.
 
 P poses, B beams, H rows and W columns of the map. Poses are in the frame map, beam angles in the frame of their
 pose; a cell is named by its flat index row * W + column. Ranges are exact: the length of the ray from its origin

@@ -1,4 +1,4 @@
-"""A lidar's message or record + transforms -> a scan with its place on the robot, its odometry, and deskewed.
+"""Makes a scan from a message or record: its pose on the robot, its odometry, and deskewed.
 
 Every scan enters here, whether the robot runs, a bag is read, or a scan is looked up by its stamp. B beams.
 """

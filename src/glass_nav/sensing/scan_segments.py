@@ -1,4 +1,4 @@
-"""Scan -> the line segments that its beams draw, with how well each line is known.
+"""Line segments in a scan, with the accuracy of each line.
 
 Split and merge (geometry/segments.py) over the end points in their order around the robot, cut where neighbours are far
 apart; then each line is fitted once more, every point weighing by how well a beam that meets a wall at that angle gives

@@ -1,4 +1,4 @@
-"""Building, lidar, pose -> one scan and the truth about each of its beams.
+"""Simulates one scan of a lidar in a building with glass, with the true case of each beam.
 
 Every beam has several return paths: from each pane on its path, from the surface behind them, and by reflection in the
 first or the second glazing. Each path has an echo power (reference figures: Fresnel for panes, Lambert for diffuse

@@ -1,4 +1,4 @@
-"""Building, lidar, robot, wheels -> what a robot records as it drives, and the ground truth.
+"""Simulates a driving robot with lidar and odometry, and records the ground truth.
 
 One seed determines everything: the moved furniture, the lidar's noise, the robot's wheels. The same seed gives the same
 bytes, and the noise of one part does not depend on the draws of another. Times are simulated; nothing waits.

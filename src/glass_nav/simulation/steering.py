@@ -1,4 +1,4 @@
-"""Who steers the simulated robot, and when its time advances."""
+"""Steers the simulated robot by cmd_vel or a path, and decides when its time advances."""
 
 from __future__ import annotations
 

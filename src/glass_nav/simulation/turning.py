@@ -1,4 +1,4 @@
-"""A lidar that takes its beams one after the other while the robot moves, in sectors of some milliseconds each."""
+"""Simulates the sweep of a rotating lidar on a moving robot, in sectors of some milliseconds each."""
 
 from __future__ import annotations
 

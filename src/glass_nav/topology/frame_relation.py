@@ -1,4 +1,4 @@
-"""A confirmed meetpoint -> where the robot's environment frame lies in the atlas.
+"""The pose of the robot's environment frame in the atlas, from a confirmed meetpoint.
 
 Seed document global_localization_procedure.txt: the localization is complete if one place is left "and the robot has
 enough information to determine its environment frame's relation to the solution meetpoint's frame". The environment

@@ -1,4 +1,4 @@
-"""GridMap, panes -> the same map with the panes drawn in; every other cell is untouched."""
+"""Draws panes into a copy of a map; every other cell stays as it is."""
 
 from __future__ import annotations
 

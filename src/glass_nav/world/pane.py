@@ -1,4 +1,4 @@
-"""A pane of glass that the map lacks: where it is, and how it was seen."""
+"""A pane of glass that the map lacks: its position, and the evidence for it."""
 
 from __future__ import annotations
 

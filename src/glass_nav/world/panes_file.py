@@ -1,4 +1,4 @@
-"""panes.yaml -> the panes that one map lacks, and back; with arrays that a node keeps over restarts.
+"""Reads and writes panes.yaml: the panes that a map lacks, and arrays that a node keeps over restarts.
 
 The file names its map by the fingerprint: panes of another map are refused.
 """

@@ -1,4 +1,4 @@
-"""GridMap -> line segments of its walls as seen from free space.
+"""Fits line segments to the walls of a map as seen from free space.
 
 The outline of free space is followed face by face, a face being a side between a free cell and another. Segments are
 fitted to the centres of the occupied cells behind the faces: beams that end at a wall draw it there. Glass is a wall.

@@ -1,4 +1,4 @@
-"""Where the robot was, the local graph -> what it reports: Meetpoint and Traversal.
+"""Measures what the robot reports of its path: Meetpoint and Traversal.
 
 Measured as the atlas builder measures: lengths along the smooth line of the edge from node to node, directions from a
 node to the point BEARING_AT_M along.

@@ -1,4 +1,4 @@
-"""What the edge driver does just now: its phase, the line it drives along, and what it found out on that."""
+"""The current state of the edge driver: its phase, its line, and what it has measured so far."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The Voronoi graph around the robot: where the robot is on it, what lies ahead, which branches leave a node.
+"""The Voronoi graph around the robot: its position on it, the way ahead, the branches of a node.
 
 Coordinates are those of the grid, odom. A line (n, 2) runs from where the robot is along an edge to a node.
 """

@@ -1,4 +1,4 @@
-"""Scans, odometry -> a small grid of what is around the robot, in which glass stands.
+"""A small occupancy grid around the robot, made of scans and odometry, that contains glass.
 
 A single scan shows a pane only where beams meet it almost at right angles, and what lies behind everywhere else. So
 each cell counts by the direction of the beams how many ended in it and how many passed it, and stands if they end

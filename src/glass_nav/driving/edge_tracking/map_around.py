@@ -1,4 +1,4 @@
-"""Scans, odometry -> the grid around the robot that its graph is made of: a coarser one in a hall too wide for the window.
+"""The grid from which the local graph is made: coarser in halls too wide for the window.
 
 A window that ends before the walls of a hall do shows ways between its own edge and a wall, which go with the robot: it
 would follow them for ever. A coarser map has as many cells, takes over what the fine one knows, and is given

@@ -1,4 +1,4 @@
-"""Scans, odometry -> the meetpoints that a robot drives past, whoever steers it.
+"""Detects the meetpoints that a robot drives past, whatever steers it.
 
 What the edge driver looks at, watched without driving: the graph of the same local map, by the same code. The driver
 homes to a node and looks until some graphs agree; a robot that only drives past has the graphs that were made on its

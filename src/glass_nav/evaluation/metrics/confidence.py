@@ -1,4 +1,4 @@
-"""How sure a mean is: Student's t over repeated runs, a weighted sum of groups by Welch and Satterthwaite.
+"""Confidence intervals of means: Student's t over repeated runs, groups combined by Welch and Satterthwaite.
 
 Student, The probable error of a mean, Biometrika 6 (1908); Welch, The generalization of "Student's" problem when
 several different population variances are involved, Biometrika 34 (1947).

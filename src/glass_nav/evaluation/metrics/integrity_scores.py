@@ -1,4 +1,4 @@
-"""Does the filter know when it is wrong?  Claims about each pose against the truth.
+"""Scores integrity: the state and protection level of each pose against its true error.
 
 As in satellite navigation: a pose that is reported as LOCALIZED while its error exceeds the protection level is misleading
 information. S scans. A scan without a reference counts in no figure.

@@ -1,4 +1,4 @@
-"""Nodes that a robot drove past: those of an atlas against those that it saw. Seen, missed, false positives.
+"""Compares the nodes of an atlas that a robot passed with those that it detected: seen, missed, false positives.
 
 Both by one rule: a node is passed if the robot came within `near(r)` of it, in sight. Passing it again, after the robot
 has been `linger_m` further away than that, counts again. What was seen belongs to a node of the atlas if it lies within

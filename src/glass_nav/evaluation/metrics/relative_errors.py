@@ -1,4 +1,4 @@
-"""How far relative motion is off: over a distance, over a time, and the absolute error after an alignment.
+"""Errors of relative motion over a distance and over a time, and the absolute error after alignment.
 
 The definitions are evo's (Grupp, evo, https://github.com/MichaelGrupp/evo): its relative pose error (RPE) over all pairs
 that are DISTANCE_M of the estimated path apart, to 10 %, or as many scans apart as TIME_S has; translation part and

@@ -1,4 +1,4 @@
-"""What a replay gives: a row per scan, the cases of every beam, and the figures of the whole run.
+"""The result of a replay: a row per scan, the cases of every beam, and the figures of the whole run.
 
 S scans that the filter took, B beams of the widest of them.
 """

@@ -1,4 +1,4 @@
-"""Limits on the figures of a run, as CI wants them: `position_p95_m>0.3` fails a run that is worse."""
+"""Limits on the figures of a run, for CI: `position_p95_m>0.3` fails a run that is worse."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scan, a rough pose, a map -> the answer of the service ~locate. The wall segments of a map are found once."""
+"""Answers the service ~locate. The wall segments of a map are extracted once."""
 
 from __future__ import annotations
 

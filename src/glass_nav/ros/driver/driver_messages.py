@@ -1,4 +1,4 @@
-"""What the driver reports, and is asked for <-> messages."""
+"""Conversions of the reports and tasks of the driver to and from messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The private parameters of the localization node: the parameter server -> validated dataclasses.
+"""The private parameters of the localization node, from the parameter server to validated dataclasses.
 
 Names and defaults are AMCL's where AMCL has the parameter. Parameters of AMCL without a meaning for
 this filter are removed first, so that launch files written for amcl load. Other unknown names are rejected with the

@@ -1,4 +1,4 @@
-"""Encoder counts from their topics -> odometry, in place of tf's; sensing/wheel_odometry.py adds them up."""
+"""Odometry from topics with encoder counts, in place of tf; sensing/wheel_odometry.py integrates them."""
 
 from __future__ import annotations
 

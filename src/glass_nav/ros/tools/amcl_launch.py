@@ -1,4 +1,4 @@
-"""A launch file that starts amcl -> the parameters of localization_node, each line explained. Needs no roscore.
+"""Reads the parameters of amcl from a launch file and translates them, with a comment on each. No roscore.
 
 roslaunch's own loader reads the file, so includes, args, groups, rosparam files and substitutions mean what they mean
 on the robot. Started by `glass_nav params` as a process of its own:

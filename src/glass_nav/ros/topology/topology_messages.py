@@ -1,4 +1,4 @@
-"""Messages of the topology node <-> observations and estimates."""
+"""Conversions of the messages of the topology node to and from observations and estimates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""atlas.json: a row for each node and each edge, for people and editors.
+"""Reads and writes atlas.json: a row for each node and each edge, for people and editors.
 
 atlas/atlas.schema.json is its JSON Schema; the checks here are those of the schema. Lengths are kept to a tenth of a
 millimetre, angles to a hundredth of a milliradian.

@@ -1,4 +1,4 @@
-"""atlas.npz: the arrays of an atlas as they are, every bit."""
+"""Reads and writes atlas.npz: the arrays of an atlas, exact to the bit."""
 
 from __future__ import annotations
 

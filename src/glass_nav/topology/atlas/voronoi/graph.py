@@ -1,4 +1,4 @@
-"""Meetpoints and lines in cells -> the graph in metres, in the frame of the map."""
+"""Converts meetpoints and lines from cells to metres in the frame of the map."""
 
 from __future__ import annotations
 

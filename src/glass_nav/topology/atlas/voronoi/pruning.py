@@ -1,4 +1,4 @@
-"""Ridges -> chains of them without the twigs that end in corners."""
+"""Removes the branches of the Voronoi ridges that end in corners."""
 
 from __future__ import annotations
 
