@@ -1,8 +1,8 @@
-"""Scans, odometry -> the pieces of wall that a scan shows for the first time.
+"""The pieces of wall that a scan shows for the first time.
 
-What a scan says of a pose is no new evidence if earlier scans have said it: the same cupboard that was moved contradicts
-the true pose in every scan, and the same two parallel walls support a wrong one. So evidence is counted by pieces of
-wall, each once, however often it is seen. B beams, S pieces.
+The same observation is not new evidence in later scans: one cupboard that was moved contradicts the true pose in
+every scan, and two parallel walls support a wrong pose in every scan. So each piece of wall counts once, however
+often it is seen. B beams, S pieces.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
-"""Poses, odometry, scores -> the same poses further on, each place once, the best first.
+"""Follows many poses by odometry and scans: duplicates are merged, the best comes first.
 
-What everything shares that follows many poses at once: GlobalSearch and PoseBelief, whose scores are log likelihoods.
-K poses.
+Common to GlobalSearch and PoseBelief, whose scores are log likelihoods. K poses.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""A scan, poses that it may come from -> the share of its beams that the map explains from each, glass included.
+"""The share of the beams of a scan that the map explains, glass included, at each of many poses.
 
-A beam is explained if it ended at one of the ranges that the five cases expect: the first surface along it, the next
-ones behind if the walls before are thin enough for glass, or the mirrored one (seed document glass_localization.txt).
-So beams that passed panes do not rule a candidate out, and a wall at any distance does not support it. A beam that
-ended in unmapped space is no evidence, unless it crossed a wall too thick for glass: the mapper was not there. Nor did
-he see the back of a wall, so a beam that comes to it from there may end before the face that is drawn. Each pose may
-first slide to where the scan fits best, since it is known to about a decimetre.
+A beam is explained if it ended at one of the ranges of the five cases: at the first surface, at a later one if the
+walls before are thin enough for glass, or at the mirrored range (seed document glass_localization.txt). So beams that
+passed panes do not rule a pose out, and a wall at another distance does not support it. A beam that ended in unmapped
+space is no evidence, unless it crossed a wall too thick for glass. The mapper did not see the back of walls either,
+so a beam that reaches one from behind may end before the face that is drawn. Each pose may first be registered to the
+scan, since it is known to about a decimetre.
 """
 
 from __future__ import annotations

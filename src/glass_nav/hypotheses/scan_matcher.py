@@ -1,10 +1,10 @@
-"""GridMap, scan -> all poses from which the scan may have been taken, with no initial pose.
+"""Finds all poses of the map from which a scan may have been taken, without an initial pose.
 
-Correlative scan matching (Olson (2009)) of the beams' end points against a likelihood field, over every position
-and heading, by branch and bound (Hess, Kohler, Rapp, Andor (2016)): the face of MatchGrid and ScanSearch in the compiled
-module _grid. It ignores what the beams passed and which wall they met, so it proposes poses and judges none. On a
-large map that takes longer than a robot may wait for its pose, so a search can be done in slices. Their size is
-a count of look-ups and no time, so that a replay gives the same answer.
+Correlative scan matching (Olson (2009)) of the beams' end points against a likelihood field, over every position and
+heading, by branch and bound (Hess, Kohler, Rapp, Andor (2016)): the Python interface of MatchGrid and ScanSearch in
+the compiled module _grid. It ignores what the beams passed and which wall they met, so it proposes poses and does not
+judge them. On a large map that takes longer than a robot may wait for its pose, so a search can be done in slices. A
+slice is a number of look-ups, not a time, so that a replay gives the same result.
 """
 
 from __future__ import annotations

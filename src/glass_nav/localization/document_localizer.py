@@ -1,10 +1,10 @@
-"""ODOMETRY -> SAMPLES -> CASES -> WEIGHTS -> POSE: the glass document alone (`method: document`).
+"""The algorithm of the glass document alone (`method: document`), for comparison with localizer.py.
 
-Seed document glass_localization.txt, sec. III.A, and nothing beside it, for comparison with localizer.py: preliminary
-samples stand around the pose that odometry predicts, each votes for one of the four expected ranges, the case with the
-highest vote wins whatever its share, and the particles are weighed by the ranges of these cases, cast from each of them.
-No scan registration, no glass map, no search, no kidnap detector. What the document does not give (its text breaks off
-at step 1) is as in `vote_mode: paper` and `weight_mode: ranges`.
+Seed document glass_localization.txt, sec. III.A. Preliminary samples around the pose predicted by odometry vote for
+one of the four expected ranges of each beam. The case with the most votes wins, whatever its share. Particles are
+weighted by the ranges of these cases, cast from each particle. There is no scan registration, glass map, global
+search or kidnap detector. What the document does not give (its text breaks off at step 1) is as in `vote_mode: paper`
+and `weight_mode: ranges`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""SCAN -> CASES -> WEIGHTS -> POSE: Monte Carlo localization that knows glass.
+"""Monte Carlo localization in buildings with glass: scan -> cases of the beams -> weights -> pose.
 
 The filter of Thrun, Burgard, Fox, Probabilistic Robotics (2005), ch. 8, with the sensor model of the seed document
-glass_localization.txt: decide beam by beam what the beam met, then weigh the particles by the beams that are understood.
+glass_localization.txt: each beam is first classified by what it met, then the particles are weighted by the beams
+whose case is known.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The file with the last pose of a robot, and the check whether it is still valid at the next start.
 
-It is valid if the map is the same, it is not too old, and odometry either continues from it or began anew when the
-robot was switched on.
+The pose is valid if the map is the same, it is not too old, and odometry either continues from it or started from
+zero when the robot was switched on.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""SCAN -> EXPECTED RANGES -> CASES -> GLASS MAP: what did each beam of a scan meet?
+"""Classifies the beams of a scan: expected ranges -> cases -> glass map.
 
-The steps of the seed document glass_localization.txt in their order, with what is learnt while driving: where in the
-walls of this map beams end, and which of its walls are glass. B beams.
+The steps of the seed document glass_localization.txt in their order, with two things that are learnt while driving:
+where in the walls of this map beams end, and which of its walls are glass. B beams.
 """
 
 from __future__ import annotations

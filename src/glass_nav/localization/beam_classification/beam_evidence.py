@@ -1,8 +1,8 @@
-"""Scan, cases -> how much of the scan speaks for the pose, and how much against it?
+"""Which beams of a scan support the pose, and which contradict it.
 
-A beam that a case explains speaks for the pose. One that ended in front of everything mapped, or behind a surface that
-lets no beam pass, speaks against it. One that ended where the map knows nothing, in an unmapped room or outdoors,
-says nothing, unless it crossed a wall on its way; it crosses a pane freely. B beams.
+A beam supports the pose if a case explains it. It contradicts the pose if it ended in front of all mapped surfaces,
+or behind a surface that lets no beam pass. A beam that ended in unmapped space, in an unmapped room or outdoors, is
+no evidence, unless it crossed an opaque wall. B beams.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Beams that passed or ended at walls -> probability of glass for each wall cell.
+"""Learns the probability of glass of each wall cell from beams that passed it or ended there.
 
-A wall seldom lets a beam through, a pane mostly does except at normal incidence, and where a mapped object is gone
-every beam passes. Every beam that crossed a mapped surface is evidence on two questions: can the surface be seen
-through, and is it still there? Each answer is kept as log odds per cell. The seed document glass_localization.txt has
-no such memory (it decides cases scan by scan); the formulation is ours. H rows, W columns, B beams.
+A wall seldom lets a beam pass, a pane mostly does except at normal incidence, and every beam passes where a mapped
+object is gone. Each beam that crossed a mapped surface is evidence on two questions: can the surface be seen through,
+and is it still there? Both are kept as log odds per cell. The seed document glass_localization.txt has no such memory
+(it decides cases scan by scan); the formulation is ours. H rows, W columns, B beams.
 """
 
 from __future__ import annotations

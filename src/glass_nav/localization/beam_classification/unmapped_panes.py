@@ -1,7 +1,7 @@
-"""Scans at trusted poses -> panes that the map lacks, drawn into a second map beside it.
+"""Adds panes that the map lacks to a second map beside it, from scans at trusted poses.
 
-The finder is panes/pane_finder.py. A pane that is probable enough becomes a surface for the beam classifier; the map
-itself, on which everything else relies, never changes.
+They are found by panes/pane_finder.py. A pane that is probable enough becomes a surface for the beam classifier. The
+map itself, which everything else uses, never changes.
 """
 
 from __future__ import annotations

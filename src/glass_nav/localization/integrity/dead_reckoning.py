@@ -1,8 +1,8 @@
-"""Last sure pose, odometry -> where the robot can be without asking the scans.
+"""Dead reckoning from the last certain pose, as a prior over places.
 
-A prior over places: where two halls look alike, scans cannot say in which of them the robot is, but the distance driven
-since the pose was last sure can. The covariance grows by the noise of odometry, linearized as in Thrun, Burgard, Fox,
-Probabilistic Robotics (2005), sec. 7.4.2. K poses.
+Where two halls look alike, scans cannot tell in which of them the robot is, but the distance driven since the last
+certain pose can. The covariance grows by the noise of odometry, linearized as in Thrun, Burgard, Fox, Probabilistic
+Robotics (2005), sec. 7.4.2. K poses.
 """
 
 from __future__ import annotations

@@ -1,19 +1,18 @@
-"""Scans, tracked poses -> was the robot kidnapped?  Watches the tracked pose, and finds another if it is wrong.
+"""Watches the tracked pose, detects that the robot was kidnapped or given a wrong pose, and finds the right one.
 
-The filter of a robot that was kidnapped, or given a wrong pose, converges where the scan fits best nearby, and is
-confident there. What gives it away is that scans fit worse than they used to. Then a global search runs beside it, with
-the tracked pose as a candidate that starts ahead (hypotheses/global_search.py). If the robot is merely surrounded by
-people, the scans fit nowhere else, and the pose stays. If another place is better and stays so over some distance, the
-robot is there. The formulation is ours.
+The particles of a kidnapped robot converge where the scan fits best nearby, with a small covariance. The symptom is
+that scans fit worse than before. Then a global search (hypotheses/global_search.py) runs beside the filter, with the
+tracked pose as a candidate that has a head start. If the robot is merely surrounded by people, the scans fit nowhere
+else, and the pose stays. If another place fits better over some distance, the robot is there. The formulation is
+ours.
 
-Once the pose was sure, dead reckoning since then is a prior over places, with a heavy tail: the robot may have been
-carried away. Of two halls that look alike the one that odometry leads to is right, and a tracked pose that the scans
-dragged away from it has no advantage. But when the scans say that the robot was moved without driving
-(scan_continuity.py), neither odometry nor the tracked pose says anything about where it is: then the pose is contested
-until it is ahead of all other places.
+After the pose was certain once, dead reckoning since then is a prior over places, with a heavy tail in case the robot
+was carried away. Of two halls that look alike, odometry then decides, and a tracked pose that the scans have dragged
+away from it has no advantage. If scans show that the robot was moved without driving (scan_continuity.py), neither
+odometry nor the tracked pose is evidence, and the pose is contested until it leads over all other places.
 
-A pose that was given is a claim. Odometry continues it, and scans fit near it: neither proves it. So it is compared with all
-other places from the first scan on, until it is ahead of them or none has overtaken it over some distance.
+A given pose may be wrong as well, although odometry continues it and scans fit near it. So it is compared with all
+other places from the first scan on, until it leads over them, or none has overtaken it over some distance.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Is it lost?  Inlier ratio, covariance, verdict of the kidnap detector -> a state, a reason in words, a confidence.
+"""The reported state, its reason and the confidence, from inlier ratio, covariance and the kidnap detector.
 
-Covariance alone cannot show it: a filter that converged in the wrong corridor has a small one. What shows it is how
-much of the scan the map explains at the pose, whether scans fit as well as they used to, and whether they fit better
-elsewhere (kidnap_detector.py).
+The covariance alone is not enough: in a wrong corridor it is small as well. What counts is how much of the scan the
+map explains at the pose, whether scans fit as well as before, and whether they fit better elsewhere
+(kidnap_detector.py).
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
-"""MOTION -> REGISTRATION -> PROPOSAL -> WEIGHTS -> RESAMPLING -> POSE: the particles and what happens to them.
+"""The particle filter: motion -> registration -> proposal -> weights -> resampling -> pose.
 
-Thrun, Burgard, Fox, Probabilistic Robotics (2005), ch. 8, with a proposal that looks at the scan. P particles, B beams.
+Thrun, Burgard, Fox, Probabilistic Robotics (2005), ch. 8, with a proposal distribution that uses the scan. P
+particles, B beams.
 """
 
 from __future__ import annotations
