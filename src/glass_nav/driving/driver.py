@@ -1,9 +1,9 @@
-"""What is seen and asked for -> what is driven and reported: an edge, a place of the map, or where a search leads.
+"""The decisions of driver_node: from observations and requests to commands and reports.
 
-This is everything that driver_node decides, without ROS and without a clock: each method is an event, and returns the
-decisions that follow from it, in the order in which they are to be carried out. One task is on at a time. A goal of an
-action ends what is on; a turn_choice waits for nobody, and is obeyed only where the robot stands at the meetpoint that
-it answers. While nothing is on the robot drives to a meetpoint by itself if a search needs one.
+Without ROS and without a clock: each method is an event, and returns the decisions that follow from it, in the order
+in which they are to be carried out. There is one task at a time. The goal of an action ends the current task. A
+turn_choice does not wait; it is followed only if the robot stands at the meetpoint that it answers. Without a task,
+the robot drives to a meetpoint by itself if a search needs one.
 """
 
 from __future__ import annotations

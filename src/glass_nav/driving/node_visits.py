@@ -1,7 +1,7 @@
 """The nodes of the atlas that a localized robot passed, with what it measured there.
 
-A robot that searches learns from the meetpoints where it stops; one that drives to a goal passes many more. What it saw
-of them is observed as by edge_tracking/passing.py. A node counts as missed only if no graph around it had any.
+A searching robot learns from the meetpoints where it stops; a robot that drives to a goal passes many more. They are
+detected by edge_tracking/passing.py. A node counts as missed only if none of the graphs made near it had it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Recovery of a blocked robot: wait, back off, turn in place, next choice, abort. Each step can be cancelled.
 
-A state machine without a clock of its own. After each step that moves the robot's view of things the drive is tried
-again (RETRY); one that comes far enough forgets what was tried before. Velocities (3,) forward, left [m/s], turn
+A state machine without a clock of its own. After each step that may have changed the view of the robot, the drive is
+tried again (RETRY). A drive that gets far enough resets the recovery. Velocities (3,) forward, left [m/s], turn
 [rad/s]; poses (3,) odom_from_base.
 """
 

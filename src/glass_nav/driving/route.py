@@ -1,8 +1,8 @@
 """The shortest path along the edges of the atlas from a pose to a goal.
 
-A robot may stand beside the graph, and so may its goal: the path begins at the nearest point of the nearest edge that is
-reached in a straight line, and ends likewise. Dijkstra's shortest path, by scipy. N nodes, E edges, darts as in
-atlas.py; M points of the path.
+Robot and goal may be off the graph: the path begins at the nearest point of the nearest edge that can be reached in a
+straight line, and ends likewise. Dijkstra's shortest path, by scipy. N nodes, E edges, darts as in atlas.py; M points
+of the path.
 """
 
 from __future__ import annotations

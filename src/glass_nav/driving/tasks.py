@@ -1,7 +1,7 @@
 """The tasks of the driver: along an edge, or to a goal in the map. A command at each step, then an outcome.
 
-Recovery is part of a task: what blocks the robot is waited for, backed off from, looked around at and driven round,
-each step to be called off at any time. Velocities (3,) forward, left [m/s], turn [rad/s].
+Recovery is part of a task: if something is in the way, the robot waits, backs off, turns in place and drives around
+it, and each step can be cancelled. Velocities (3,) forward, left [m/s], turn [rad/s].
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """Decides from the kept scans whether a line is a pane.
 
 Pieces of the line are looked up in every scan that saw them: a beam returned there, passed, or ended before. A pane
-returns what comes along its normal and lets the rest pass; a thing returns what comes from anywhere; clutter and people
-return little. Where a line of glass ends, and where another piece of it begins, follows from all pieces together: one
-piece alone is seen head-on by a scan or two. Where the map has nothing behind a pane, its own weak echo may be the only one, so
-that it returns oblique beams too; a thing returns the same there and elsewhere. L pieces, S scans.
+returns beams along its normal and lets the others pass; other objects return beams from all directions; clutter and
+people return few. The ends of a pane follow from all pieces together, since a single piece is seen head-on by only a
+scan or two. Where the map has nothing behind a pane, its own weak echo may be the only one, so that it returns
+oblique beams too; other objects return the same there and elsewhere. L pieces, S scans.
 """
 
 from __future__ import annotations

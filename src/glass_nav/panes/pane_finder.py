@@ -1,10 +1,11 @@
 """Finds the panes that the map lacks, each with its probability, from scans at trusted poses.
 
-A beam that ended in front of the first mapped surface met something that the map lacks, and time shows what: a pane
-answers within some degrees of its normal only, wherever the robot looks at it head-on, and lets beams pass at other
-angles; a thing that was put there answers from everywhere and lets none pass; a person moves on. Where the lidar gives
-intensities, those that differ from this lidar's own walls count too (wall_intensity.py). The formulation is ours. Lines are traced through the returns (pane_lines.py), and every piece of a line is looked up in the kept scans
-(pane_evidence.py).
+A beam that ended in front of the first mapped surface met something that the map lacks. What it was shows over time:
+a pane returns beams only within some degrees of its normal, from wherever the robot looks at it head-on, and lets
+beams pass at other angles; a new object returns beams from all directions and lets none pass; a person moves on. If
+the lidar gives intensities, those that differ from ordinary walls count too (wall_intensity.py). Lines are traced
+through the returns (pane_lines.py), and every piece of a line is looked up in the kept scans (pane_evidence.py). The
+formulation is ours.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Finds lines among the returns that the map does not explain.
 
-A pane returns beams near its normal only: a beam that came back from it says where the pane is and how it runs. Each
+A pane returns beams only near its normal, so each return tells where the pane is and in which direction it runs. Each
 return votes for the lines through it that are nearly at right angles to its beam (Hough transform with known
 directions, in pieces of the plane); total least squares through the voters gives the line. N returns.
 """

@@ -1,8 +1,8 @@
 """Learns the intensity of mapped walls, and tells which returns are brighter.
 
-Drivers give intensities in units of their own, of which some fall with range and incidence, some were corrected for it,
-and some are a constant. What the map explains shows which: mean and deviation of the intensities of walls are learnt while
-the robot drives, by range and incidence. Nothing is calibrated. N returns.
+Drivers give intensities in their own units: some fall with range and incidence, some are corrected for that, some are
+constant. Mean and deviation of the intensities of mapped walls are learnt while the robot drives, by range and
+incidence, so no calibration is needed. N returns.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 Seed document global_localization_procedure.txt: the localization is complete if one place is left "and the robot has
 enough information to determine its environment frame's relation to the solution meetpoint's frame". The environment
-frame is that of the robot's dead reckoning, since the robot has no other one before it is localized. The frame of a
-meetpoint of the atlas has its origin there and looks along the meetpoint's first edge.
+frame is that of dead reckoning, the only frame of a robot that is not localized. The frame of a meetpoint has its
+origin at the meetpoint and its x axis along the meetpoint's first edge.
 """
 
 from __future__ import annotations

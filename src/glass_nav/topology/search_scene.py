@@ -1,8 +1,8 @@
-"""What a person sees of a search, in the frame of the map, before the pose is known.
+"""The search as markers in the frame of the map, before the pose is known.
 
-The leading hypotheses as robots with their share; on the best three the last scan, laid over the map; the path by dead
-reckoning that led to each of them; the rows of the forest, with each search node that went and the value that ruled it
-out. Shapes are free of ROS. K hypotheses.
+The leading hypotheses as robots with their probability; on the best three the last scan and the path by dead
+reckoning, laid over the map; the rows of the forest, with each search node that was ruled out and the reason. Without
+ROS. K hypotheses.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""What the robot reports and what people ask for -> what to publish: one search after another in an atlas.
+"""The decisions of topology_node: one search after another in an atlas, from reports and requests to what is published.
 
-This is everything that topology_node decides, without ROS and without a clock: each method is an event, and returns
-the decisions that follow from it, in the order in which they are to be carried out. A search begins with a meetpoint
-and ends CONFIRMED, AMBIGUOUS or LOST, or when its goal gives up; before and after, the state is WAITING (the next
-meetpoint begins a search) or IDLE, and NO_ATLAS while there is no atlas of the map.
+Without ROS and without a clock: each method is an event, and returns the decisions that follow from it, in the order
+in which they are to be carried out. A search begins at a meetpoint and ends CONFIRMED, AMBIGUOUS or LOST, or when its
+goal gives up. Before and after, the state is WAITING (the next meetpoint begins a search), IDLE, or NO_ATLAS without
+an atlas of the map.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a search tells in a terminal: one plain line at each meetpoint, and now and then on the way."""
+"""The progress of a search as log lines: one at each meetpoint, and some in between."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Measures what the robot reports of its path: Meetpoint and Traversal.
 
-Measured as the atlas builder measures: lengths along the smooth line of the edge from node to node, directions from a
-node to the point BEARING_AT_M along.
+The same measures as in the atlas builder: lengths along the smoothed line of the edge from node to node, directions
+from a node to the point at BEARING_AT_M along the line.
 """
 
 from __future__ import annotations

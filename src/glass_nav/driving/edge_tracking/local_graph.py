@@ -1,6 +1,6 @@
 """The Voronoi graph around the robot: its position on it, the way ahead, the branches of a node.
 
-Coordinates are those of the grid, odom. A line (n, 2) runs from where the robot is along an edge to a node.
+Coordinates are those of the grid, odom. A line (n, 2) runs from the robot along an edge to a node.
 """
 
 from __future__ import annotations

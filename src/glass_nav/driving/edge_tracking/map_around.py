@@ -1,8 +1,8 @@
 """The grid from which the local graph is made: coarser in halls too wide for the window.
 
-A window that ends before the walls of a hall do shows ways between its own edge and a wall, which go with the robot: it
-would follow them for ever. A coarser map has as many cells, takes over what the fine one knows, and is given
-up where the fine one reaches far enough again.
+A window that ends before the walls of a hall shows edges between its own border and a wall, which move with the
+robot, so it would follow them for ever. A coarser map has as many cells, takes over what the fine one contains, and
+is dropped as soon as the fine one is large enough again.
 """
 
 from __future__ import annotations

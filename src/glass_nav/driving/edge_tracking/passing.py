@@ -1,9 +1,9 @@
 """Detects the meetpoints that a robot drives past, whatever steers it.
 
-What the edge driver looks at, watched without driving: the graph of the same local map, by the same code. The driver
-homes to a node and looks until some graphs agree; a robot that only drives past has the graphs that were made on its
-way. So a node is followed from graph to graph while the robot is near, and told once the robot has left it, with what
-the graphs around the nearest point of the path agree on.
+It observes the graph of the same local map as the edge driver, without driving. The driver stops at a node and looks
+until some graphs agree; a robot that only drives past has the graphs that were made on its way. So a node is followed
+from graph to graph while the robot is near, and reported once the robot has left it, with the values on which the
+graphs around the nearest point of the path agree.
 
 Poses are local_from_base, see local_pose.py.
 """

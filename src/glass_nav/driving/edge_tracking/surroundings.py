@@ -1,6 +1,6 @@
-"""Scans, odometry -> the map and the Voronoi graph around the robot, its pose in them, and what it may run into.
+"""The map and the Voronoi graph around the robot, its pose in them, and the obstacles nearby.
 
-All is in the frame local: odom without its drift, see local_pose.py.
+Everything is in the frame local: odom without its drift, see local_pose.py.
 """
 
 from __future__ import annotations

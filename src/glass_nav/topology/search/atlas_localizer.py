@@ -1,10 +1,11 @@
-"""MEETPOINT -> FOREST -> VOTE -> TURN: where in the atlas is a robot that woke up somewhere?
+"""Localizes a robot in an atlas: meetpoint -> search forest -> vote -> turn.
 
-Seed document: global_localization_procedure.txt. `vote_mode: seed` with `confirm_edges: 0` and `use_scans: false` is its
-procedure: no edge angles, no detection errors, done at the first single candidate. Its rule alone claims a place for
-many robots that are not in the atlas at all; the default asks for edges that confirm it, proves ambiguity instead of
-driving for ever, and answers LOST rather than guess. Where there are scans and odometry, scans and forest share one
-belief (joint_belief.py), which finds most robots before their first edge; the forest goes on where places look alike.
+Seed document: global_localization_procedure.txt. `vote_mode: seed` with `confirm_edges: 0` and `use_scans: false` is
+its procedure: no edge angles, no detection errors, done at the first single candidate. This rule alone reports a
+place even for many robots that are not in the atlas. By default, edges must confirm the place, ambiguity is proved
+instead of driving for ever, and the result is LOST rather than a guess. With scans and odometry, scans and forest
+share one belief (joint_belief.py), which finds most robots before their first edge; the forest helps where places
+look alike.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""A simulated robot that lives in an atlas: it reports meetpoints and edges, and drives as the search says.
+"""A simulated robot in an atlas, without coordinates: reports meetpoints and edges, and takes the chosen turns.
 
-It has no coordinates. It measures what its sensors would show of the atlas (lengths, chords, equidistances, angles) by
-dead reckoning, with normally distributed errors; a detector that fails joins and splits edges. For a robot outside the
-atlas, the parts of the atlas are shuffled.
+It measures what the atlas says (lengths, chords, equidistances, angles) by dead reckoning, with normally distributed
+errors. Detection errors join and split edges. For a robot outside the atlas, the parts of the atlas are shuffled.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""FOREST -> VOTE -> TURN: what the candidates of the search forest say, without the poses that scans follow."""
+"""State and turn from the candidates of the search forest alone, without scans."""
 
 from __future__ import annotations
 

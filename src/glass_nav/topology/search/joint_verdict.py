@@ -1,8 +1,7 @@
-"""BELIEF -> VOTE -> TURN: what scans and forest say together.
+"""State and turn from the joint belief of scans and forest.
 
-One rule: the robot is where the probability of all other places, and of elsewhere, is less than the risk that is
-accepted. It is LOST if that of elsewhere is the one that is left, and AMBIGUOUS if nothing can tell the places apart
-that are.
+The robot is CONFIRMED at a place if the probability of all other places, and of elsewhere, is below the accepted
+risk. It is LOST if only elsewhere is left, and AMBIGUOUS if nothing can tell the remaining places apart.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
-"""Does a node or an edge of the atlas match what was seen?
+"""Tests whether a node or an edge of the atlas matches what was observed.
 
 Each test compares one number: the difference between atlas and observation with z times its standard deviation. z
-follows from a risk budget for a whole run, because a probability that is small for one test is not small for a hundred.
-C candidates; a candidate at a meetpoint is the dart that matches its reference edge.
+follows from a risk budget for a whole run, because a probability that is small for one test is not small for a
+hundred. C candidates; a candidate at a meetpoint is the dart that matches its reference edge.
 
-Seed document global_localization_procedure.txt, "Updating the Search Forest", which does not define when values match.
+Seed document global_localization_procedure.txt, "Updating the Search Forest", which does not define when values
+match.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Why search nodes went: the first test that each failed, with the value of the atlas and the one that was seen.
+"""Why search nodes were ruled out: the first test that each failed, with the values of atlas and observation.
 
 The tests and their tolerances are those of matching.py. D darts.
 """

@@ -1,9 +1,9 @@
-"""A meetpoint, poses -> the log likelihood ratio of the meetpoint at each pose to a robot elsewhere.
+"""The log likelihood ratio of a meetpoint at each of many poses, relative to a robot elsewhere.
 
-A pose expects a meetpoint where the atlas has one, as the atlas describes it: degree, equidistance, angles between
-the edges, each with the tolerances of the matcher. Elsewhere a meetpoint is like any of the atlas: what many have in
-common speaks for none. The edge by which the robot came is evidence through the pose, which odometry carried along
-it, and through the forest, whose tests it passed (length, chord, directions, walls). D darts, K poses.
+Where the atlas has a meetpoint, it is expected as the atlas describes it: degree, equidistance, angles between the
+edges, each with the tolerances of the matcher. Elsewhere a meetpoint is like any of the atlas, so properties that
+many have in common are no evidence. The edge along which the robot came counts through the pose, which odometry moved
+along it, and through the forest, whose tests it passed (length, chord, directions, walls). D darts, K poses.
 """
 
 from __future__ import annotations

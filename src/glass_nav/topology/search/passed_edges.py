@@ -1,8 +1,8 @@
-"""Odometry at meetpoints -> how often the robot passed each of their edges, to get everywhere without an atlas.
+"""How often the robot passed each edge of its meetpoints, to explore without an atlas.
 
-A robot that always leaves by the edge that it passed least often covers every edge of any building: the rule of
-Tremaux for mazes (Lucas, Recreations mathematiques, 1882). Edges are recognized by where they leave and in which
-direction.
+A robot that always leaves by the edge that it passed least often covers every edge of any building: Tremaux's rule
+for mazes (Lucas, Recreations mathematiques, 1882). Edges are recognized by where they leave and in which direction,
+from odometry.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What is known after a meetpoint, and the turn to take there."""
+"""The result of the search after a meetpoint: state, candidates, and the turn to take."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Explains scans by the map that is served: there may be none yet, and another one later."""
+"""Explains scans by the served map, which may be missing at first and may be replaced later."""
 
 from __future__ import annotations
 

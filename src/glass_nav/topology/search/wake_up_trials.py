@@ -1,4 +1,4 @@
-"""Trials without a building: simulated robots wake up somewhere in an atlas and are sent through the search."""
+"""Simulates searches of robots that wake up somewhere in an atlas, without a building."""
 
 from __future__ import annotations
 
