@@ -17,7 +17,7 @@ class Level(IntEnum):
 
 @dataclass(frozen=True)
 class Health:
-    """One entry: a level, one sentence, and figures by name."""
+    """One entry: a level, one sentence, and named figures."""
 
     level: Level
     message: str

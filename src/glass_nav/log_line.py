@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class LogLine:
-    """To be logged."""
+    """A line for the log."""
 
     text: str
     level: int = logging.INFO

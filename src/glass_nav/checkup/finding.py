@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Finding:
-    """One fault."""
+    """A fault and its remedy."""
 
     name: str  # short and for good: for scripts, and to look it up
     what: str  # what was seen, with figures

@@ -192,7 +192,7 @@ def _line(sigma_m: np.ndarray, seen: np.ndarray) -> str:
 
 
 def _as_map(suggestions: List[Suggestion], landmarks: LandmarkMap) -> LandmarkMap:
-    """With names that are not taken yet."""
+    """The suggestions as landmarks, with unused names."""
     names: List[str] = []
     number = 1
     while len(names) < len(suggestions):

@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
-    """Nothing can be wrong with the options as such."""
+    """None: any combination of options is valid."""
     return None
 
 

@@ -99,7 +99,7 @@ def main(arguments: argparse.Namespace) -> bool:
 
 
 def run(options: ReplayOptions, outputs: Outputs) -> Dict[str, Any]:
-    """One replay, with its progress and figures printed.
+    """Runs one replay, and prints its progress and figures.
 
     Raises:
         RecordingError, MapError, AtlasError, ParamError, ValueError, OSError: bad input; one line.

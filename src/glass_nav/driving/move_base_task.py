@@ -17,13 +17,13 @@ from glass_nav.vocabulary import DriverPhase, Outcome
 
 
 class MoveBaseClient(Protocol):
-    """What the task needs of the action of move_base."""
+    """The client of move_base's action, as far as the task needs it."""
 
     name: str  # of the action, for people
 
     @property
     def is_there(self) -> bool:
-        """Its action server is connected."""
+        """Whether the action server is connected."""
 
     def was_heard(self) -> bool:
         """Whether its status came since the last call."""

@@ -77,7 +77,7 @@ class VisitWatch:
             self._visits += self._visit(observer, node, self._near.pop(node))
 
     def _note_seen(self, observer: PassingObserver) -> None:
-        """What the observer has seen since the last scan goes to the nodes where it was."""
+        """Assigns what the observer has seen since the last scan to the nodes."""
         new = observer.passed[self._taken :]
         self._taken += len(new)
         for each in new:

@@ -51,7 +51,7 @@ class RecoveryParams:
 
 @dataclass(frozen=True)
 class Step:
-    """What to do now."""
+    """The step to take now."""
 
     name: str
     command: np.ndarray  # (3,) wanted, by WAIT, BACK_OFF and TURN; else zero
@@ -97,7 +97,7 @@ class Recovery:
         return self._step in MOVES
 
     def cancel(self) -> None:
-        """Nothing was tried, nothing is."""
+        """Ends the recovery and forgets what was tried."""
         self._rung = -1
         self._step = NONE
         self._why = ""

@@ -116,7 +116,7 @@ class GlobalSearch:
         self._counted_at_m: Dict[str, float] = {}  # id of a landmark -> distance driven when its bearing last counted
 
     def decide_by(self, params: SearchParams) -> None:
-        """Other limits from the next scan on."""
+        """Use other limits from the next scan on."""
         self._params = params
 
     def update(
@@ -127,7 +127,7 @@ class GlobalSearch:
         log_prior: Optional[Callable[[np.ndarray], np.ndarray]] = None,
         period_s: Optional[float] = None,
     ) -> Candidates:
-        """One more scan; a scan with too few returns only moves the candidates.
+        """Process a scan; one with too few returns only moves the candidates.
 
         Args:
             scan: one revolution of a lidar.
@@ -152,7 +152,7 @@ class GlobalSearch:
         return self._candidates(log_prior)
 
     def add(self, map_from_base: np.ndarray, head_start: float) -> None:
-        """Before the first scan: a candidate at the tracked pose, with a head start of log likelihood."""
+        """Add the tracked pose as a candidate, with a head start in log likelihood; before the first scan."""
         self._append(np.asarray(map_from_base, float)[None], np.array([head_start]))
 
     def correct(self, map_from_base: np.ndarray) -> None:

@@ -49,7 +49,7 @@ class NewWalls:
         return count
 
     def add(self, ends_m: np.ndarray, odom_from_base: np.ndarray, driven_m: float) -> None:
-        """What the scan shows was seen."""
+        """Mark the pieces of wall of a scan as seen."""
         at, new = self._new(ends_m, odom_from_base, driven_m)
         self._seen = np.concatenate([self._seen, np.column_stack([at[new], np.full(len(new), driven_m)])])
 

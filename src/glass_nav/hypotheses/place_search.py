@@ -49,7 +49,7 @@ class PlaceSearch:
         self._fits: List[np.ndarray] = []  # (N,) of them
 
     def advance(self, period_s: Optional[float] = None) -> bool:
-        """One slice; whether the search is complete.
+        """Search one slice; returns whether the search is complete.
 
         Args:
             period_s: from the scan before to this one; None: not known.

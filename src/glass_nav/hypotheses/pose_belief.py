@@ -50,7 +50,7 @@ NEW = -2  # label of a pose that nobody has weighed
 
 
 class Search(Protocol):
-    """Of one scan in the whole map; hypotheses/place_search.py is one."""
+    """A search of one scan in the whole map, such as hypotheses/place_search.py."""
 
     def advance(self) -> bool:
         """One slice; whether it is complete."""
@@ -63,7 +63,7 @@ class MapScans(Protocol):
     """How a map would be seen; hypotheses/scan_explanation.py is one."""
 
     def search(self, scan: Scan, odom_from_base: np.ndarray) -> Optional[Search]:
-        """For poses from which the scan may have been taken; None: the scan is no evidence."""
+        """Begins a search for poses where the scan fits; None: the scan is no evidence."""
 
     def beams(self, scan: Scan, map_from_base: np.ndarray, most_m: float, most_rad: float) -> Optional[BeamsExplained]:
         """Poses (K, 3) slid by no more than that, with the beams explained from there; None: no evidence."""
@@ -90,7 +90,7 @@ class _View:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Of K poses."""
+    """The evidence for K poses."""
 
     nats: np.ndarray  # (K,) log likelihood ratios to elsewhere, by the scans
     checked_nats: np.ndarray  # (K,) the part of them by scans that did not choose the pose
@@ -108,7 +108,7 @@ class Evidence:
         return Evidence(*(values[chosen] for values in vars(self).values()))
 
     def then(self, more: Evidence) -> Evidence:
-        """Of these poses and more of them."""
+        """The evidence for these poses and for more of them."""
         return Evidence(*map(np.concatenate, zip(vars(self).values(), vars(more).values())))
 
     def with_view(self, nats: np.ndarray, explained: np.ndarray, seen: np.ndarray) -> Evidence:
@@ -170,7 +170,7 @@ class PoseBelief:
             self.driven_m += float(se2.travelled(step)[0])
 
     def see(self, scan: Scan, odom_from_base: np.ndarray) -> bool:
-        """One more scan.
+        """Process a scan.
 
         Args:
             scan: one revolution of a lidar.
@@ -320,7 +320,7 @@ class PoseBelief:
 
 
 class _SearchedScan:
-    """One scan in the whole map: advance() until it is complete."""
+    """A scan that is searched in the whole map: advance() until it is complete."""
 
     def __init__(
         self, scans: MapScans, search: Search, scan: Scan, odom_from_base: np.ndarray, driven_m: float, most: int

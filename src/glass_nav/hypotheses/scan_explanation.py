@@ -38,7 +38,7 @@ _MIN_KNOWN = 0.25  # of the beams that returned; where the map knows fewer of th
 
 @dataclass(frozen=True)
 class BeamsExplained:
-    """Of B beams of a scan, seen from P poses."""
+    """How the map explains the B beams of a scan, from P poses."""
 
     poses: np.ndarray  # (P, 3) where the scan fits best
     ends_m: np.ndarray  # (B, 2) of the beams, in the robot's frame
@@ -47,7 +47,7 @@ class BeamsExplained:
 
 
 class ScanExplanation:
-    """For one map."""
+    """Explains scans by one map."""
 
     def __init__(self, grid_map: GridMap) -> None:
         self._grid_map = grid_map
@@ -64,7 +64,7 @@ class ScanExplanation:
             self._matcher = ScanMatcher(self._grid_map, self._field)
 
     def shares(self, scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
-        """Of the beams that returned from mapped space, the share that the map explains.
+        """Share of the beams that the map explains, of those that returned from mapped space.
 
         Args:
             scan: as it was measured.
@@ -96,7 +96,7 @@ class ScanExplanation:
         return beams.poses, np.where(few, np.nan, beams.explained.sum(axis=1) / np.maximum(count, 1))
 
     def beams(self, scan: Scan, map_from_base: np.ndarray, most_m: float, most_rad: float) -> Optional[BeamsExplained]:
-        """As fitted(), beam by beam; None if hardly any beam returned."""
+        """As fitted(), but for each beam; None if hardly any beam returned."""
         used = _used_beams(scan)
         if used is None:
             return None

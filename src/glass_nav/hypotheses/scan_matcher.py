@@ -73,7 +73,7 @@ class ScanMatcher:
         return np.rint(_HIGHEST * _SCALE_M**2 / (_SCALE_M**2 + distance**2)).astype(np.uint8)
 
     def search(self, points_m: np.ndarray, keep: int) -> Places:
-        """At most so many places, one for each square of 0.8 m and each of the headings.
+        """Find at most this number of places, one for each square of 0.8 m and each of the headings.
 
         Args:
             points_m: (B, 2) finite end points of beams in the robot's frame.
@@ -90,7 +90,7 @@ class ScanMatcher:
 
 
 class SlicedSearch:
-    """One scan, to be matched slice by slice."""
+    """A search of one scan, done slice by slice."""
 
     def __init__(self, search: _grid.ScanSearch, map_from_grid: np.ndarray, cell_m: float) -> None:
         """Made by ScanMatcher.begin()."""
@@ -102,12 +102,12 @@ class SlicedSearch:
 
     @property
     def look_ups(self) -> int:
-        """So far."""
+        """Number of look-ups so far."""
         return int(self._search.look_ups)
 
     @property
     def places(self) -> Places:
-        """Of a complete search."""
+        """The places found, once the search is complete."""
         row, column, heading, score = self._search.places()
         grid_from_base = np.stack(
             [(column + 0.5) * self._cell_m, (row + 0.5) * self._cell_m, _HEADINGS_RAD[heading]], -1

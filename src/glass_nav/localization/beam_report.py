@@ -10,7 +10,7 @@ from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
 
 @dataclass(frozen=True)
 class BeamReport:
-    """Of one scan."""
+    """The report on the beams of one scan."""
 
     cases: BeamCases  # of every beam
     surface_scan: SurfaceScan  # the scan in which glass is an obstacle

@@ -25,7 +25,7 @@ _AHEAD_NS = 500_000_000  # a scan stamped further in the future has a wrong cloc
 
 @dataclass(frozen=True)
 class StampedTransform:
-    """To be sent on tf."""
+    """A transform to be sent on tf."""
 
     stamp_ns: int
     map_from_odom: np.ndarray  # (3,) x [m], y [m], yaw [rad]

@@ -18,7 +18,7 @@ QUIET_S = 5.0  # a state that comes and goes is said to be lost at most that oft
 
 @dataclass(frozen=True)
 class _Moment:
-    """Where the robot was said to be, and when."""
+    """A reported pose and its time."""
 
     stamp_ns: int
     map_from_base: np.ndarray  # (3,)

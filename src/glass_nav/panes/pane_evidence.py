@@ -50,7 +50,7 @@ _CHANGE = 3.4  # nats: a line changes from one kind to another once in 3 m
 
 
 class Kind(IntEnum):
-    """What a piece of a line is."""
+    """The kind of a piece of a line."""
 
     PANE = 0
     NOTHING = 1
@@ -59,7 +59,7 @@ class Kind(IntEnum):
 
 @dataclass(frozen=True)
 class Counts:
-    """What was seen of pieces of a line, by incidence, before something mapped and before nothing."""
+    """Returns and passes at pieces of a line, by incidence, in front of mapped surfaces and of nothing."""
 
     returns: np.ndarray  # (L, 2, INCIDENCES)
     passes: np.ndarray  # (L, 2, INCIDENCES)
@@ -75,7 +75,7 @@ class Counts:
 
 
 def counts(scans: KeptScans, middle_m: np.ndarray, normal: np.ndarray, reach_m: float) -> Counts:
-    """What all scans say of pieces of a line.
+    """Counts returns and passes of all scans at pieces of a line.
 
     Args:
         scans: the memory.

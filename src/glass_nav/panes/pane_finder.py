@@ -152,7 +152,7 @@ class PaneFinder:
         return True
 
     def panes(self, anew: bool = False) -> List[Pane]:
-        """All candidates by what was seen so far, the most probable first.
+        """All candidates so far, most probable first.
 
         Looks again where the robot has been since the last call, which takes some ten milliseconds.
 
@@ -206,7 +206,7 @@ class PaneFinder:
         return walls.excess(ranges_m, incidence_rad, scan.intensities)
 
     def _returns(self, boxes: "Sequence[_Box]") -> Returns:
-        """All returns in some boxes."""
+        """All returns in the given boxes."""
         laser_m = self._scans.map_from_laser[:, :2]
         rows = np.flatnonzero(np.any([box.contains(laser_m, self._p.pane_reach_m) for box in boxes], axis=0)).tolist()
         parts = [self._unmapped[row] for row in rows] or [(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0))]
@@ -289,7 +289,7 @@ class PaneFinder:
         return bool(self._mapped.is_speck(line.centre_m + along_m[:, None] * line.along).any())
 
     def _to_wall(self, line: Line, end_m: float, sign: float) -> float:
-        """Where the pane ends along the line: at the mapped wall near its end, if there is one."""
+        """The end of the pane along the line: the mapped wall near its end, if there is one."""
         reach_m = self._p.pane_to_wall_m + self._p.pane_near_wall_m
         step_m = 0.5 * self._mapped.resolution_m
         along_m = end_m + sign * np.arange(0.0, reach_m + step_m, step_m)

@@ -26,7 +26,7 @@ _LEAST_RETURNS = 3
 
 @dataclass(frozen=True)
 class Returns:
-    """What beams met where the map has nothing."""
+    """Returns from where the map has nothing."""
 
     points_m: np.ndarray  # (N, 2) in map
     beam_rad: np.ndarray  # (N,) direction of the beam in map
@@ -197,7 +197,7 @@ def _connected(at_m: np.ndarray, seed_m: np.ndarray) -> np.ndarray:
 
 
 def _covariance(offset_m: np.ndarray, at_m: np.ndarray) -> np.ndarray:
-    """Of offset and direction at the centre, errors within one scan being correlated."""
+    """Covariance of offset and direction at the centre, with correlated errors within a scan."""
     variance = float(np.mean(offset_m**2)) / max(np.sqrt(len(offset_m)), 1.0)
     spread = max(float(np.mean((at_m - at_m.mean()) ** 2)), 1e-4)
     return np.diag([variance, variance / spread])

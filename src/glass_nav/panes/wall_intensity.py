@@ -1,4 +1,4 @@
-"""Learns the intensity of mapped walls, and tells which returns are brighter.
+"""Learns the intensity of mapped walls, and tells which returns differ from it.
 
 Drivers give intensities in their own units: some fall with range and incidence, some are corrected for that, some are
 constant. Mean and deviation of the intensities of mapped walls are learnt while the robot drives, by range and
@@ -60,7 +60,7 @@ class WallIntensity:
 
 
 def log_odds(excess: np.ndarray) -> float:
-    """Of a pane against a thing, by the excess (N,) of the returns near its normal; 0 where nothing is known."""
+    """Log odds of a pane against other objects, from the excess (N,) of returns near its normal; 0 if unknown."""
     known = excess[np.isfinite(excess)]
     if not len(known):
         return 0.0

@@ -65,7 +65,7 @@ class Bag:
 
     @property
     def duration_s(self) -> float:
-        """From the first to the last message, by the time of recording."""
+        """Time from the first to the last message, by the time of recording."""
         return max(float(self._reader.duration) * 1e-9, 0.0)
 
     def topics_of(self, *kinds: str) -> List[str]:
@@ -149,7 +149,7 @@ class Bag:
             )
 
     def only_or_usual(self, found: List[str], usual: str, what: str, option: str) -> str:
-        """Of the topics found, at least one: the only one, or the one with the usual name."""
+        """The only topic found, or the one with the usual name; at least one was found."""
         if len(found) == 1:
             return found[0]
         if usual not in found:

@@ -36,7 +36,7 @@ class BagWriter(MessageWriter):
     OWN_TYPES = {"glass_nav/msg/TrueBeams": TRUE_BEAMS}
 
     def mounting(self, stamp_ns: int, base_from_laser: np.ndarray) -> None:
-        """Where the laser sits on the robot, (3,): /tf_static, once, before the first scan."""
+        """Writes the pose of the laser on the robot, (3,), to /tf_static; once, before the first scan."""
         self._send("/tf_static", stamp_ns, transforms=[self._transform(stamp_ns, BASE, LASER, base_from_laser)])
 
     def odometry(self, stamp_ns: int, odom_from_base: np.ndarray, velocity: np.ndarray) -> None:

@@ -39,7 +39,7 @@ def text_of(connection: Any) -> str:
 
 
 def noetic_md5(kind: str) -> Optional[str]:
-    """Of a type as rosbags writes it; None if Noetic does not have it."""
+    """The md5 of a type written by rosbags; None if Noetic does not have the type."""
     store = noetic_store()
     return str(store.generate_msgdef(kind)[1]) if kind in definitions_of(store) else None
 

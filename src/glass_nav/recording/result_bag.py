@@ -72,7 +72,7 @@ class ResultBag(MessageWriter):
         residual_m: np.ndarray,
         weight: np.ndarray,
     ) -> None:
-        """One scan, the cases of its beams (B,), and where each is cut (B,), as measured by the lidar."""
+        """Writes a scan, the cases of its beams (B,), and where each is cut (B,), as measured by the lidar."""
         frame = scan.lidar or "laser"
         if frame not in self._mounted:
             self._mounted.add(frame)
@@ -182,7 +182,7 @@ class ResultBag(MessageWriter):
         )
 
     def legend(self, stamp_ns: int, pixels: np.ndarray) -> None:
-        """What the marks mean: (H, W, 3) uint8."""
+        """Writes the legend of the markers: (H, W, 3) uint8."""
         height, width, _ = pixels.shape
         self._send(
             "/legend",
@@ -243,7 +243,7 @@ class ResultBag(MessageWriter):
         return self._new("geometry_msgs/Point", x=x, y=y, z=z)
 
     def truth(self, stamp_ns: int, map_from_base: np.ndarray) -> None:
-        """Where the robot truly was, (3,)."""
+        """Writes the true pose of the robot, (3,)."""
         self._send("/ground_truth", stamp_ns, header=self._header(stamp_ns, self._map), pose=self._pose(map_from_base))
 
     def glass_map(self, stamp_ns: int, grid_map: GridMap, glass: np.ndarray) -> None:

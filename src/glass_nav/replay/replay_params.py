@@ -47,7 +47,7 @@ class Frames:
 
 @dataclass(frozen=True)
 class ReplayParams:
-    """All that a file may set."""
+    """All parameters that a file may set."""
 
     frames: Frames = field(default_factory=Frames)
     start: StartPose = field(default_factory=StartPose)

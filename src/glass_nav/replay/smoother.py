@@ -84,7 +84,7 @@ class Smoother:
         self._sure: List[bool] = []
 
     def listen(self, step: Step, estimate: Estimate) -> None:
-        """One scan, with the filter's pose; of several lidars at one moment the first counts."""
+        """Adds a scan with the filter's pose; of several lidars at one moment, only the first."""
         if self._stamps_ns and step.scan.stamp_ns <= self._stamps_ns[-1]:
             return
         self._stamps_ns.append(step.scan.stamp_ns)

@@ -29,7 +29,7 @@ class Sightings:
     place_m2: np.ndarray  # (N,) variance across the line of sight, of landmark and sensor [m^2]
 
     def subset(self, chosen: np.ndarray) -> "Sightings":
-        """Those of a mask (N,) or of indices."""
+        """The bearings of a mask (N,) or of indices."""
         return Sightings(
             self.number[chosen],
             self.landmarks_m[chosen],

@@ -28,7 +28,7 @@ class Deskew:
 
 
 def sweep_ns(beams: int, time_increment_s: float) -> int:
-    """From the first beam to the last one [ns]; 0 if that is not known."""
+    """Time from the first beam to the last one [ns]; 0 if unknown."""
     if not (np.isfinite(time_increment_s) and time_increment_s > 0.0):
         return 0
     sweep_s = time_increment_s * max(beams - 1, 0)

@@ -49,7 +49,7 @@ class EmitterSearchParams:
 
 
 class EmitterSearch:
-    """One search over the span; the next one goes the other way."""
+    """A search over the span; the next one goes the other way."""
 
     def __init__(self, p: EmitterSearchParams, way: int = 1) -> None:
         """

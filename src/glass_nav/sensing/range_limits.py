@@ -38,7 +38,7 @@ class RangeLimits:
         self._longest_m: Dict[str, float] = {}
 
     def use(self, laser_max_range_m: float) -> None:
-        """Another laser_max_range from now on; what the lidars showed stays known."""
+        """Use another laser_max_range from now on; the ranges seen are kept."""
         self._given_m = laser_max_range_m
 
     def is_assumed(self, range_max_m: float) -> bool:

@@ -49,7 +49,7 @@ class WheelParams:
 
 @dataclass(frozen=True)
 class Counts:
-    """What one message says of the wheels; None: nothing."""
+    """The encoder counts in one message; None: none."""
 
     left: Optional[float]
     right: Optional[float]

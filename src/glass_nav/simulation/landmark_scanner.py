@@ -68,7 +68,7 @@ class Turn:
 
 @dataclass(frozen=True)
 class _Move:
-    """From one angle to another [rad], as commanded; the motor goes to its nearest step."""
+    """A commanded move from one angle to another [rad]; the motor goes to its nearest step."""
 
     start_rad: float
     end_rad: float

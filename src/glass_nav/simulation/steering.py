@@ -19,7 +19,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Audience:
-    """Who follows the robot."""
+    """The localization that the robot waits for."""
 
     answers: int  # received transforms map -> odom
     listeners: int  # to its scans

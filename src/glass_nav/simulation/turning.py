@@ -24,7 +24,7 @@ def scan(
     start_ns: int,
     rng: np.random.Generator,
 ) -> TrueScan:
-    """One sweep of the lidar, its first beam at the first pose and its last beam at the last one.
+    """Simulates a sweep, from the first beam at the first pose to the last beam at the last one.
 
     Args:
         model: the lidar.

@@ -19,7 +19,7 @@ from glass_nav.topology.atlas.atlas import Atlas
 
 @dataclass(frozen=True)
 class FrameRelation:
-    """Where the environment frame lies; poses (3,) x [m], y [m], yaw [rad]."""
+    """The pose of the environment frame; poses (3,) x [m], y [m], yaw [rad]."""
 
     map_from_environment: np.ndarray  # (3,) in the map of the atlas
     node: Optional[int] = None  # the solution meetpoint; None: scans confirmed a place that the atlas does not have

@@ -9,7 +9,7 @@ from glass_nav.topology.search.search_forest import SearchForest
 
 
 def after(estimate: SearchEstimate, forest: SearchForest, stamp_ns: int) -> str:
-    """What was seen, what is known by that, and what is asked next.
+    """A line with what was seen, what is known now, and the next turn.
 
     Args:
         estimate: that follows from it.

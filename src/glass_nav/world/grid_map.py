@@ -40,7 +40,7 @@ class GridMap:
 
     @property
     def place(self) -> str:
-        """Where the cells are: rows, columns, resolution, x, y, yaw.
+        """Geometry of the grid: rows, columns, resolution, x, y, yaw.
 
         The resolution counts to a micrometre (messages carry it as float32), the origin to a millimetre.
         """

@@ -25,7 +25,7 @@ class UnknownLandmark(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class LandmarkMap:
-    """Where the landmarks are and from where they are visible, ignoring walls."""
+    """Positions of landmarks, and from where they are visible, ignoring walls."""
 
     ids: Tuple[str, ...]
     positions_m: np.ndarray  # (N, 2) in map

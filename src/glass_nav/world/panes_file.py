@@ -27,7 +27,7 @@ class PanesFileError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class PanesFile:
-    """What a file of panes holds."""
+    """The contents of a file of panes."""
 
     panes: Tuple[Pane, ...]
     arrays: Dict[str, np.ndarray] = field(default_factory=dict)  # by name, as given to save()

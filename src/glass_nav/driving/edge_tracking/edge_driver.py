@@ -54,7 +54,7 @@ class EdgeDriverParams:
 
 @dataclass(frozen=True)
 class Arrival:
-    """What is reported at a meetpoint."""
+    """The report at a meetpoint."""
 
     stamp_ns: int  # of the scan that showed it
     odom_from_base: np.ndarray  # (3,) then
@@ -64,7 +64,7 @@ class Arrival:
 
 @dataclass(frozen=True)
 class Progress:
-    """Where the driver is."""
+    """The progress of the driver."""
 
     phase: DriverPhase
     reason: str  # one sentence
@@ -268,7 +268,7 @@ class EdgeDriver:
         return float(np.abs(self._velocity).max()) < 0.02
 
     def _think(self, graph: LocalGraph) -> None:
-        """Once for each graph."""
+        """Decides once for each new graph."""
         leg = self._leg
         if leg.looking:
             if self._stands:

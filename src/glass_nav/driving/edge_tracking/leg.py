@@ -23,7 +23,7 @@ _SPLIT_M = 0.6  # so much: it would be a part of the one that the robot left
 
 @dataclass
 class Leg:
-    """From one order to the next: seeking, following an edge with homing at its end, returning, or standing."""
+    """One order: seeking, following an edge with homing at its end, returning, or standing."""
 
     phase: DriverPhase
     reason: str

@@ -38,13 +38,13 @@ class MapAround:
             self._wide.add(scan, local_from_base)
 
     def walls(self) -> GridMap:
-        """What stands there, as fine as it is known; all else is free."""
+        """The walls at the finest resolution known; everything else is free."""
         walls = self._fine.walls()
         return walls if self._wide is None or walls.occupied.any() else self._wide.walls()
 
     @property
     def coarse_m(self) -> float:
-        """By how much the cells of the last grid are larger than those of the fine map."""
+        """How much larger the cells of the last grid are than those of the fine map."""
         fine_m = self._fine.params.resolution_m
         return 0.0 if self._wide is None else self._wide.params.resolution_m - fine_m
 

@@ -83,7 +83,7 @@ class PassedNode:
 
 @dataclass(frozen=True)
 class WayPoint:
-    """Where the robot was on the graph."""
+    """A position of the robot on the graph."""
 
     stamp_ns: int
     local_m: np.ndarray  # (2,) the point of the graph nearest to the robot; the robot itself if none is near
@@ -113,7 +113,7 @@ class _Track:
         return self.looks[-1]
 
     def share(self) -> float:
-        """Of the graphs next to the nearest point of the path, those that have it."""
+        """Share of the graphs near the closest point of the path that have the node."""
         nearest = min(self.away_m, key=lambda number: self.away_m[number])
         beside = [number for number in self.away_m if abs(number - nearest) <= _AGREE // 2]
         return sum(look.number in beside for look in self.looks) / len(beside)

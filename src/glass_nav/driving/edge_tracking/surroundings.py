@@ -59,7 +59,7 @@ class Surroundings:
 
     @property
     def coarse_m(self) -> float:
-        """By how much the cells of the last graph's map were larger than usual."""
+        """How much larger than usual the cells of the last graph's map were."""
         return self._map.coarse_m
 
     @property
@@ -77,7 +77,7 @@ class Surroundings:
         return self.graph
 
     def renew_walls(self) -> None:
-        """Only the walls: no graph is needed now."""
+        """Updates only the walls, when no graph is needed."""
         self._renewed_ns = self.stamp_ns
         self._map.fit(self.pose[:2])
         walls = self._map.walls()

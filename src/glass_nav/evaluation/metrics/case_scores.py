@@ -77,7 +77,7 @@ class SurfaceScores:
 
 
 def none_yet() -> CaseScores:
-    """To add to."""
+    """Empty scores, to add to."""
     return CaseScores(np.zeros((CASES, CASES), np.int64), np.zeros((CASES, CASES), np.int64))
 
 

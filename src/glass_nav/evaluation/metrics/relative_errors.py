@@ -85,7 +85,7 @@ def pairs_by_distance(estimates: np.ndarray, distance_m: float) -> Tuple[np.ndar
 
 
 def pairs_by_frames(count: int, frames: int) -> Tuple[np.ndarray, np.ndarray]:
-    """All pairs of `count` poses that are so many apart."""
+    """All pairs of `count` poses that are this number of scans apart."""
     begin = np.arange(max(count - frames, 0))
     return begin, begin + frames
 

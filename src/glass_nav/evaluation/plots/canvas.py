@@ -13,7 +13,7 @@ DPI = 110
 
 @dataclass(frozen=True)
 class Picture:
-    """One picture of a report."""
+    """A picture of a report."""
 
     path: Path
     title: str

@@ -42,7 +42,7 @@ class Coatings:
     def learn(
         self, measured_m: np.ndarray, expected: ExpectedRanges, sigma_m: float, gate_m: float, gain: float
     ) -> "Coatings":
-        """After one more scan at a trusted pose; arguments as for of().
+        """Learn from a scan at a trusted pose; arguments as of of().
 
         Args:
             gate_m: across a surface; where both echoes are expected farther apart, the range tells which it was.
@@ -74,7 +74,7 @@ UNKNOWN_COATINGS = Coatings(np.log(_FREQUENT))
 
 @dataclass(frozen=True)
 class PaneEchoes:
-    """What comes back of the beams that a pane does not return itself; (B,) each."""
+    """What returns of the beams that the pane itself does not return; (B,) each."""
 
     mirrored: np.ndarray  # probability that it is a mirrored echo; 0 where nothing mirrors
     unmapped: np.ndarray  # density [1/m] at the measured range of ends behind the pane at what no map shows

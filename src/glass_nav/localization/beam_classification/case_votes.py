@@ -149,7 +149,7 @@ def as_seen_from(
 def learn_coatings(
     coatings: Coatings, measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote
 ) -> Coatings:
-    """What sample 0 of `expected`, a trusted pose, says of the panes' coatings."""
+    """Learn the coating of the panes from sample 0 of `expected`, a trusted pose."""
     at_pose = _inside_walls(_of_sample_0(expected), residuals)
     return coatings.learn(measured_m, at_pose, residuals.sigma_m, gate_m(residuals, vote), vote.mirror_gain)
 

@@ -95,7 +95,7 @@ class GlassMap:
         self.weigh_by(evidence)
 
     def weigh_by(self, evidence: GlassEvidence) -> None:
-        """Other evidence per crossing from now on; what was learnt before stays."""
+        """Use other evidence per crossing from now on; what was learnt stays."""
         self._evidence = evidence
         self._prior = np.log([[evidence.glass_prior / (1.0 - evidence.glass_prior)], [_THERE / (1.0 - _THERE)]])
 
@@ -170,12 +170,12 @@ class GlassMap:
         return percent
 
     def arrays(self) -> Dict[str, np.ndarray]:
-        """What was learnt, by name, for restore()."""
+        """What was learnt, as named arrays for restore()."""
         learnt = self._crossed
         return {"glass_cell": self._wall[learnt].astype(np.int32), "glass_log_odds": self._log_odds[:, learnt]}
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """What arrays() of the same map gave.
+        """Restore the arrays() of the same map.
 
         Raises:
             ValueError: it is not that.
@@ -214,7 +214,7 @@ class GlassMap:
 
     @property
     def _cells(self) -> int:
-        """Of the map with its border."""
+        """Cells of the map with its border."""
         return (self._shape[0] + 4) * self._stride
 
     def _look_at(self, wall: np.ndarray) -> None:

@@ -29,7 +29,7 @@ class RangeResiduals:
     def learn(
         self, across_m: np.ndarray, thickness_m: np.ndarray, min_sigma_m: float, max_sigma_m: float
     ) -> "RangeResiduals":
-        """After one more scan at a trusted pose.
+        """Learn from a scan at a trusted pose.
 
         Args:
             across_m: (B,) range residuals to the near boundary times cosine of incidence.

@@ -29,7 +29,7 @@ class DeadReckoning:
     distance_m: float = 0.0  # driven since the pose was sure
 
     def carried(self, step: np.ndarray, noise: OdometryNoise, noise_scale: np.ndarray = _AS_IT_IS) -> DeadReckoning:
-        """After a step of odometry. Its noise is per step: steps are those between two updates of the particles.
+        """After an odometry step. The noise is per step, so steps are those between two updates of the particles.
 
         Args:
             step: (3,) in the robot's frame before it.

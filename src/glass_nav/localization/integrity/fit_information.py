@@ -26,7 +26,7 @@ _EDGE_CELLS = 0.29  # deviation of an edge that is drawn in whole cells
 
 @dataclass(frozen=True)
 class FitInformation:
-    """Of one scan at one pose."""
+    """The information of one scan at one pose."""
 
     covariance: np.ndarray  # (3, 3) over x [m], y [m], yaw [rad], in map
     offset: (

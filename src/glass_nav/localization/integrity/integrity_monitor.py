@@ -48,7 +48,7 @@ class IntegrityMonitor:
         self._at_update = {}
 
     def stop(self) -> None:
-        """There is no tracked pose."""
+        """Stop: there is no tracked pose."""
         self._covariance = None
 
     def fits(self, scan: Scan, map_from_base: np.ndarray, step: Optional[np.ndarray], noise: OdometryNoise) -> bool:

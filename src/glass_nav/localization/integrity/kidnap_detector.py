@@ -58,7 +58,7 @@ _CLOSE = -1.0  # log likelihood ratio of another place to the tracked pose from 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the scans say about the tracked pose."""
+    """The verdict of the scans on the tracked pose."""
 
     fit: float  # present fit at it, 0..1; NaN: no scan has been evidence yet
     usual: float  # what it has been so far
@@ -75,7 +75,7 @@ class Verdict:
 
     @property
     def fit_there(self) -> float:
-        """Of the best candidate, 0..1; NaN: no search runs."""
+        """Fit of the best candidate, 0..1; NaN: no search runs."""
         return float("nan") if self.candidates is None else self.candidates.fit
 
     @property
@@ -129,14 +129,14 @@ class KidnapDetector:
         self._verdict = Verdict(float("nan"), self._usual, -np.inf, False, None, None)
 
     def decide_by(self, params: SearchParams) -> None:
-        """Other limits from the next scan on."""
+        """Use other limits from the next scan on."""
         self._params = params
         if self._search is not None:
             self._search.decide_by(params)
 
     @property
     def _tolerance(self) -> float:
-        """That a fit may be below the usual one without being in doubt."""
+        """How far a fit may be below the usual one without doubt."""
         return max(_DOUBT[0], _DOUBT[1] * self._spread)
 
     @property
@@ -152,7 +152,7 @@ class KidnapDetector:
         dead_reckoning: Optional[DeadReckoning] = None,
         period_s: Optional[float] = None,
     ) -> Verdict:
-        """One more scan and the tracked pose after it; with too few returns the verdict stays.
+        """Process a scan and the tracked pose after it; with too few returns the verdict stays.
 
         Args:
             scan: one revolution of a lidar.
@@ -274,7 +274,7 @@ class KidnapDetector:
         return usual or candidates.lead > _POOR_LEAD * self._params.search_margin
 
     def _fit_at(self, points: np.ndarray, map_from_base: np.ndarray) -> Optional[float]:
-        """Of the points (B, 2) that end where the map knows something, at a pose (3,); None: they are too few."""
+        """Fit of the points (B, 2) that end in mapped space, at a pose (3,); None: too few points."""
         known = points if self._area is None else points[self._area.ends(points, map_from_base[None])[0]]
         if len(known) < global_search.MIN_BEAMS:
             return None

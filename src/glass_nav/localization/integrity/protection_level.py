@@ -22,7 +22,7 @@ PROBABILITIES = (0.95, 0.999)
 
 
 def _multiple(probability: float) -> float:
-    """Of the standard deviation: an error of either sign is below it with that probability."""
+    """Multiple of the standard deviation that an error of either sign exceeds with the remaining probability."""
     return float(special.stdtrit(_FREEDOM, 0.5 + 0.5 * probability) * np.sqrt((_FREEDOM - 2.0) / _FREEDOM))
 
 

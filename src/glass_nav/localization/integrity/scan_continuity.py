@@ -67,7 +67,7 @@ class ScanContinuity:
 
     @property
     def _limit(self) -> float:
-        """Of the excess; none until it is known what is usual."""
+        """Limit of the excess; inf until the usual one is known."""
         return max(_BREAK[0], _BREAK[1] * self._deviation) if self._scans >= _MIN_SCANS else np.inf
 
     def _excess(self, before: _View, after: _View) -> float:

@@ -124,7 +124,7 @@ def _log_density(across_m: np.ndarray, residuals: RangeResiduals, mixture: BeamM
 
 
 def independent_beams(residuals: RangeResiduals, mixture: BeamMixture) -> float:
-    """As how many independent beams the chosen ones count.
+    """Number of independent beams as which the chosen ones count.
 
     A spread wider than the lidar's comes from the map, whose error is the same along a whole wall.
     """

@@ -20,7 +20,7 @@ _WIDER = 2.0  # than the covariance says: what is wrong in the map errs alike in
 
 @dataclass(frozen=True)
 class OdometryPrior:
-    """Over planar poses."""
+    """A prior over planar poses."""
 
     map_from_base: np.ndarray  # (3,) where odometry led
     covariance: np.ndarray  # (3, 3) of that over x [m], y [m], yaw [rad] in map

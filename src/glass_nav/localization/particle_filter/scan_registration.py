@@ -78,7 +78,7 @@ class ScanRegistration:
         points_m: np.ndarray,
         scale_m: float,
     ) -> Alignment:
-        """At most 4 distinct poses, the best first.
+        """Find at most 4 distinct poses, best first.
 
         Args:
             mean, covariance: (3,), (3, 3) of the predicted cluster.

@@ -25,7 +25,7 @@ class LocateAnswer:
 
     @property
     def text(self) -> str:
-        """One sentence for people."""
+        """The answer in one sentence."""
         return self.refusal or f"free: {segment_locator.free_in_words(self.correction)}"
 
 

@@ -38,7 +38,7 @@ def driver_markers(
     odom_frame: str,
     map_frame: str,
 ) -> MarkerArray:
-    """All of them; namespaces without anything are cleared.
+    """All markers; namespaces without content are cleared.
 
     Args:
         driver: with its graph, meetpoint and way, in a frame of its own.

@@ -91,7 +91,7 @@ class LocalizationNodeParams:
 
 @dataclass(frozen=True)
 class LocalizationParams:
-    """Everything the node reads: its own parameters and the filter's, one flat set of names."""
+    """All parameters of the node, its own and the filter's, one flat set of names."""
 
     node: LocalizationNodeParams = field(default_factory=LocalizationNodeParams)
     start: StartPose = field(default_factory=StartPose)
@@ -105,7 +105,7 @@ class LocalizationParams:
 
     @property
     def session(self) -> SessionParams:
-        """Those that the session begins with."""
+        """Parameters of the session."""
         return SessionParams(self.localizer, self.start, self.rules, self.pose_file, self.panes_file, self.method)
 
 

@@ -60,7 +60,7 @@ class LaunchError(ValueError):
 
 @dataclass(frozen=True)
 class AmclNode:
-    """One node of a launch file, as roslaunch would start it."""
+    """A node of a launch file, as roslaunch would start it."""
 
     name: str
     program: str  # package/type
@@ -94,7 +94,7 @@ class _Loader(roslaunch.xmlloader.XmlLoader):  # type: ignore[misc]
 
 
 def _reason(err: Exception) -> str:
-    """What an error of roslaunch says, in one line."""
+    """The text of a roslaunch error, in one line."""
     if isinstance(err, rospkg.ResourceNotFound):
         return f"$(find {err.args[0]}): there is no such package"
     if isinstance(err, KeyError):

@@ -73,7 +73,7 @@ def turn_choice_msg(turn: Turn, frame: str) -> TurnChoiceMsg:
 
 
 def status_msg(status: SearchStatus, frame: str) -> TopologyStatus:
-    """With an estimate also depth, candidates and turn; CONFIRMED also the relation of the frames."""
+    """The status message; with an estimate also depth, candidates and turn; CONFIRMED also the relation of frames."""
     msg = TopologyStatus(
         header=conversions.header(status.stamp_ns, frame),
         state=status.state.code,

@@ -57,7 +57,7 @@ Watch = Callable[
 
 @contextmanager
 def unwatched(what: str, steps: int) -> Iterator[Callable[[], None]]:
-    """Nobody waits."""
+    """Ignores progress."""
     yield lambda: None
 
 

@@ -32,7 +32,7 @@ Row = Dict[str, Any]
 
 
 def text_of(atlas: Atlas) -> str:
-    """One node or edge per line, so that two versions can be compared by eye."""
+    """The atlas as text, one node or edge per line, so that versions can be compared."""
     head = {
         "$schema": "../atlas.schema.json",
         "format": FORMAT,

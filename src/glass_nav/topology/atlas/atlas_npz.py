@@ -44,7 +44,7 @@ _NPZ_MISSED = "visits_node_missed"  # files of older versions lack it
 
 
 def arrays_of(atlas: Atlas) -> Dict[str, np.ndarray]:
-    """By the names in the file."""
+    """The arrays by their names in the file."""
     nodes, edges, darts, visits = atlas.nodes, atlas.edges, atlas.darts, atlas.visits
     return {
         **_free_space_arrays(atlas.source.free_space),

@@ -26,7 +26,7 @@ MAX_PAIRS = 200_000  # of one search; a torus of 40,000 darts takes 40,000 pairs
 
 @dataclass(frozen=True)
 class Proof:
-    """What the search over pairs found."""
+    """The result of the search over pairs."""
 
     indistinguishable: bool  # all candidates are
     ranks: Optional[List[int]]  # turns that tell two of them apart; None: proved, or the search was stopped

@@ -91,11 +91,11 @@ class AtlasLocalizer:
 
     @property
     def belief(self) -> Optional[Belief]:
-        """Of scans and forest; None: no scan has been evidence yet."""
+        """The belief of scans and forest; None: no scan has been evidence yet."""
         return None if self._joint is None else self._joint.belief
 
     def begin(self) -> None:
-        """What was known is forgotten; scans may come before the first meetpoint."""
+        """Start a new search; scans may come before the first meetpoint."""
         self._estimate, self._edges_before = None, 0
         if self._joint is not None:
             self._joint.forget()
@@ -162,7 +162,7 @@ class AtlasLocalizer:
         return self.map_from_base(estimate.dart[:most])
 
     def node(self, estimate: SearchEstimate) -> Optional[int]:
-        """Of the first candidate; None without one, as where only scans found the place."""
+        """Node of the first candidate; None without one, as when only scans found the place."""
         return int(self._atlas.darts.node[estimate.dart[0]]) if len(estimate.dart) else None
 
     @property

@@ -45,7 +45,7 @@ class TrialParams:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What can be measured; nodes, edges and darts as in the atlas."""
+    """The quantities that can be measured; nodes, edges and darts as in the atlas."""
 
     atlas: Atlas  # for its topology
     r_m: np.ndarray  # (N,)
@@ -57,7 +57,7 @@ class Surroundings:
 
     @classmethod
     def of(cls, atlas: Atlas) -> "Surroundings":
-        """Those of a robot in the atlas."""
+        """The surroundings of a robot in the atlas."""
         darts, position = atlas.darts, atlas.nodes.position_m
         there = twin(np.arange(len(darts)))
         step = position[darts.node[there]] - position[darts.node]
@@ -100,7 +100,7 @@ class AtlasRobot:
         self.detection_errors = 0  # so far
 
     def wake_up(self, dart: Optional[int] = None) -> Meetpoint:
-        """With a dart as the reference edge; without one, at any of the atlas."""
+        """Wake up with a dart as the reference edge; without one, at any dart of the atlas."""
         self.dart = int(self._rng.integers(len(self._world.chord_bearing_rad))) if dart is None else dart
         self.on_edge = 0.0
         return self._at_node()

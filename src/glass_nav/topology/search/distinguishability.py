@@ -21,7 +21,7 @@ from glass_nav.vocabulary import SearchState
 
 @dataclass(frozen=True)
 class Distinguishability:
-    """Of the darts that robots woke up at."""
+    """The result for the darts at which robots woke up."""
 
     starts: np.ndarray  # (S,) darts
     edges: np.ndarray  # (S,) driven until the search ended; those that confirm included

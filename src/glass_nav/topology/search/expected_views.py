@@ -28,7 +28,7 @@ Pose = Tuple[int, ...]
 
 
 class ExpectedViews:
-    """Of one atlas and its map."""
+    """The expected views of one atlas and its map."""
 
     def __init__(self, atlas: Atlas, scans: MapScans) -> None:
         self._atlas, self._scans = atlas, scans
@@ -37,7 +37,7 @@ class ExpectedViews:
         self._left = _COMPARED
 
     def forget(self) -> None:
-        """Another search: nothing was seen."""
+        """Start over for another search."""
         self._seen.clear()
 
     def arrive(self, poses: np.ndarray) -> None:

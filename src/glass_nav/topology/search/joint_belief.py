@@ -38,7 +38,7 @@ class JointBelief:
         self.forget()
 
     def forget(self) -> None:
-        """Nothing is known any more."""
+        """Start over."""
         self._poses.forget()
         self._nodes: List[Tuple[NodeEvidence, float]] = []  # with the distance driven until then
         self._odometry: Dict[int, np.ndarray] = {}  # at the last scans, by stamp [ns]

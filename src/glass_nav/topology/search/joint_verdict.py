@@ -36,7 +36,7 @@ _MAX_SHOWN = 0.9995  # of a probability in words
 
 
 class JointVerdict:
-    """Of one search at a time."""
+    """The verdict of one search at a time."""
 
     def __init__(
         self,
@@ -73,7 +73,7 @@ class JointVerdict:
         return None
 
     def at_meetpoint(self, belief: Belief, depth: int) -> SearchEstimate:
-        """What follows from the last meetpoint of the forest."""
+        """The verdict after the last meetpoint of the forest."""
         final = self.final(belief, depth)
         if final is not None:
             return final
@@ -160,7 +160,7 @@ class JointVerdict:
         )
 
     def _on_path(self, dart: np.ndarray) -> np.ndarray:
-        """Those of the darts that the forest has a path to."""
+        """The darts to which the forest has a path."""
         return dart[np.isin(dart, self._forest.candidates()[0])] if self._forest.depth >= 0 else dart[:0]
 
     def _least_passed(self, here: Meetpoint) -> int:

@@ -175,7 +175,7 @@ class Matcher:
         return log_p
 
     def sigma_r_m(self, meetpoint: Optional[Meetpoint] = None) -> float:
-        """Of a measured equidistance, without the uncertainty of the atlas."""
+        """Standard deviation of a measured equidistance, without the uncertainty of the atlas."""
         return (meetpoint.sigma_r_m if meetpoint else 0.0) or self.tolerances.r_sigma_m
 
     def _r_fits(self, node: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
@@ -202,7 +202,7 @@ class Matcher:
         return traversal.sigma_length_m or float(self.tolerances.sigma_length_m(np.array(traversal.length_m)))
 
     def sigma_chord_m(self, traversal: Traversal) -> float:
-        """Of a measured chord, without the uncertainty of the atlas."""
+        """Standard deviation of a measured chord, without the uncertainty of the atlas."""
         return traversal.sigma_chord_m or float(self.tolerances.sigma_length_m(np.array(traversal.length_m)))
 
     def longest_m(self, traversal: Traversal, edges: int = 1) -> float:

@@ -49,7 +49,7 @@ def of_last_row(matcher: Matcher, forest: SearchForest) -> List[RuledOut]:
 
 
 def words(gone: RuledOut) -> str:
-    """For people: "length 8.00 m, driven 11.20 m"."""
+    """The mismatch in words: "length 8.00 m, driven 11.20 m"."""
     if gone.test == "scan":
         return "the scan does not fit" if math.isnan(gone.seen) else f"explains {gone.seen:.0%} of the scan"
     verb = "driven" if gone.test in ("length", "chord", "turn") else "seen"

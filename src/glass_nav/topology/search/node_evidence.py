@@ -26,7 +26,7 @@ _NO_PATH = -1.5  # the forest has no path to the dart, or for each detection err
 
 @dataclass(frozen=True)
 class NodeEvidence:
-    """Of one meetpoint."""
+    """The evidence of one meetpoint."""
 
     odom_from_base: np.ndarray  # (3,) there
     dart: np.ndarray  # (D,) that match, by x of their poses
@@ -37,7 +37,7 @@ class NodeEvidence:
     def of(
         cls, matcher: Matcher, meetpoint: Meetpoint, odom_from_base: np.ndarray, path: np.ndarray, errors: np.ndarray
     ) -> NodeEvidence:
-        """Of a meetpoint where the robot stood at that odometry (3,).
+        """The evidence of a meetpoint where the robot stood at that odometry (3,).
 
         Args:
             matcher: of the atlas.

@@ -32,7 +32,7 @@ class PassedEdges:
         self._driven_m = 0.0
 
     def begin(self, meetpoint: Meetpoint) -> None:
-        """Nothing was passed yet."""
+        """Start over."""
         self._forget()
         self._last = meetpoint
 
@@ -68,7 +68,7 @@ class PassedEdges:
 
 
 def _in_odom(meetpoint: Meetpoint) -> "tuple[np.ndarray, np.ndarray]":
-    """Where it is (2,), and the directions (degree,) of its edges."""
+    """Position (2,) of the meetpoint in odom, and directions (degree,) of its edges."""
     assert meetpoint.odom_from_base is not None
     return (
         se2.transform_points(meetpoint.odom_from_base, meetpoint.centre_m),

@@ -13,7 +13,7 @@ from glass_nav.world.grid_map import GridMap
 
 
 class ServedExplanation:
-    """As ScanExplanation; without a map scans are no evidence."""
+    """A ScanExplanation of the served map; without a map scans are no evidence."""
 
     def __init__(self) -> None:
         self._explanation: Optional[ScanExplanation] = None

@@ -38,7 +38,7 @@ def run(
     in_atlas: bool = True,
     dart: Optional[int] = None,
 ) -> Trial:
-    """One robot, from waking up (at a dart, or anywhere) to the end of its search."""
+    """Simulates one robot, from waking up (at a dart, or anywhere) to the end of its search."""
     robot = AtlasRobot(world, p, rng)
     step_ms: List[float] = []
     truth_lost_at: Optional[int] = None

@@ -104,7 +104,7 @@ class Chains:
             self._at[end].remove(number)
 
     def _join(self, first: int, second: int, junction: int) -> int:
-        """One chain of two that meet where nothing else does."""
+        """Joins two chains that meet where nothing else does."""
         turned = self._ends[first][0] == junction, self._ends[second][1] == junction
         parts = [
             [(part, back != turn) for part, back in self._parts[number][:: -1 if turn else 1]]
