@@ -1,4 +1,4 @@
-"""glass_nav atlas: what can be done with an atlas without a robot, a module for each."""
+"""glass_nav atlas: commands for atlases, a module for each. Need no robot."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import Any, Dict, Optional
 from glass_nav.cli import atlas_build, atlas_check, atlas_explain, atlas_show, atlas_wake_up
 from glass_nav.cli.parser import add_commands
 
-HELP = "build, check and try out an atlas"
-DESCRIPTION = "The hierarchical atlas of a floor, and what a robot that wakes up can make of it. Needs no roscore."
+HELP = "build, check and test an atlas"
+DESCRIPTION = """Builds the atlas of a floor from its map, checks it, and tests how well a robot that wakes up there finds
+out where it is. Needs no roscore."""
 EXAMPLES = (
     "glass_nav atlas build floor.yaml --out atlas/floor",
     "glass_nav atlas show glass_office --out pictures",

@@ -1,4 +1,4 @@
-"""glass_nav landmarks: what positions from landmark bearings will be worth, and where one more tag helps most."""
+"""glass_nav landmarks: expected accuracy of positions from landmarks, and where to add landmarks."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from glass_nav.world import landmark_file, map_file
 from glass_nav.world.grid_map import GridMap
 from glass_nav.world.landmark_map import RANGE_M, VIEW_RAD, LandmarkMap
 
-HELP = "plan where landmarks for bearings shall hang"
-DESCRIPTION = """plan: how well a robot that sees the landmarks of a file will know its position, all over a map, and
-where more of them help most. Prints a line for each state, writes the picture landmarks.png and the file
-landmarks.yaml with the suggested ones added."""
+HELP = "plan where to place landmarks"
+DESCRIPTION = """Computes the expected position error all over a map for a robot that measures bearings to the landmarks
+of a file, and where more landmarks would help most. Writes the picture landmarks.png, and landmarks.yaml with the suggested
+landmarks added."""
 EXAMPLES = (
     "glass_nav landmarks plan floor.yaml landmarks.yaml --out plan",
     "glass_nav landmarks plan floor.yaml landmarks.yaml --add 3 --glass-map results/glass_map.yaml",
@@ -50,27 +50,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="LANDMARKS",
         help="landmarks.yaml: sigma, and landmarks, a list of {id, position: [x, y], facing_deg, "
-        "view_deg, range}; an empty list plans from nothing",
+        "view_deg, range}; the list may be empty",
     )
     plan.add_argument(
         "--out", type=Path, default=Path("."), metavar="DIR", help=f"for {PICTURE} and {FILE} (default .)"
     )
-    plan.add_argument("--add", type=int, default=1, metavar="N", help="tags to suggest (default 1)")
+    plan.add_argument("--add", type=int, default=1, metavar="N", help="number of landmarks to suggest (default 1)")
     plan.add_argument(
         "--step-deg",
         type=float,
         default=1.0,
         metavar="DEG",
-        help="steps in which bearings are read, degrees (default 1)",
+        help="resolution of the bearings, degrees (default 1)",
     )
     plan.add_argument(
         "--glass-map",
         type=Path,
         metavar="MAP",
-        help="glass_map.yaml of glass_nav replay: walls of glass hide no tag; without it all walls do",
+        help="glass_map.yaml of glass_nav replay: landmarks are visible through glass; without it all walls hide them",
     )
     plan.add_argument(
-        "--spacing", type=float, default=0.5, metavar="M", help="of the places looked at, m (default 0.5)"
+        "--spacing",
+        type=float,
+        default=0.5,
+        metavar="M",
+        help="distance between the evaluated positions, m (default 0.5)",
     )
 
 
@@ -188,7 +192,7 @@ def _line(sigma_m: np.ndarray, seen: np.ndarray) -> str:
 
 
 def _as_map(suggestions: List[Suggestion], landmarks: LandmarkMap) -> LandmarkMap:
-    """With names that are not taken yet."""
+    """The suggestions as landmarks, with unused names."""
     names: List[str] = []
     number = 1
     while len(names) < len(suggestions):

@@ -98,7 +98,7 @@ class _Version(argparse.Action):
 
 
 def _run(program: str, module: Any, arguments: argparse.Namespace) -> int:
-    """One subcommand, its errors as a line and an exit code."""
+    """Runs a subcommand; errors become a line and an exit code."""
     wrong = module.usage_error(arguments)
     if wrong is not None:
         print(f"{program}: {wrong}", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""glass_nav map: the glass that a map lacks, a module for each thing to do about it."""
+"""glass_nav map: commands for glass that a map lacks, a module for each."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from glass_nav.cli import map_draw, map_panes, map_show
 from glass_nav.cli.parser import add_commands
 
 HELP = "find the glass that a map lacks, and draw it in"
-DESCRIPTION = """Mappers erase panes, because beams pass them. These commands find the missing panes in recorded
+DESCRIPTION = """Mappers erase panes because beams pass them. These commands find the missing panes in recorded
 drives, draw them into a copy of the map, and show the result. Needs no roscore."""
 EXAMPLES = (
     "glass_nav map panes run.bag --map floor.yaml --out with_glass",

@@ -1,4 +1,4 @@
-"""The parser of glass_nav: examples at the end of each --help, and suggestions for a mistyped subcommand."""
+"""The parser of glass_nav: examples at the end of each --help, and suggestions for mistyped subcommands."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def add_commands(parser: argparse.ArgumentParser, dest: str, metavar: str, modul
 
 
 def give_examples(parser: argparse.ArgumentParser, examples: Sequence[str]) -> None:
-    """What the help of a CommandParser ends with."""
+    """Adds examples at the end of the help of a CommandParser."""
     assert isinstance(parser, CommandParser)
     parser.examples = examples
 
