@@ -95,7 +95,7 @@ class ScanRegistration:
         found = self._align_around(mean, covariance, _LEVELS[0], points_m)
         suspect, self._suspect = self._suspect, None
         self._fit_ahead = float(scan_alignment.fit(self._field, points_m, mean[None])[0])
-        self.fits = not (found.fit[0] < _POOR_FIT * self._usual_fit or found.fit[0] < _HALF)
+        self.fits = not found.fit[0] < _POOR_FIT * self._usual_fit
         self.contradicts_odometry = self._contradicts(found, mean, covariance, points_m)
         self.is_evidence = not found.fit[0] < _NO_EVIDENCE_FIT * self._lasting_fit
         if not self.fits:
