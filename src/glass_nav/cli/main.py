@@ -78,7 +78,7 @@ def complete(parser: argparse.ArgumentParser) -> None:
 
 
 def _parser(modules: Dict[str, Any]) -> CommandParser:
-    parser = CommandParser(prog="glass_nav", description="Localization in buildings of glass: offline tools.")
+    parser = CommandParser(prog="glass_nav", description="Offline tools for localization in buildings with glass.")
     parser.examples = EXAMPLES
     parser.add_argument("--version", action=_Version)
     add_commands(parser, "command", "COMMAND", modules)
