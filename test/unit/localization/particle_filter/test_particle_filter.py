@@ -161,7 +161,8 @@ def test_a_cabinet_beside_the_robot_does_not_pull_a_pose_that_odometry_knows(beh
 
 
 @pytest.mark.parametrize(
-    ("share", "is_worth"), [pytest.param(0.2, True, id="a few people"), pytest.param(0.7, False, id="most of what it sees")]
+    ("share", "is_worth"),
+    [pytest.param(0.2, True, id="a few people"), pytest.param(0.7, False, id="most of what it sees")],
 )
 def test_a_scan_is_worth_nothing_where_the_map_lacks_most_of_what_it_sees(share, is_worth):
     scan = L_ROOM.scan(TRUE, rng=np.random.default_rng(0))
@@ -180,7 +181,9 @@ def test_a_pose_that_odometry_rules_out_and_the_scan_hardly_proves_is_not_taken(
     ranges_m = scan.ranges_m.copy()
     ranges_m[shorter] *= np.linspace(0.3, 0.7, len(shorter))
     classifier, tight = BeamClassifier(PARAMS.classifier, MAP), np.diag([0.01, 0.01, 0.005]) ** 2
-    odd = started(spread=np.array([0.01, 0.01, 0.005])).register(replace(scan, ranges_m=ranges_m), np.zeros(3), classifier, tight)
+    odd = started(spread=np.array([0.01, 0.01, 0.005])).register(
+        replace(scan, ranges_m=ranges_m), np.zeros(3), classifier, tight
+    )
     clear = started(spread=np.array([0.01, 0.01, 0.005])).register(scan, np.zeros(3), classifier, tight)
     assert off(odd.map_from_base, TRUE)[0] < 0.1
     assert off(clear.map_from_base, TRUE)[0] > 0.25
