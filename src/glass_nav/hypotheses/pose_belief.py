@@ -46,7 +46,7 @@ _TRACED = 40  # new poses that are traced back: up to 0.1 ms for each of the vie
 _AS_GOOD = 0.1  # share that a new pose explains less than the best: not worth tracing
 _SEARCH_AGAIN_M = 3.0
 _APART_M = 0.7  # places
-NEW = -2  # label of a pose that nobody has weighed
+NEW = -2  # label of a pose without a weight
 
 
 class Search(Protocol):
@@ -97,7 +97,7 @@ class Evidence:
     explained: np.ndarray  # (K,) pieces of wall that the map explains
     seen: np.ndarray  # (K,) pieces of wall that it should
     other_nats: np.ndarray  # (K,) log likelihood ratios by what is not a scan
-    label: np.ndarray  # (K,) int, of whoever weighs the poses; NEW: not weighed yet
+    label: np.ndarray  # (K,) int, given by the caller; NEW: not weighted yet
 
     @classmethod
     def none(cls, count: int) -> Evidence:

@@ -68,7 +68,7 @@ class JointVerdict:
             reason = f"{self._place(belief)}; it explains {explained:.0%} of the walls seen"
             return self._estimate(SearchState.CONFIRMED, reason, depth, dart, None, belief.poses[0].copy())
         if 1.0 - belief.elsewhere < risk and belief.searches >= _LOST_SEARCHES and belief.driven_m >= _LOST_M:
-            reason = f"no place of the map explains what was seen: the best one {explained:.0%} of the walls"
+            reason = f"no place in the map explains what was seen: the best one {explained:.0%} of the walls"
             return self._estimate(SearchState.LOST, reason, depth, np.zeros(0, np.int64), None)
         return None
 
@@ -90,7 +90,7 @@ class JointVerdict:
         if len(dart) < 2:
             state = SearchState.TENTATIVE if len(left) == 1 else SearchState.SEARCHING
             choice = TurnChoice(self._least_passed(here), here.degree)
-            reason = f"{places}; next a new edge, as more walls are to confirm it"
+            reason = f"{places}; next a new edge, to see more walls"
             return self._estimate(state, reason, depth, dart, choice)
         poses = belief.poses[known[first[order]]]
         if self._views is not None:
@@ -116,7 +116,7 @@ class JointVerdict:
         if proof is not None and proof.indistinguishable and 1.0 - listed < self._params.tolerances.risk and depth > 0:
             reason = f"{len(dart)} places match, and no turn can tell them apart"
             return self._estimate(SearchState.AMBIGUOUS, reason, depth, dart, None)
-        reason = f"{places}; no turn is known to tell them apart, next a new edge"
+        reason = f"{places}; no turn is known to tell them apart; next a new edge"
         return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(rank, here.degree))
 
     def _estimate(
