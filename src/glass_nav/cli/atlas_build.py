@@ -1,4 +1,4 @@
-"""glass_nav atlas build: the atlas of any map that map_server can serve."""
+"""glass_nav atlas build: builds the atlas of a map."""
 
 from __future__ import annotations
 

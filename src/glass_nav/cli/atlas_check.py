@@ -1,4 +1,4 @@
-"""glass_nav atlas check: is the file valid, and which places are indistinguishable?"""
+"""glass_nav atlas check: validates an atlas, and lists indistinguishable places."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def main(arguments: argparse.Namespace) -> None:
 
 
 def summary(atlas: Atlas, tolerances: Tolerances) -> List[str]:
-    """What an atlas consists of, and what robots taught it."""
+    """The contents of an atlas, and its statistics."""
     counts = np.bincount(atlas.nodes.kind, minlength=len(KINDS)).tolist()
     kinds = ", ".join(
         f"{count} {KINDS[kind].replace('_', ' ')}{'s' * (count != 1)}" for kind, count in enumerate(counts) if count
@@ -95,7 +95,7 @@ def summary(atlas: Atlas, tolerances: Tolerances) -> List[str]:
 
 
 def learnt(atlas: Atlas, tolerances: Tolerances) -> List[str]:
-    """What robots have taught the atlas, one line for each node or edge; none without enough visits."""
+    """What robots have learnt, one line for each node or edge; none without enough visits."""
     known, lines = learnt_atlas.of(atlas, tolerances), []
     for what, value, of_map, sigma, of_map_sigma, count in (
         ("r", known.nodes.r_m, atlas.nodes.r_m, known.nodes.sigma_r_m, atlas.nodes.sigma_r_m, atlas.visits.node_count),
@@ -123,7 +123,7 @@ def learnt(atlas: Atlas, tolerances: Tolerances) -> List[str]:
 
 
 def verdict(atlas: Atlas, found: Distinguishability) -> List[str]:
-    """What can be distinguished, and after how many edges."""
+    """Which places are indistinguishable, and how many edges are needed."""
     tried = len(found.starts)
     of = "everywhere" if tried == len(atlas.darts) else f"{tried} of {len(atlas.darts)} places"
     lines = (

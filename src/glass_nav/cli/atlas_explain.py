@@ -1,4 +1,4 @@
-"""glass_nav atlas explain: the search forest row by row, as the document draws it."""
+"""glass_nav atlas explain: prints a search forest row by row, as in the document."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""glass_nav atlas wake-up: trials without a robot."""
+"""glass_nav atlas wake-up: simulates robots that search in an atlas."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""glass_nav compare: runs, parameters or recorded poses side by side, with confidence over seeds."""
+"""glass_nav compare: compares runs, parameter sets or recorded poses, with confidence intervals."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def main(arguments: argparse.Namespace) -> bool:
 
 
 def _run(jobs: List[Job], arguments: argparse.Namespace) -> "Tuple[List[Run], List[Failed]]":
-    """All jobs, with one progress over all of them."""
+    """Runs all jobs, with one progress bar."""
     if not jobs:
         return [], []
     opened: List[Job] = []

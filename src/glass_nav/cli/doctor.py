@@ -1,4 +1,4 @@
-"""glass_nav doctor: what is wrong with a robot's bag, or with the robot as it runs. No roscore for a bag."""
+"""glass_nav doctor: finds faults of a bag or of the running robot. A bag needs no roscore."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""glass_nav landmarks limits: the seed document's table of position errors for any three landmarks and any step angle."""
+"""glass_nav landmarks limits: the document's table of position errors, for any three landmarks and step angle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""glass_nav locate: one scan, a rough pose -> the pose at which the scan lies on the walls of the map. No roscore."""
+"""glass_nav locate: corrects a rough pose so that one scan lies on the walls of the map. No roscore."""
 
 from __future__ import annotations
 

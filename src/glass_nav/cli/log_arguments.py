@@ -12,7 +12,7 @@ from glass_nav.replay.window import Window
 
 
 def add_run_arguments(parser: argparse.ArgumentParser) -> None:
-    """What makes one run over a log another than the next."""
+    """Options of a single run over a log."""
     parser.add_argument(
         "--params",
         type=Path,
@@ -23,7 +23,7 @@ def add_run_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_log_arguments(parser: argparse.ArgumentParser) -> None:
-    """What is taken from a log, and where the robot starts in it: the same for all runs over it."""
+    """Options of the log and of the start, common to all runs over it."""
     parser.add_argument(
         "--ground-truth",
         metavar="TOPIC_OR_FILE",
@@ -79,7 +79,7 @@ def add_log_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def log_use(arguments: argparse.Namespace) -> LogUse:
-    """What the options of add_log_arguments() ask for.
+    """The values of the options of add_log_arguments().
 
     Raises:
         ValueError: what cannot be; one line.

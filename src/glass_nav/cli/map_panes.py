@@ -1,4 +1,4 @@
-"""glass_nav map panes: recorded drives -> the panes that the map lacks, and the map with them."""
+"""glass_nav map panes: finds the panes that a map lacks in recorded drives, and draws them in."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""glass_nav map show: a map with its panes as a picture."""
+"""glass_nav map show: draws a map with its panes as a picture."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
-    """Nothing can be wrong with the options as such."""
+    """None: any combination of options is valid."""
     return None
 
 

@@ -1,4 +1,4 @@
-"""glass_nav params: the parameters of a launch file written for amcl, as this package takes them. No roscore."""
+"""glass_nav params: translates the parameters of a launch file written for amcl. No roscore."""
 
 from __future__ import annotations
 

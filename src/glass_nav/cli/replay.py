@@ -1,4 +1,4 @@
-"""glass_nav replay: a recorded robot through the filter, and how well it went. No roscore."""
+"""glass_nav replay: runs the filter over a recorded log, and scores it. No roscore."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def main(arguments: argparse.Namespace) -> bool:
 
 
 def run(options: ReplayOptions, outputs: Outputs) -> Dict[str, Any]:
-    """One replay, with its progress and figures printed.
+    """Runs one replay, and prints its progress and figures.
 
     Raises:
         RecordingError, MapError, AtlasError, ParamError, ValueError, OSError: bad input; one line.

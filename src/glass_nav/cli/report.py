@@ -1,4 +1,4 @@
-"""glass_nav report: one run as one HTML file with its pictures inside."""
+"""glass_nav report: writes one run as an HTML file with its pictures inside."""
 
 from __future__ import annotations
 

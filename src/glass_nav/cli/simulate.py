@@ -1,4 +1,4 @@
-"""glass_nav simulate: a robot drives through a building of walls and glass, and a bag records it. No roscore."""
+"""glass_nav simulate: drives a simulated robot through a building with glass and records a bag. No roscore."""
 
 from __future__ import annotations
 
@@ -190,7 +190,7 @@ def _maps(arguments: argparse.Namespace, building: Building) -> Dict[str, GridMa
 
 
 def write_frame(bag: BagWriter, frame: Frame, period_s: float) -> None:
-    """All that was recorded since the frame before, and the truth of this one."""
+    """Writes everything recorded since the last frame, and the ground truth of this one."""
     for reading in frame.odometry:
         bag.odometry(reading.stamp_ns, reading.odom_from_base, reading.velocity)
         if reading.wheels_rad is not None:
@@ -200,7 +200,7 @@ def write_frame(bag: BagWriter, frame: Frame, period_s: float) -> None:
 
 
 class _Tally:
-    """What a run was, in a line."""
+    """Summary of a run in one line."""
 
     def __init__(self) -> None:
         self._began_s = time.perf_counter()

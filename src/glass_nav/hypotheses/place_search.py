@@ -1,9 +1,9 @@
-"""One scan, odometry since -> the places of the whole map where it fits, found in slices.
+"""Finds all places of the map where a scan fits, in slices over several scans.
 
-Matching a scan against every pose of a large map takes longer than a robot may wait for its pose. So the search goes on
-a little with each later scan, and the places it ends with are carried by odometry to where the robot is by then. A slice
-is a count of look-ups in the map and no time, so that a replay gives the same answer; where scans follow each other
-quickly it is smaller. K places, B beams.
+Matching a scan against every pose of a large map takes longer than a robot may wait for its pose. So the search
+continues a little with each later scan, and odometry moves the places found to the present. A slice is a number of
+look-ups in the map, not a time, so that a replay gives the same result; it is smaller if scans follow each other
+quickly. K places, B beams.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class PlaceSearch:
         self._fits: List[np.ndarray] = []  # (N,) of them
 
     def advance(self, period_s: Optional[float] = None) -> bool:
-        """One slice; whether the search is complete.
+        """Search one slice; returns whether the search is complete.
 
         Args:
             period_s: from the scan before to this one; None: not known.

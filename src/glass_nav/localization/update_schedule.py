@@ -38,7 +38,7 @@ class UpdateSchedule:
         return odom_from_base
 
     def is_due(self, lidar: str, odom_from_base: np.ndarray, schedule: Schedule) -> bool:
-        """Each lidar has one update after enough distance or turn by odometry."""
+        """Whether an update is due: for each lidar, after enough distance or turn by odometry."""
         step = self.step_to(odom_from_base)
         if step is not None:
             distance_m, turn_rad = se2.travelled(step)

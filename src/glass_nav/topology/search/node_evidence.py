@@ -1,9 +1,9 @@
-"""A meetpoint, poses -> the log likelihood ratio of the meetpoint at each pose to a robot elsewhere.
+"""The log likelihood ratio of a meetpoint at each of many poses, relative to a robot elsewhere.
 
-A pose expects a meetpoint where the atlas has one, as the atlas describes it: degree, equidistance, angles between
-the edges, each with the tolerances of the matcher. Elsewhere a meetpoint is like any of the atlas: what many have in
-common speaks for none. The edge by which the robot came is evidence through the pose, which odometry carried along
-it, and through the forest, whose tests it passed (length, chord, directions, walls). D darts, K poses.
+Where the atlas has a meetpoint, it is expected as the atlas describes it: degree, equidistance, angles between the
+edges, each with the tolerances of the matcher. Elsewhere a meetpoint is like any of the atlas, so properties that
+many have in common are no evidence. The edge along which the robot came counts through the pose, which odometry moved
+along it, and through the forest, whose tests it passed (length, chord, directions, walls). D darts, K poses.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _NO_PATH = -1.5  # the forest has no path to the dart, or for each detection err
 
 @dataclass(frozen=True)
 class NodeEvidence:
-    """Of one meetpoint."""
+    """The evidence of one meetpoint."""
 
     odom_from_base: np.ndarray  # (3,) there
     dart: np.ndarray  # (D,) that match, by x of their poses
@@ -37,7 +37,7 @@ class NodeEvidence:
     def of(
         cls, matcher: Matcher, meetpoint: Meetpoint, odom_from_base: np.ndarray, path: np.ndarray, errors: np.ndarray
     ) -> NodeEvidence:
-        """Of a meetpoint where the robot stood at that odometry (3,).
+        """The evidence of a meetpoint where the robot stood at that odometry (3,).
 
         Args:
             matcher: of the atlas.
