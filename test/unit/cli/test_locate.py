@@ -172,7 +172,7 @@ def test_wrong_options_are_told_before_any_file_is_opened(room, capsys, options,
     assert line in capsys.readouterr().err
 
 
-def test_files_that_are_not_there_are_told(room, capsys):
+def test_files_that_are_not_there_are_reported(room, capsys):
     assert locate(room, TRUE, scan="none.csv") == 3
     assert "none.csv" in capsys.readouterr().err
     assert locate(room, TRUE, grid="none.yaml") == 3

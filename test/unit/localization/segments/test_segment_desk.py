@@ -25,7 +25,7 @@ def test_a_rough_pose_is_corrected():
     assert answer.correction.after.combined > answer.correction.before.combined
 
 
-def test_the_hallway_effect_is_told_in_the_message():
+def test_the_hallway_effect_is_reported_in_the_message():
     true = np.array([30.0, 1.1, 0.2])
     scan = CORRIDOR.scan(true)
     answer = SegmentDesk().locate(CORRIDOR.grid_map(), replace(scan, range_max_m=8.0), true + [0.3, 0.1, 0.0])
