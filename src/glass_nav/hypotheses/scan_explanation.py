@@ -128,6 +128,10 @@ class ScanExplanation:
         first_m = self._caster.cast(map_from_base[None], directions, _SEES_M)[0]
         return Scan(0, first_m, directions, 0.0, _SEES_M, np.zeros(3))
 
+    def is_free(self, points_m: np.ndarray) -> np.ndarray:
+        """(...) bool: by the map a robot may stand at points (..., 2) [m]."""
+        return self._known_area.is_free(points_m)
+
     def _slid(self, points_m: np.ndarray, poses: np.ndarray, most_m: float, most_rad: float) -> np.ndarray:
         slid = scan_alignment.align(self._field, points_m, poses, last_scale_m=0.1).poses
         off = slid - poses
@@ -153,7 +157,8 @@ class ScanExplanation:
         near = np.abs(ahead_m) < _BACK_M
         back = (near & (ahead_m > 0.0)).any(axis=0) & ~(near & (ahead_m <= 0.0)).any(axis=0)
         back &= self._known_area.is_unmapped(ends)
-        return explained, explained | stopped | (self._known_area.contains(ends) & ~back)
+        unseen = (hits.first_m > measured) & self._known_area.is_beside_unmapped(ends)
+        return explained, explained | stopped | (self._known_area.contains(ends) & ~back & ~unseen)
 
 
 def _used_beams(scan: Scan) -> Optional[np.ndarray]:
