@@ -34,18 +34,27 @@ class ExpectedViews:
         self._atlas, self._scans = atlas, scans
         self._known: Dict[Tuple[Pose, Pose], float] = {}
         self._seen: List[np.ndarray] = []  # (C, 2) where the robot would have been, at each arrival
+        self._aimed = np.zeros((0, 3))  # where the robot will have been at its next arrival
         self._left = _COMPARED
 
     def forget(self) -> None:
         """Another search: nothing was seen."""
         self._seen.clear()
+        self._aimed = np.zeros((0, 3))
 
     def arrive(self, poses: np.ndarray) -> None:
         """The robot is at one of poses (C, 3): what is seen there is known now, and told them apart or not."""
-        self._seen.append(poses[:, :2].copy())
+        self._seen.append(np.concatenate([poses, self._aimed])[:, :2])
+        self._aimed = np.zeros((0, 3))
         self._left = _COMPARED  # pairs for the next step
         if len(self._known) > _MAX_KEPT:
             self._known.clear()
+
+    def aim(self, poses: np.ndarray) -> None:
+        """The robot drives to one of poses (C, 3), and sees at its next arrival what it can see there: it may find the way
+        blocked, or its graph drawn otherwise than the atlas, and is not to try again for ever.
+        """
+        self._aimed = poses
 
     @property
     def is_exhausted(self) -> bool:
