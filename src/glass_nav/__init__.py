@@ -1,4 +1,4 @@
-"""Where is a ROS 1 robot with a 2D lidar, in a building full of glass?"""
+"""Localization of ROS 1 robots with a 2D lidar in buildings with glass walls."""
 
 import os as _os
 

@@ -53,7 +53,7 @@ def adapted(mapping: Mapping[str, Any], cls: type) -> Dict[str, Any]:
 def without_unused(
     mapping: Mapping[str, Any], cls: type, also_unused: "frozenset[str]" = frozenset()
 ) -> "Tuple[Dict[str, Any], List[str]]":
-    """What of the mapping the dataclass cls may be asked for, and the sorted names that were taken off.
+    """The entries of the mapping that the dataclass cls has, and the sorted names of the others.
 
     Args:
         mapping: flat names -> values.

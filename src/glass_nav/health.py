@@ -1,4 +1,4 @@
-"""What a node tells its operators about itself: the entries of /diagnostics, free of ROS."""
+"""The entries of /diagnostics, without ROS."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Level(IntEnum):
 
 @dataclass(frozen=True)
 class Health:
-    """One entry: a level, one sentence, and figures by name."""
+    """One entry: a level, one sentence, and named figures."""
 
     level: Level
     message: str

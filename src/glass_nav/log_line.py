@@ -1,4 +1,4 @@
-"""A line of the log, as what decides hands it to what writes it."""
+"""A log line, passed from the code that decides to the node that writes it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class LogLine:
-    """To be logged."""
+    """A line for the log."""
 
     text: str
     level: int = logging.INFO

@@ -1,4 +1,4 @@
-"""What the computer has, and what of it this process takes."""
+"""Memory and cores of the computer, and the memory of this process."""
 
 from __future__ import annotations
 

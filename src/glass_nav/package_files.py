@@ -1,4 +1,4 @@
-"""Names of what comes with the package -> its files: maps/NAME/..., atlas/NAME/..., in a checkout or installed."""
+"""Finds files that come with the package by name: maps/NAME/..., atlas/NAME/..., in a checkout or installed."""
 
 from __future__ import annotations
 

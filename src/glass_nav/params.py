@@ -1,4 +1,4 @@
-"""A mapping of names to values -> a validated dataclass.
+"""Turns a mapping of names to values into a validated dataclass.
 
 One flat set of names, as ROS keeps parameters; the dataclass may nest other dataclasses, one struct
 per model. Nothing is converted or repaired: a wrong value is refused in one line that says who, what,

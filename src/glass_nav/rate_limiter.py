@@ -1,4 +1,4 @@
-"""Limits how often a thing is done; the caller says what time it is."""
+"""Limits how often something is done; the caller gives the time."""
 
 from __future__ import annotations
 
@@ -18,5 +18,5 @@ class RateLimiter:
 
 
 def period_s(rate_hz: float) -> float:
-    """Of a rate as AMCL's parameters give it: <= 0 means no limit."""
+    """Period of a rate as in AMCL's parameters: <= 0 means no limit."""
     return 1.0 / rate_hz if rate_hz > 0.0 else 0.0

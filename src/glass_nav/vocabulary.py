@@ -1,4 +1,4 @@
-"""The words and colours of the package: beam cases, states of localization and search, phases and outcomes of the driver.
+"""Names and colours of beam cases, states of localization and search, phases and outcomes of the driver.
 
 Every terminal line, picture, report, rviz display and message takes its names, its order and its colours from here. The
 numbers of the beam cases are those of the glass document (glass_localization.txt) and of msg/BeamCases.msg; the order of
@@ -32,7 +32,7 @@ class BeamCase(IntEnum):
 
     @property
     def label(self) -> str:
-        """For people, with its number: "3 behind one pane"."""
+        """Name with number: "3 behind one pane"."""
         return f"{self.value} {self.words}"
 
     @property
@@ -168,14 +168,14 @@ def state_hatch(state: str) -> str:
 
 
 def states_in_order(states: Iterable[str]) -> List[str]:
-    """Those that occur, each once, in the order of the colours; states that a later version wrote come last."""
+    """The states that occur, each once, in the order of the colours; states of later versions come last."""
     found = set(states)
     known = [str(state) for state in STATE_COLOURS if state in found]
     return known + sorted(found - set(known))
 
 
 class WallKind(Word):
-    """What a wall proved to be, by its probability of glass."""
+    """Kind of a wall, by its probability of glass."""
 
     SOLID = "solid"
     UNDECIDED = "undecided"
@@ -202,7 +202,7 @@ SOLID_BELOW, GLASS_FROM = 25, 75  # probability of glass [percent]
 
 
 class SearchState(Word):
-    """What is known about the place in the atlas; msg/TopologyStatus.msg."""
+    """State of the search in the atlas; msg/TopologyStatus.msg."""
 
     NO_ATLAS = "NO_ATLAS"
     IDLE = "IDLE"
@@ -224,7 +224,7 @@ SEARCH_IS_OVER = (SearchState.CONFIRMED, SearchState.AMBIGUOUS, SearchState.LOST
 
 
 class DriverPhase(Word):
-    """What the driver does; msg/DriverStatus.msg."""
+    """Phase of the driver; msg/DriverStatus.msg."""
 
     IDLE = "IDLE"
     SEEKING = "SEEKING"

@@ -15,6 +15,7 @@ PYTHON = OLD / "venv" / "bin" / "python"
 
 
 @pytest.mark.skipif(sys.version_info[:2] == (3, 8), reason="the whole suite runs on Python 3.8 here")
+@pytest.mark.timeout(2400)  # a suite of its own
 @pytest.mark.skipif(not PYTHON.exists(), reason="no Python 3.8 on this machine (pyenv, /usr/bin/python3.8)")
 def test_unit_tests_pass_on_python_38(tmp_path: Path) -> None:
     # Long runs tell of figures and not of the interpreter; nor do the faults of checkup, and the tests of the command

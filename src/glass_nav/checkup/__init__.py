@@ -1,1 +1,1 @@
-"""What is wrong with a robot's scans, frames, odometry and map: knows no ROS, as the other rooms."""
+"""Finds faults of a robot's scans, frames, odometry and map. Without ROS, as all packages but `ros`."""

@@ -1,4 +1,4 @@
-"""What a robot says, and its map -> what is wrong, and what to do about it: calls the checks, in their order."""
+"""Runs all checks on the recorded messages of a robot and its map: faults, with remedies."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _SPOILS = {"scan-units", "scan-angles-no-radians", "scan-limits", "scan-blind", 
 
 @dataclass(frozen=True)
 class FrameNames:
-    """Of the robot; None: found by themselves."""
+    """Frames of the robot; None: detected."""
 
     odom: str = "odom"
     base: Optional[str] = None
@@ -44,14 +44,14 @@ class FrameNames:
 
 @dataclass(frozen=True)
 class Report:
-    """What was seen, a line each, and what is wrong with it."""
+    """The result of an examination: a line for each thing seen, and the findings."""
 
     seen: List[str]
     findings: List[Finding]
 
     @property
     def text(self) -> str:
-        """For people: what was seen, then each finding with what to do."""
+        """The report as text: what was seen, then each finding with its remedy."""
         lines = [f"seen     {line}" for line in self.seen]
         for finding in self.findings:
             lines += ["", f"finding  {finding.name}: {finding.what}", f"  to do  {finding.advice}"]
@@ -60,7 +60,7 @@ class Report:
 
 
 def examine(seen: Observed, grid_map: Optional[GridMap] = None, names: FrameNames = FrameNames()) -> Report:
-    """All checks.
+    """Runs all checks.
 
     Args:
         seen: what the robot says.
@@ -99,7 +99,7 @@ def examine(seen: Observed, grid_map: Optional[GridMap] = None, names: FrameName
 
 
 class _Robot:
-    """Its frames and its odometry, as far as they are there."""
+    """Frames and odometry of the robot, as far as they exist."""
 
     def __init__(self, seen: Observed, names: FrameNames) -> None:
         self.findings: List[Finding] = []
@@ -139,7 +139,7 @@ class _Robot:
         )
 
     def _moving_child(self) -> str:
-        """Between odom and base, the first frame that has a parent."""
+        """The first frame between odom and base that has a parent."""
         return next((child for child in self.tree.way(self.base, self.odom)), self.base)
 
     def _follow(self, stamps: Sequence[Tuple[int, int]]) -> None:
@@ -242,7 +242,7 @@ def _check_motion_and_map(
 
 
 def _check_glass(grid_map: GridMap, robot: _Robot) -> Iterator[Finding]:
-    """What the map lacks and has too much, as each lidar sees it; only for a robot without other faults."""
+    """Panes that the map lacks and walls that are gone, by each lidar; only for a robot without other faults."""
     for placed in robot.placed.values():
         known = [(scan, odom_from_laser) for scan, odom_from_laser in placed if np.isfinite(odom_from_laser).all()]
         if known:

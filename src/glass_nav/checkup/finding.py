@@ -1,4 +1,4 @@
-"""What a check found, and what to do about it."""
+"""A fault that a check found, and its remedy."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Finding:
-    """One fault."""
+    """A fault and its remedy."""
 
     name: str  # short and for good: for scripts, and to look it up
     what: str  # what was seen, with figures

@@ -1,4 +1,4 @@
-"""The tree of frames: is there exactly one path from odom over the base to the lidar, at every scan?"""
+"""Checks the tree of frames: exactly one path from odom over the base to the lidar, at every scan."""
 
 from __future__ import annotations
 

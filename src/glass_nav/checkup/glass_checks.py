@@ -1,4 +1,4 @@
-"""Does the map lack glass, or show walls that are gone? The robot is followed through the map, scan by scan.
+"""Finds glass that the map lacks, and mapped walls that are gone, by tracking the robot through the map.
 
 The robot is looked for in the whole map, and followed where it is found. B beams.
 """

@@ -1,4 +1,4 @@
-"""Do scans and map belong together? Scans are looked for everywhere in the map, as they are, mirrored and scaled."""
+"""Checks that scans and map belong together: scans are matched everywhere, as they are, mirrored and scaled."""
 
 from __future__ import annotations
 

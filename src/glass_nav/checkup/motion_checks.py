@@ -1,4 +1,4 @@
-"""Odometry and the lidar's place on the robot, against how the lidar moved by its own scans. N pairs of scans."""
+"""Checks odometry and the lidar's mounting against the motion between scans. N pairs of scans."""
 
 from __future__ import annotations
 
@@ -96,24 +96,24 @@ class Ratio:
 
     @property
     def is_known(self) -> bool:
-        """There are enough of them, and they agree."""
+        """Whether there are enough pairs, and they agree."""
         return self.count >= _MIN_PAIRS and self.high - self.low < _SPREAD * abs(self.middle)
 
 
 def way_ratio(moves: Moves) -> Ratio:
-    """Of the distances between scans with little turn."""
+    """Ratio of the distances between scans, for pairs with little turn."""
     by_odometry, by_scans = straight(moves)
     return _ratio(np.hypot(by_scans[:, 0], by_scans[:, 1]) / np.hypot(by_odometry[:, 0], by_odometry[:, 1]))
 
 
 def turn_ratio(moves: Moves) -> Ratio:
-    """Of the turns; negative where scans and odometry turn opposite ways."""
+    """Ratio of the turns; negative where scans and odometry turn opposite ways."""
     turning = np.abs(moves.by_odometry[:, 2]) >= 0.6 * _TURN_RAD
     return _ratio(moves.by_scans[turning, 2] / moves.by_odometry[turning, 2])
 
 
 def straight(moves: Moves) -> Tuple[np.ndarray, np.ndarray]:
-    """Of the pairs with little turn, (M, 3) each: how the lidar moved by odometry, and by scans."""
+    """Motions of the lidar by odometry and by scans, (M, 3) each, of the pairs with little turn."""
     way_m, turn = np.hypot(moves.by_odometry[:, 0], moves.by_odometry[:, 1]), np.abs(moves.by_odometry[:, 2])
     straight = (way_m >= 0.6 * _WAY_M) & (turn < 0.25)
     return moves.by_odometry[straight], moves.by_scans[straight]

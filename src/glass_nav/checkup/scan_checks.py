@@ -1,4 +1,4 @@
-"""What a lidar's driver writes: angles, limits, ranges, and how it says that a beam met nothing. B beams, S scans."""
+"""Checks what the driver of a lidar sends: angles, limits, ranges, and how no return is encoded. B beams, S scans."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def check(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
 
 
 def describe(topic: str, scans: Sequence[HeardScan]) -> str:
-    """One line on a topic: how often, how many beams, and how it writes that nothing was met."""
+    """One line on a topic: rate, number of beams, and how no return is encoded."""
     if not scans:
         return f"{topic}: no scans"
     stamps_s = np.array([scan.stamp_ns for scan in scans]) * 1e-9

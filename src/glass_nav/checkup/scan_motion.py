@@ -1,4 +1,4 @@
-"""Two scans -> how the lidar moved between them: without a map, and without believing odometry.
+"""The motion of the lidar between two scans, without a map and without trusting odometry.
 
 The later scan is laid over the earlier one at every offset and turn of a grid, and the best is refined (correlative
 scan matching, Olson (2009), then scan_alignment). Nothing is assumed about the direction of the motion: an odometry

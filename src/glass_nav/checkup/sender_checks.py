@@ -1,4 +1,4 @@
-"""Two nodes that send one transform, each with stamps of its own: the robot jumps between their answers.
+"""Finds two nodes that send one transform with different values: the robot jumps between them.
 
 Known by their names, which a recorder of ROS 1 keeps; without names, by values that go there and back.
 """

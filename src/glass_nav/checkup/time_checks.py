@@ -1,4 +1,4 @@
-"""Stamps and rates: of scans against each other, and against the clock of odometry."""
+"""Checks stamps and rates: of scans against each other, and against the clock of odometry."""
 
 from __future__ import annotations
 

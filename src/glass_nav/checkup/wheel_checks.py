@@ -1,4 +1,4 @@
-"""Which wheel is it? A wrong radius and slip, from how the lidar moved by scans and by odometry. N pairs of scans.
+"""Finds the wheel with a wrong radius or slip, from the motion by scans and by odometry. N pairs of scans.
 
 By the glass document's equations (3) and (4) a wheel's increment is the forward motion plus or minus half the turn times the
 distance between the wheels: both motions say what each wheel did.

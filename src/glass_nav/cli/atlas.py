@@ -1,15 +1,15 @@
-"""glass_nav atlas: what can be done with an atlas without a robot, a module for each."""
+"""glass_nav atlas: commands for atlases, a module for each. Need no robot."""
 
 from __future__ import annotations
 
-import argparse
-from typing import Any, Dict, Optional
+from typing import Any, Dict
 
 from glass_nav.cli import atlas_build, atlas_check, atlas_explain, atlas_show, atlas_wake_up
-from glass_nav.cli.parser import add_commands
+from glass_nav.cli.parser import CommandGroup
 
-HELP = "build, check and try out an atlas"
-DESCRIPTION = "The hierarchical atlas of a floor, and what a robot that wakes up can make of it. Needs no roscore."
+HELP = "build, check and test an atlas"
+DESCRIPTION = """Builds the atlas of a floor from its map, checks it, and tests how well a robot that wakes up there finds
+out where it is. Needs no roscore."""
 EXAMPLES = (
     "glass_nav atlas build floor.yaml --out atlas/floor",
     "glass_nav atlas show glass_office --out pictures",
@@ -22,19 +22,5 @@ MODULES: Dict[str, Any] = {
     "explain": atlas_explain,
     "wake-up": atlas_wake_up,
 }
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """A subcommand for each module."""
-    add_commands(parser, "atlas_command", "COMMAND", MODULES)
-
-
-def usage_error(arguments: argparse.Namespace) -> Optional[str]:
-    """What is wrong with the options of the subcommand."""
-    wrong: Optional[str] = MODULES[arguments.atlas_command].usage_error(arguments)
-    return wrong and f"{arguments.atlas_command}: {wrong}"
-
-
-def main(arguments: argparse.Namespace) -> None:
-    """Run the subcommand."""
-    MODULES[arguments.atlas_command].main(arguments)
+_GROUP = CommandGroup("atlas_command", MODULES)
+add_arguments, usage_error, main = _GROUP.add_arguments, _GROUP.usage_error, _GROUP.main

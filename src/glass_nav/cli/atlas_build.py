@@ -1,4 +1,4 @@
-"""glass_nav atlas build: the atlas of any map that map_server can serve."""
+"""glass_nav atlas build: builds the atlas of a map."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from glass_nav.topology.atlas.voronoi.graph import VoronoiGraph
 from glass_nav.topology.atlas.voronoi_graph import VoronoiParams
 from glass_nav.world import map_file
 
-HELP = "make the atlas of a map"
-DESCRIPTION = """Makes the atlas of a map: the generalized Voronoi graph of its free space, measured, with the wall
-segments that a robot sees on each edge in each direction. Glass needs no marking: it is occupied like any wall."""
+HELP = "build the atlas of a map"
+DESCRIPTION = """Builds the atlas of a map: the generalized Voronoi graph of its free space with its lengths and
+distances, and the wall segments that a robot sees along each edge in each direction. Glass needs no marking: it is occupied like any wall."""
 EXAMPLES = (
     "glass_nav atlas build floor.yaml --out atlas/floor",
     "glass_nav atlas build floor.yaml --out atlas/floor --force",
@@ -40,26 +40,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help=f"folder for atlas.json, such as atlas/NAME; for an atlas of {NPZ_FROM_NODES} nodes or more, atlas.npz",
     )
-    parser.add_argument("--name", help="of the atlas; default: that of the folder")
-    parser.add_argument("--force", action="store_true", help="replace an atlas in which robots have left statistics")
+    parser.add_argument("--name", help="name of the atlas; default: that of the folder")
+    parser.add_argument("--force", action="store_true", help="replace an atlas that contains statistics of robots")
     _numbers(
         parser.add_argument_group("robot"),
         [
-            ("--robot-radius", "robot_radius_m", "narrower passages are closed to it, m"),
-            ("--passage-margin", "passage_margin_m", "room that it needs besides on each side of a passage, m"),
-            ("--view-range", "view_range_m", "of the lidar for the segment maps, m"),
-            ("--field-of-view", "field_of_view_deg", "of the lidar around straight ahead, degrees"),
+            ("--robot-radius", "robot_radius_m", "radius of the robot; it cannot use narrower passages, m"),
+            ("--passage-margin", "passage_margin_m", "additional clearance on each side of a passage, m"),
+            ("--view-range", "view_range_m", "range of the lidar for the segment maps, m"),
+            ("--field-of-view", "field_of_view_deg", "field of view of the lidar, centred ahead, degrees"),
         ],
     )
     _numbers(
         parser.add_argument_group("graph"),
         [
-            ("--smallest-obstacle", "smallest_obstacle_m", "smaller things that stand free make no meetpoints, m"),
-            ("--leaf", "leaf_m", "a dead end has to reach so much further than the walls do, m"),
-            ("--leaf-share", "leaf_share_of_r", "and by this share of the room at its junction"),
-            ("--merge", "merge_m", "meetpoints closer than this are one, m"),
-            ("--equidistance", "equidistance_m", "differences of distances that the robot takes for none, m"),
-            ("--smallest-component", "smallest_component_m", "parts of the floor with less way are left out, m"),
+            ("--smallest-obstacle", "smallest_obstacle_m", "smaller free-standing objects create no meetpoints, m"),
+            ("--leaf", "leaf_m", "shorter dead ends are removed: length and widening beyond the walls, m"),
+            ("--leaf-share", "leaf_share_of_r", "the same as a share of the distance from the walls at the junction"),
+            ("--merge", "merge_m", "meetpoints closer than this are merged, m"),
+            ("--equidistance", "equidistance_m", "differences between distances that count as equal, m"),
+            (
+                "--smallest-component",
+                "smallest_component_m",
+                "parts of the graph with a smaller total length are left out, m",
+            ),
         ],
     )
 

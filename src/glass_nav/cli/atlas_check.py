@@ -1,4 +1,4 @@
-"""glass_nav atlas check: is the file valid, and which places are indistinguishable?"""
+"""glass_nav atlas check: validates an atlas, and lists indistinguishable places."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from glass_nav.topology.search.distinguishability import Distinguishability
 from glass_nav.topology.search.matching import Tolerances
 from glass_nav.world import map_file
 
-HELP = "validate an atlas, and list places that are indistinguishable"
-DESCRIPTION = """Checks every rule of an atlas, then sends a robot without errors through the search from everywhere:
-which places are indistinguishable from which, and how many edges a robot needs at most and on average."""
+HELP = "validate an atlas, and list places that look alike"
+DESCRIPTION = """Checks every rule of an atlas. Then simulates the search of a robot without measurement errors from all
+starts, and reports which places are indistinguishable and how many edges a robot needs at most and on average."""
 EXAMPLES = (
     "glass_nav atlas check glass_office",
     "glass_nav atlas check atlas/floor --map floor.yaml",
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "atlas", metavar="ATLAS", help="atlas.json, atlas.npz, the folder of one, or the name of a shipped one"
     )
-    parser.add_argument("--map", type=Path, help="the atlas must be one of this map")
+    parser.add_argument("--map", type=Path, help="also check that the atlas was made from this map")
     parser.add_argument("--params", type=Path, metavar="FILE", help="yaml of parameters, names as for topology_node")
     parser.add_argument(
         "--starts",
@@ -79,7 +79,7 @@ def main(arguments: argparse.Namespace) -> None:
 
 
 def summary(atlas: Atlas, tolerances: Tolerances) -> List[str]:
-    """What an atlas consists of, and what robots taught it."""
+    """The contents of an atlas, and its statistics."""
     counts = np.bincount(atlas.nodes.kind, minlength=len(KINDS)).tolist()
     kinds = ", ".join(
         f"{count} {KINDS[kind].replace('_', ' ')}{'s' * (count != 1)}" for kind, count in enumerate(counts) if count
@@ -95,7 +95,7 @@ def summary(atlas: Atlas, tolerances: Tolerances) -> List[str]:
 
 
 def learnt(atlas: Atlas, tolerances: Tolerances) -> List[str]:
-    """What robots have taught the atlas, one line for each node or edge; none without enough visits."""
+    """What robots have learnt, one line for each node or edge; none without enough visits."""
     known, lines = learnt_atlas.of(atlas, tolerances), []
     for what, value, of_map, sigma, of_map_sigma, count in (
         ("r", known.nodes.r_m, atlas.nodes.r_m, known.nodes.sigma_r_m, atlas.nodes.sigma_r_m, atlas.visits.node_count),
@@ -123,7 +123,7 @@ def learnt(atlas: Atlas, tolerances: Tolerances) -> List[str]:
 
 
 def verdict(atlas: Atlas, found: Distinguishability) -> List[str]:
-    """What can be distinguished, and after how many edges."""
+    """Which places are indistinguishable, and how many edges are needed."""
     tried = len(found.starts)
     of = "everywhere" if tried == len(atlas.darts) else f"{tried} of {len(atlas.darts)} places"
     lines = (

@@ -1,4 +1,4 @@
-"""glass_nav atlas explain: the search forest row by row, as the document draws it."""
+"""glass_nav atlas explain: prints a search forest row by row, as in the document."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from glass_nav.topology.search.atlas_robot import AtlasRobot, Surroundings, Tria
 from glass_nav.topology.search.search_params import SearchParams
 
 HELP = "print a search forest row by row"
-DESCRIPTION = """Wakes up a robot without errors and prints its search forest: in each row every edge of every
-search node that was active in the row before, and what rules it out. Without arguments it is the worked example
-of the document on the global localization procedure, searched as it says."""
+DESCRIPTION = """Simulates a robot without measurement errors and prints its search forest: each row has every edge of
+every search node that was active in the row before, with the reason if it is ruled out. Without arguments this is the
+worked example of the document on the global localization procedure."""
 EXAMPLES = (
     "glass_nav atlas explain",
     "glass_nav atlas explain glass_office --dart 5 --best",
@@ -44,13 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=0,
         metavar="N",
-        help="by which the robot leaves first: 2e where edge e begins, 2e + 1 where it ends (default 0)",
+        help="first edge of the robot: 2e to leave along edge e from its begin, 2e + 1 from its end (default 0)",
     )
     parser.add_argument(
         "--best",
         action="store_true",
-        help="search as topology_node does, not as the document: best-splitting turns, edges that "
-        "confirm, proof of ambiguity",
+        help="search as topology_node does by default: best turn, confirming edges, proof of ambiguity",
     )
     parser.add_argument("--params", type=Path, metavar="FILE", help="yaml of parameters, names as for topology_node")
 

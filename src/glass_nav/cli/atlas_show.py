@@ -18,8 +18,8 @@ from glass_nav.world import map_file
 from glass_nav.world.grid_map import GridMap
 
 HELP = "draw an atlas over its map"
-DESCRIPTION = """Writes a PNG: the map, nodes and edges with their numbers, and the wall segments that a robot sees on
-each edge, there and back; or one edge alone."""
+DESCRIPTION = """Writes a PNG: the map, nodes and edges with their numbers, and the wall segments that a robot sees along
+each edge in each direction; or one edge alone."""
 EXAMPLES = (
     "glass_nav atlas show glass_office --out pictures",
     "glass_nav atlas show atlas/floor --edge 3 --map floor.yaml",
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="map_server .yaml, or MRPT .gridmap[.gz]; default: the map of the "
         "package that the atlas was made from, else none",
     )
-    parser.add_argument("--edge", type=int, metavar="N", help="draw this one only")
+    parser.add_argument("--edge", type=int, metavar="N", help="draw this edge only")
     parser.add_argument(
         "--out",
         type=Path,

@@ -1,4 +1,4 @@
-"""glass_nav atlas wake-up: trials without a robot."""
+"""glass_nav atlas wake-up: simulates robots that search in an atlas."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.search import wake_up_trials
 from glass_nav.topology.search.atlas_robot import TrialParams
 
-HELP = "try out how robots that wake up in an atlas fare"
-DESCRIPTION = """Simulated robots wake up anywhere in an atlas, report what they measure (with errors as large as
-the tolerances say) and drive as the search asks. Writes metrics.json: shares of robots that were confirmed at
-the right place or at a wrong one, that are ambiguous, that are lost and that were still searching; the
-edges they drove; the CPU time of the slowest step."""
+HELP = "simulate robots that wake up in an atlas"
+DESCRIPTION = """Simulates robots that wake up anywhere in an atlas, measure with the errors that the tolerances assume,
+and take the turns that the search chooses. Writes metrics.json: shares of robots that end CONFIRMED at the right or at a
+wrong place, AMBIGUOUS, LOST, or still searching; edges driven; CPU time of the slowest step."""
 EXAMPLES = (
     "glass_nav atlas wake-up glass_office --trials 100",
     "glass_nav atlas wake-up atlas/floor --missed 0.1 --out results",
@@ -32,29 +31,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "atlas", metavar="ATLAS", help="atlas.json, atlas.npz, the folder of one, or the name of a shipped one"
     )
-    parser.add_argument("--trials", type=int, default=1000, metavar="N", help="robots (default 1000)")
+    parser.add_argument("--trials", type=int, default=1000, metavar="N", help="number of robots (default 1000)")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the random numbers (default 0)")
-    parser.add_argument("--missed", type=float, default=0.0, metavar="P", help="chance to drive past a meetpoint")
+    parser.add_argument("--missed", type=float, default=0.0, metavar="P", help="probability of missing a meetpoint")
     parser.add_argument(
         "--spurious",
         type=float,
         default=0.0,
         metavar="P",
-        help="chance of an edge to show a meetpoint where there is none",
+        help="probability of a spurious meetpoint on an edge",
     )
     parser.add_argument(
         "--noise",
         type=float,
         default=1.0,
         metavar="X",
-        help="factor between the errors and those that the tolerances assume (default 1)",
+        help="measurement errors as a multiple of those that the tolerances assume (default 1)",
     )
     parser.add_argument(
         "--elsewhere",
         action="store_true",
-        help="the robots are not in the atlas, but where its parts are put together otherwise",
+        help="put the robots into another building, made of the same parts put together differently",
     )
-    parser.add_argument("--max-edges", type=int, default=100, metavar="N", help="then a robot gives up (default 100)")
+    parser.add_argument(
+        "--max-edges",
+        type=int,
+        default=100,
+        metavar="N",
+        help="a robot gives up after this number of edges (default 100)",
+    )
     parser.add_argument("--params", type=Path, metavar="FILE", help="yaml of parameters, names as for topology_node")
     parser.add_argument(
         "--out",

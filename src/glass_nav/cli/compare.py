@@ -1,4 +1,4 @@
-"""glass_nav compare: runs, parameters or recorded poses side by side, with confidence over seeds."""
+"""glass_nav compare: compares runs, parameter sets or recorded poses, with confidence intervals."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from glass_nav.evaluation.metrics.comparison import Run
 from glass_nav.evaluation.metrics.thresholds import Threshold
 from glass_nav.evaluation.pages import comparison_table
 
-HELP = "runs, parameters or recorded poses side by side, with confidence over seeds"
-DESCRIPTION = """Compares contestants over logs and seeds: prints a table and writes compare.html, one file that needs
-no network, its pictures as PNG files, runs.csv (a row per run, with the hash of its trajectory), compare.json and
-timings.csv. A contestant is a folder that `glass_nav replay --out` wrote, a yaml file of parameters, the word default,
-or poses that the log has: topic:/amcl_pose, or tf:map for what tf says. NAME=CONTESTANT names it; folders of one name
-are runs of one contestant. The others are compared with the first, seed by seed, over the scans that all have a pose
-for. A mean has its 95 % interval: Student's t over the seeds of each log, the logs as they are."""
+HELP = "compare runs, parameter sets or recorded poses, with confidence intervals"
+DESCRIPTION = """Compares contestants over logs and seeds. Prints a table and writes compare.html (one file that needs no
+network), its pictures as PNG files, runs.csv (a row per run, with the hash of its trajectory), compare.json and
+timings.csv. A contestant is a folder written by `glass_nav replay --out`, a yaml file of parameters, the word default, or
+poses recorded in the log: topic:/amcl_pose, or tf:map. NAME=CONTESTANT names it; folders with the same name are runs of one
+contestant. All are compared with the first one, seed by seed, over the scans for which all have a pose. Means have 95 %
+confidence intervals: Student's t over the seeds of each log, equal weight for all logs."""
 EXAMPLES = (
     "glass_nav compare default mine.yaml --log run.bag=floor.yaml --seeds 3 --out compared",
     "glass_nav compare before=results_1 after=results_2 --out compared",
@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=1,
         metavar="N",
-        help="runs at a time, a process each (default 1; more need the Python package distributed); changes no result",
+        help="runs at a time, a process each (default 1); changes no result",
     )
     parser.add_argument(
         "--scheduler",
@@ -141,7 +141,7 @@ def main(arguments: argparse.Namespace) -> bool:
 
 
 def _run(jobs: List[Job], arguments: argparse.Namespace) -> "Tuple[List[Run], List[Failed]]":
-    """All jobs, with one progress over all of them."""
+    """Runs all jobs, with one progress bar."""
     if not jobs:
         return [], []
     opened: List[Job] = []

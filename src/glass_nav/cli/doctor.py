@@ -1,4 +1,4 @@
-"""glass_nav doctor: what is wrong with a robot's bag, or with the robot as it runs. No roscore for a bag."""
+"""glass_nav doctor: finds faults of a bag or of the running robot. A bag needs no roscore."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from glass_nav.cli.progress import Progress
 from glass_nav.recording import bag_observer
 from glass_nav.world import map_file
 
-HELP = "say what is wrong with a bag or a running robot, and what to do"
-DESCRIPTION = """Looks at the scans, frames, stamps and odometry in a bag (of ROS 1 or ROS 2), or of the running
-robot, and with --map at how the scans fit the map; says what is wrong, each with what to do. Exit code 0: nothing,
-1: something is wrong, 2: wrong usage, 3: bad input."""
+HELP = "find faults of a bag or a running robot, with remedies"
+DESCRIPTION = """Checks scans, frames, stamps and odometry of a bag (ROS 1 or ROS 2) or of the running robot, and with
+--map how the scans fit the map. Lists each fault with its remedy. Exit code 0: no fault, 1: faults, 2: wrong usage, 3: bad
+input."""
 EXAMPLES = (
     "glass_nav doctor run.bag --map floor.yaml",
     "glass_nav doctor --live --seconds 20",

@@ -1,4 +1,4 @@
-"""glass_nav landmarks limits: the seed document's table of position errors for any three landmarks and any step angle."""
+"""glass_nav landmarks limits: the document's table of position errors, for any three landmarks and step angle."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import numpy as np
 from glass_nav.localization.bearings import bearing_errors
 from glass_nav.world import landmark_file
 
-HELP = "errors of a position from three landmarks, by the step of the emitter"
-DESCRIPTION = """limits: how wrong a position from three landmarks can be if the angles between them are read in steps
-(Tsukiyama 2009, Tables 1 and 2), and which step keeps the error within a limit. The landmarks are given in one of three
+HELP = "position errors for three landmarks, by the step angle of the emitter"
+DESCRIPTION = """Prints how large the error of a position from three landmarks can be if the angles between them are read
+in steps (Tsukiyama 2009, Tables 1 and 2), and the step that keeps the error within a limit. The landmarks are given in one of three
 ways: by --tags and --at, by --ranges and --between as the document gives them, or from a file by --landmarks, --ids and
 --at."""
 EXAMPLES = (
@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=WITHIN_M,
         metavar="M",
-        help=f"error that the step to be found keeps, m (default {WITHIN_M:g})",
+        help=f"limit of the error, for which a step is computed, m (default {WITHIN_M:g})",
     )
 
 

@@ -1,4 +1,4 @@
-"""glass_nav locate: one scan, a rough pose -> the pose at which the scan lies on the walls of the map. No roscore."""
+"""glass_nav locate: corrects a rough pose so that one scan lies on the walls of the map. No roscore."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from glass_nav.sensing.scan import Scan
 from glass_nav.world import map_file
 
 HELP = "correct a rough pose by one scan"
-DESCRIPTION = """Moves a rough pose so that the scan's beams end at the wall segments of the map, and says how well they
-do there, and which directions the walls do not constrain. Draws the scan before and after. Good from
-about 0.5 m and 10 degrees away. Ends with 3 if the scan fits nowhere near the pose."""
+DESCRIPTION = """Corrects a rough pose so that the beams of a scan end at the wall segments of the map. Prints the pose, how
+well the scan fits there, and which directions the walls do not constrain. Draws the scan before and after. The rough pose may
+be off by about 0.5 m and 10 degrees. Exit code 3 if the scan fits nowhere near it."""
 EXAMPLES = (
     "glass_nav locate --map floor.yaml --scan scan.yaml --pose 4.3 4.0 0.0",
     "glass_nav locate --map floor.yaml --scan run.bag --index 120 --pose 4.3 4.0 0.0 --out pictures",
@@ -58,8 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--method",
         choices=METHODS,
         default=METHODS[0],
-        help="least_squares: x, y and yaw at once; document: the mean of all displacements, slower to "
-        "arrive (default least_squares)",
+        help="least_squares: x, y and yaw at once; document: the mean of all displacements, "
+        "which converges more slowly (default least_squares)",
     )
     parser.add_argument(
         "--iterations",

@@ -12,23 +12,23 @@ from glass_nav.replay.window import Window
 
 
 def add_run_arguments(parser: argparse.ArgumentParser) -> None:
-    """What makes one run over a log another than the next."""
+    """Options of a single run over a log."""
     parser.add_argument(
         "--params",
         type=Path,
         metavar="FILE",
         help="yaml of parameters, names as for the node; default: the node's defaults",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the filter's random numbers (default 0)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the filter's random numbers (default 0)")
 
 
 def add_log_arguments(parser: argparse.ArgumentParser) -> None:
-    """What is taken from a log, and where the robot starts in it: the same for all runs over it."""
+    """Options of the log and of the start, common to all runs over it."""
     parser.add_argument(
         "--ground-truth",
         metavar="TOPIC_OR_FILE",
         help="poses in the map: a PoseStamped, PoseWithCovarianceStamped or Odometry topic, tf:FRAME "
-        "for what tf says in a bag, a TUM file, or MRPT's _GT.txt; default: /ground_truth of a "
+        "for a tf frame of a bag, a TUM file, or MRPT's _GT.txt; default: /ground_truth of a "
         "bag, LOG_GT.txt beside a rawlog; none: no ground truth",
     )
     parser.add_argument(
@@ -55,7 +55,7 @@ def add_log_arguments(parser: argparse.ArgumentParser) -> None:
     start.add_argument(
         "--global", dest="everywhere", action="store_true", help="start anywhere in the map instead of at a pose"
     )
-    source = parser.add_argument_group("what to take from the log")
+    source = parser.add_argument_group("topics and frames of the log")
     source.add_argument(
         "--scan-topic",
         metavar="TOPIC",
@@ -69,17 +69,17 @@ def add_log_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         nargs=3,
         metavar=("X", "Y", "YAW"),
-        help="of the laser on the robot, for logs without its tf; m, m, rad",
+        help="pose of the laser on the robot, for logs without its tf; m, m, rad",
     )
     part = parser.add_argument_group("part of the log")
     part.add_argument("--start", type=float, default=0.0, metavar="S", help="seconds after the first scan")
-    part.add_argument("--duration", type=float, metavar="S", help="seconds from there")
-    part.add_argument("--every", type=int, default=1, metavar="N", help="only each N-th scan")
-    part.add_argument("--max-scans", type=int, metavar="N")
+    part.add_argument("--duration", type=float, metavar="S", help="seconds to replay")
+    part.add_argument("--every", type=int, default=1, metavar="N", help="only every N-th scan")
+    part.add_argument("--max-scans", type=int, metavar="N", help="at most this number of scans")
 
 
 def log_use(arguments: argparse.Namespace) -> LogUse:
-    """What the options of add_log_arguments() ask for.
+    """The values of the options of add_log_arguments().
 
     Raises:
         ValueError: what cannot be; one line.

@@ -78,7 +78,7 @@ def complete(parser: argparse.ArgumentParser) -> None:
 
 
 def _parser(modules: Dict[str, Any]) -> CommandParser:
-    parser = CommandParser(prog="glass_nav", description="Localization in buildings of glass: offline tools.")
+    parser = CommandParser(prog="glass_nav", description="Offline tools for localization in buildings with glass.")
     parser.examples = EXAMPLES
     parser.add_argument("--version", action=_Version)
     add_commands(parser, "command", "COMMAND", modules)
@@ -98,7 +98,7 @@ class _Version(argparse.Action):
 
 
 def _run(program: str, module: Any, arguments: argparse.Namespace) -> int:
-    """One subcommand, its errors as a line and an exit code."""
+    """Runs a subcommand; errors become a line and an exit code."""
     wrong = module.usage_error(arguments)
     if wrong is not None:
         print(f"{program}: {wrong}", file=sys.stderr)

@@ -13,8 +13,8 @@ from glass_nav.world import map_file, panes_file
 from glass_nav.world.pane import Pane
 
 HELP = "draw panes into a copy of a map"
-DESCRIPTION = """Writes map.yaml with its image, the map with the panes drawn in and all else as it was, panes.yaml and
-panes.png. The panes are those of a file, those given by their ends, or both."""
+DESCRIPTION = """Writes map.yaml with its image (the map with the panes drawn in, everything else unchanged), panes.yaml
+and panes.png. Panes are given by a file, by their ends, or both."""
 EXAMPLES = (
     "glass_nav map draw floor.yaml --pane 1.2 0.5 4.8 0.5 --pane 4.8 0.5 4.8 3 --out with_glass",
     "glass_nav map draw floor.yaml --panes panes.yaml --out with_glass",

@@ -1,4 +1,4 @@
-"""glass_nav map panes: recorded drives -> the panes that the map lacks, and the map with them."""
+"""glass_nav map panes: finds the panes that a map lacks in recorded drives, and draws them in."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from glass_nav.world import map_file
 from glass_nav.world.pane import Pane
 
 HELP = "find the panes that a map lacks in recorded drives"
-DESCRIPTION = """Runs the localization on recorded logs and finds the panes of glass that the map lacks: beams return
-from them near their normal only, and pass at other angles. Writes map.yaml with its image (the map with the panes drawn
-in, all else as it was), panes.yaml and panes.png, and prints a table of all candidates."""
+DESCRIPTION = """Runs the localization on recorded logs and finds panes of glass that the map lacks: beams return from them
+only near their normal, and pass at other angles. Writes map.yaml with its image (the map with the panes drawn in, everything
+else unchanged), panes.yaml and panes.png, and prints a table of all candidates."""
 EXAMPLES = (
     "glass_nav map panes run.bag --map floor.yaml --out with_glass",
     "glass_nav map panes monday.bag tuesday.bag --map floor.yaml --drop 2 --out with_glass",
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="LOG",
         type=Path,
         nargs="+",
-        help="bag of ROS 1 or ROS 2, or MRPT .rawlog; several: drives on the same map, each with a start of its own",
+        help="bag of ROS 1 or ROS 2, or MRPT .rawlog; several: drives on the same map, each with its own start",
     )
     parser.add_argument("--map", required=True, type=Path, help="map_server .yaml, or MRPT .gridmap[.gz]")
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for the results")
@@ -47,8 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="panes that are less probable are not drawn (default 0.9)",
     )
     chosen = parser.add_mutually_exclusive_group()
-    chosen.add_argument("--keep", metavar="N,N", help="draw these panes only, by their numbers in the table")
-    chosen.add_argument("--drop", metavar="N,N", help="do not draw these")
+    chosen.add_argument("--keep", metavar="N,N", help="draw only these panes, by number in the table")
+    chosen.add_argument("--drop", metavar="N,N", help="do not draw these panes")
     log_arguments.add_run_arguments(parser)
     log_arguments.add_log_arguments(parser)
 

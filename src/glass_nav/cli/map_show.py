@@ -1,4 +1,4 @@
-"""glass_nav map show: a map with its panes as a picture."""
+"""glass_nav map show: draws a map with its panes as a picture."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from glass_nav.evaluation.plots import panes_picture
 from glass_nav.world import map_file, panes_file
 
 HELP = "show a map with its panes"
-DESCRIPTION = "Writes a PNG: the map, and over it the panes of a file by number and probability."
+DESCRIPTION = "Writes a PNG of the map with the panes of a file, by number and probability."
 EXAMPLES = ("glass_nav map show floor.yaml --panes panes.yaml --out pictures",)
 
 
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def usage_error(arguments: argparse.Namespace) -> Optional[str]:
-    """Nothing can be wrong with the options as such."""
+    """None: any combination of options is valid."""
     return None
 
 

@@ -1,15 +1,14 @@
-"""glass_nav map: the glass that a map lacks, a module for each thing to do about it."""
+"""glass_nav map: commands for glass that a map lacks, a module for each."""
 
 from __future__ import annotations
 
-import argparse
-from typing import Any, Dict, Optional
+from typing import Any, Dict
 
 from glass_nav.cli import map_draw, map_panes, map_show
-from glass_nav.cli.parser import add_commands
+from glass_nav.cli.parser import CommandGroup
 
 HELP = "find the glass that a map lacks, and draw it in"
-DESCRIPTION = """Mappers erase panes, because beams pass them. These commands find the missing panes in recorded
+DESCRIPTION = """Mappers erase panes because beams pass them. These commands find the missing panes in recorded
 drives, draw them into a copy of the map, and show the result. Needs no roscore."""
 EXAMPLES = (
     "glass_nav map panes run.bag --map floor.yaml --out with_glass",
@@ -17,19 +16,5 @@ EXAMPLES = (
 )
 
 MODULES: Dict[str, Any] = {"panes": map_panes, "draw": map_draw, "show": map_show}
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """A subcommand for each module."""
-    add_commands(parser, "map_command", "COMMAND", MODULES)
-
-
-def usage_error(arguments: argparse.Namespace) -> Optional[str]:
-    """What is wrong with the options of the subcommand."""
-    wrong: Optional[str] = MODULES[arguments.map_command].usage_error(arguments)
-    return wrong and f"{arguments.map_command}: {wrong}"
-
-
-def main(arguments: argparse.Namespace) -> None:
-    """Run the subcommand."""
-    MODULES[arguments.map_command].main(arguments)
+_GROUP = CommandGroup("map_command", MODULES)
+add_arguments, usage_error, main = _GROUP.add_arguments, _GROUP.usage_error, _GROUP.main

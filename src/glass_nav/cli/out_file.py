@@ -1,4 +1,4 @@
-"""--out of the subcommands that write one file: a folder, as everywhere, or a file by its full name."""
+"""--out of the subcommands that write one file: a folder, or a file by its full name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""glass_nav params: the parameters of a launch file written for amcl, as this package takes them. No roscore."""
+"""glass_nav params: translates the parameters of a launch file written for amcl. No roscore."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from glass_nav.cli import ros_process
 
 HELP = "translate the parameters of a launch file that starts amcl"
 DESCRIPTION = """Reads a launch file that starts amcl, as roslaunch does (includes, args, groups, rosparam files), and
-prints the parameters of localization_node as yaml, for rosparam and for glass_nav replay --params. Comments say what
-has no meaning here, and why. Needs the Python of ROS, but no roscore."""
+prints the parameters of localization_node as yaml, for rosparam and for glass_nav replay --params. Comments list the parameters
+that have no effect here, and why. Needs the Python of ROS, but no roscore."""
 EXAMPLES = (
     "glass_nav params --from-amcl amcl.launch > mine.yaml",
     "glass_nav params --from-amcl robot.launch --node amcl map_file:=floor.yaml",

@@ -1,4 +1,4 @@
-"""How far a long job is: a bar on a terminal, a line every few seconds elsewhere. Writes to stderr only."""
+"""Progress of a long job: a bar on a terminal, a line every few seconds elsewhere. Writes to stderr only."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Progress:
         self._done = 0
 
     def step(self, count: int = 1) -> None:
-        """So many more are done."""
+        """Adds steps that are done."""
         self._done += count
         now = time.monotonic()
         if now - self._shown >= (BAR_PERIOD_S if self._tty else LINE_PERIOD_S):
@@ -29,7 +29,7 @@ class Progress:
             self._show(now)
 
     def finish(self) -> None:
-        """All is done, or as much as there was; closes the line of a bar."""
+        """Ends the progress, complete or not; closes the line of a bar."""
         if self._tty:
             self._show(time.monotonic())
             self._stream.write("\n")

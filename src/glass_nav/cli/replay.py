@@ -1,4 +1,4 @@
-"""glass_nav replay: a recorded robot through the filter, and how well it went. No roscore."""
+"""glass_nav replay: runs the filter over a recorded log, and scores it. No roscore."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ from glass_nav.replay.replay_files import FiledReplay, Outputs
 from glass_nav.replay.replay_options import ReplayOptions
 
 HELP = "run the localization on a recorded log"
-DESCRIPTION = """Runs the localization on a recorded log, every scan of it, and writes metrics.json,
-trajectory.tum, per_scan.csv, beam_cases.npz, worst_scans.npz, glass_map.yaml (probability of glass of each wall cell)
-and trajectory.png; where the log has the truth about its beams, as
-simulated ones do, also the scores of the cases and cases.png. Needs no roscore."""
+DESCRIPTION = """Runs the localization on every scan of a recorded log. Writes metrics.json, trajectory.tum,
+per_scan.csv, beam_cases.npz, worst_scans.npz, glass_map.yaml (probability of glass of each wall cell) and trajectory.png. If
+the log has the true cases of its beams, as simulated ones do, they are scored too (cases.png). Needs no roscore."""
 EXAMPLES = (
     "glass_nav replay run.bag --map floor.yaml --out results",
     "glass_nav replay run.bag --map floor.yaml --global --duration 60 --out results --bag results/shown.bag",
@@ -50,16 +49,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=replay_topology.FROM_MAP,
         metavar="ATLAS",
-        help="also list the nodes of an atlas that the robot passed, and which of them it detected with lidar "
-        "and odometry alone, as the driver does: a table, topology.csv and topology.png; an atlas "
-        f"file, its folder, a shipped one's name, or {replay_topology.FROM_MAP}: made from "
-        "the map, as without a value at the end of the line",
+        help="also list the nodes of an atlas that the robot passed, and which of them are detected with lidar "
+        "and odometry alone, as by the driver: a table, topology.csv and topology.png. ATLAS is a file, its folder, "
+        f"the name of a shipped one, or {replay_topology.FROM_MAP} (default): made from the map",
     )
     parser.add_argument(
         "--smooth",
         action="store_true",
-        help="also smooth the whole log, past and future together, and compare the filter with it: smoothed.tum and "
-        "figures, a third opinion where there is no ground truth",
+        help="also smooth the trajectory over the whole log and compare the filter with it (smoothed.tum), for logs "
+        "without a good ground truth",
     )
     parser.add_argument(
         "--fail-if",
@@ -101,7 +99,7 @@ def main(arguments: argparse.Namespace) -> bool:
 
 
 def run(options: ReplayOptions, outputs: Outputs) -> Dict[str, Any]:
-    """One replay, with its progress and figures printed.
+    """Runs one replay, and prints its progress and figures.
 
     Raises:
         RecordingError, MapError, AtlasError, ParamError, ValueError, OSError: bad input; one line.

@@ -1,4 +1,4 @@
-"""glass_nav report: one run as one HTML file with its pictures inside."""
+"""glass_nav report: writes one run as an HTML file with its pictures inside."""
 
 from __future__ import annotations
 
@@ -18,12 +18,11 @@ from glass_nav.replay.replay_files import Outputs
 from glass_nav.replay.replay_options import ReplayOptions
 from glass_nav.world import map_file
 
-HELP = "one run as an HTML file with pictures"
-DESCRIPTION = """Writes report.html, one file that needs no network and holds its pictures, and the same pictures as
-PNG files: the path over the map by state, what the beams met over time, the probability of glass, errors,
-reliability against the truth, places possible until one was left, update time, and the ten worst scans. Takes the
-folder that `glass_nav replay --out` wrote, or a log, which is replayed first (all options but --map and --out are for
-that)."""
+HELP = "write a report of one run as an HTML file"
+DESCRIPTION = """Writes report.html, one file that needs no network, and its pictures as PNG files: the path over the map by
+state, beam cases over time, the probability of glass, errors, reliability against the ground truth, the number of candidates
+in a search, update times, and the ten worst scans. Its input is the folder written by `glass_nav replay --out`, or a log,
+which is replayed first (all options but --map and --out are for that)."""
 EXAMPLES = (
     "glass_nav report results --out report",
     "glass_nav report run.bag --map floor.yaml --out report",

@@ -1,4 +1,4 @@
-"""glass_nav simulate: a robot drives through a building of walls and glass, and a bag records it. No roscore."""
+"""glass_nav simulate: drives a simulated robot through a building with glass and records a bag. No roscore."""
 
 from __future__ import annotations
 
@@ -38,10 +38,9 @@ COMPLETE, ERASING = MAPPERS = ("complete", "erasing")
 _MAPPER_STREAM = 0x3A99E4  # of the seed, for the noise of the mapping drive
 
 HELP = "drive a robot through a building of glass and record a bag"
-DESCRIPTION = """Drives a robot along a path through a building, and writes a bag of what it records (/scan, /odom, /tf,
-/clock) with the truth beside (/ground_truth, /true_beams: the case of every beam), and the map of the building.
-Needs no roscore. The same seed gives the same bag. Real mappers erase glass; --glass-erased and --mapper do so to the
-map, and leave the bag as it is: its truth is in terms of the whole building."""
+DESCRIPTION = """Drives a simulated robot along a path through a building. Writes a bag (/scan, /odom, /tf, /clock) with the
+ground truth (/ground_truth, /true_beams: the case of every beam), and the map of the building. Needs no roscore. The same
+seed gives the same bag. --glass-erased and --mapper omit glass from the map, as real mappers do; the bag does not change."""
 EXAMPLES = (
     "glass_nav simulate glass_office --seed 1 --out simulated",
     "glass_nav simulate glass_bridge --lidar coated --speed 0.4 --out bridge.bag",
@@ -103,7 +102,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=0.0,
         metavar="S",
-        help="from the first beam of a scan to the last one, while the robot moves on; default 0",
+        help="time from the first beam of a scan to the last one, while the robot moves; s, default 0",
     )
     parser.add_argument("--beams", type=int, metavar="N", help="of a scan; default: the preset's")
     parser.add_argument("--echo", choices=ECHOES, help="which echo the lidar reports; default: the preset's")
@@ -191,7 +190,7 @@ def _maps(arguments: argparse.Namespace, building: Building) -> Dict[str, GridMa
 
 
 def write_frame(bag: BagWriter, frame: Frame, period_s: float) -> None:
-    """All that was recorded since the frame before, and the truth of this one."""
+    """Writes everything recorded since the last frame, and the ground truth of this one."""
     for reading in frame.odometry:
         bag.odometry(reading.stamp_ns, reading.odom_from_base, reading.velocity)
         if reading.wheels_rad is not None:
@@ -201,7 +200,7 @@ def write_frame(bag: BagWriter, frame: Frame, period_s: float) -> None:
 
 
 class _Tally:
-    """What a run was, in a line."""
+    """Summary of a run in one line."""
 
     def __init__(self) -> None:
         self._began_s = time.perf_counter()

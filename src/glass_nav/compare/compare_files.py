@@ -15,7 +15,7 @@ from glass_nav.world import map_file
 
 
 def write(folder: Path, compared: Comparison, maps: Mapping[str, Path], everyone: Sequence[Contestant]) -> Path:
-    """All of them; the page.
+    """Writes all files; returns the path of the page.
 
     Raises:
         MapError, OSError: a map cannot be read, or the folder cannot be written.

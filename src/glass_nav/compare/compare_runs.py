@@ -1,4 +1,4 @@
-"""The runs behind a comparison, and one of these runs from start to end."""
+"""The runs of a comparison, and how one of them is done."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from glass_nav.replay.replay_options import LogUse, ReplayOptions, Triple
 
 @dataclass(frozen=True)
 class Job:
-    """One run to be made, as it is sent to whoever makes it."""
+    """One run, in a form that can be sent to another process or machine."""
 
     contestant: Contestant
     log: str
@@ -59,7 +59,7 @@ def _same(one: str, other: str) -> bool:
 
 
 def jobs(everyone: Sequence[Contestant], over: Sequence[Log], seeds: Sequence[int], use: LogUse) -> List[Job]:
-    """All runs to be made, in the order of logs, contestants and seeds."""
+    """All runs, in the order of logs, contestants and seeds."""
     found = []
     for log in over:
         for contestant in everyone:
@@ -70,7 +70,7 @@ def jobs(everyone: Sequence[Contestant], over: Sequence[Log], seeds: Sequence[in
 
 
 def replay_options(use: LogUse, contestant: Contestant, log: Log, seed: Optional[int]) -> ReplayOptions:
-    """Of one run; whole paths, as who runs it may be in another folder."""
+    """Options of one run, with absolute paths: another process may work in another folder."""
     truth = log.ground_truth if log.ground_truth is not None else use.source.ground_truth
     truth = truth if truth is None or not Path(truth).is_file() else str(_whole(Path(truth)))
     pose = log.initial_pose if log.initial_pose is not None else use.start.pose
@@ -103,7 +103,7 @@ def check(everyone: Sequence[Contestant]) -> None:
 
 
 def make(job: Job, step_done: Callable[[], None]) -> Run:
-    """One run, from the files to its errors.
+    """Does one run, from the files to its errors.
 
     Raises:
         RecordingError, MapError, ParamError, ValueError, OSError: bad input; one line.

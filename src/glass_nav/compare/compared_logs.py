@@ -1,4 +1,4 @@
-"""Over which logs a comparison goes: those of --log BAG=MAP and those of a list in yaml."""
+"""The logs of a comparison: those of --log BAG=MAP and those of a yaml list."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _Listed = Tuple[Tuple[Path, ...], Path, Optional[str], Optional[Triple]]  # the 
 
 @dataclass(frozen=True)
 class Log:
-    """One log, with what belongs to it alone."""
+    """One log of a comparison, with its map and options."""
 
     name: str
     paths: Tuple[Path, ...]
@@ -23,7 +23,7 @@ class Log:
 
 
 def parse(pairs: Sequence[str], listing: Optional[Path]) -> List[Log]:
-    """Those of --log BAG=MAP and of the list.
+    """The logs of --log BAG=MAP and of the list.
 
     Raises:
         ValueError: not of that form; one line.
@@ -55,7 +55,7 @@ def _items(listing: Path) -> List[Any]:
 
 
 def _listed(listing: Path, number: int, item: Any) -> _Listed:
-    """One log of the list; its paths are meant from the folder of the list."""
+    """One log of the list; relative paths start at the folder of the list."""
     allowed = {"log", "map", "ground_truth", "initial_pose"}
     if not isinstance(item, dict) or not {"log", "map"} <= set(item) <= allowed:
         raise ValueError(
@@ -80,6 +80,6 @@ def _listed(listing: Path, number: int, item: Any) -> _Listed:
 
 
 def _names(paths: "Sequence[Tuple[Path, ...]]") -> List[str]:
-    """What the logs are called: the name of the file, its whole path where names meet."""
+    """Names of the logs: the name of the file, or its whole path if names collide."""
     short = [each[0].name for each in paths]
     return [name if short.count(name) == 1 else str(each[0]) for name, each in zip(short, paths)]

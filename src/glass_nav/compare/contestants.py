@@ -1,4 +1,4 @@
-"""Who takes part in a comparison: results of replays, parameters, or poses that a log has."""
+"""The contestants of a comparison: results of replays, parameters, or poses recorded in a log."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ RECORDED = ("topic:", "tf:")
 
 @dataclass(frozen=True)
 class Contestant:
-    """Who takes part: one of results, parameters, recorded."""
+    """A contestant: exactly one of results, parameters, recorded is set."""
 
     name: str
     results: Tuple[Path, ...] = ()  # folders of replays, a run each
@@ -34,7 +34,7 @@ class Contestant:
 
 
 def parse(texts: Sequence[str]) -> List[Contestant]:
-    """Those of the command line, `[NAME=]WHAT` each; folders of one name are runs of one contestant.
+    """The contestants of the command line, `[NAME=]WHAT` each; folders with one name are runs of one contestant.
 
     Raises:
         ValueError: a name twice, or what is none of the kinds; one line.

@@ -1,24 +1,28 @@
 """Many independent jobs at once: in this process, on its cores, or on the machines of a Dask cluster.
 
-More than one at a time is the work of dask.distributed, an optional package: `cores` starts a cluster of processes on
-this machine. The answers come back in the order of the jobs, whatever ran them.
+Processes of this machine are Python's own; those of other machines are the work of dask.distributed, an optional
+package. The answers come back in the order of the jobs, whatever ran them.
 """
 
 from __future__ import annotations
 
 import contextlib
-import logging
+import multiprocessing
+import signal
 import sys
 import threading
 import time
+from collections import deque
 from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence, Set, Tuple, Union
 
 CONNECT_S, WORKER_S = 10.0, 60.0
 REPORT_S = 0.2  # between two reports of a worker on how far it is
 TOPIC = "glass_nav_steps"
 ATTEMPTS = 2  # at a job whose process ends
+DIED = "its process died, out of memory?"
 
 
 class EngineError(ValueError):
@@ -49,7 +53,7 @@ def run(
         scheduler: address of a Dask scheduler instead; its workers need this package and the files of the jobs.
 
     Raises:
-        EngineError: the package is missing, or no scheduler answers.
+        EngineError: Dask is missing, no scheduler answers, or it has no worker.
     """
     if scheduler is not None:
         return _on_scheduler(jobs, work, step_done, scheduler)
@@ -59,23 +63,103 @@ def run(
 
 
 def _on_cores(jobs: Sequence[Any], work: Work, step_done: Callable[[int], None], cores: int) -> List[Any]:
-    distributed = _distributed(f"--jobs {cores}")
-    import dask
+    steps = _Steps(step_done)
+    answers: Dict[int, Any] = {}
+    attempts = [0] * len(jobs)
+    waiting = deque(range(len(jobs)))
+    running: "Dict[Any, Tuple[_Process, int]]" = {}  # by its connection
+    with contextlib.ExitStack() as stack:
 
-    settings = {"distributed.scheduler.allowed-failures": ATTEMPTS - 1}
-    with dask.config.set(settings), _package_first(), distributed.LocalCluster(
-        n_workers=cores,
-        threads_per_worker=1,
-        processes=True,
-        memory_limit=0,  # the kernel's alone
-        dashboard_address=None,
-        silence_logs=logging.CRITICAL,
-    ) as cluster, distributed.Client(cluster) as client:
-        return _gathered(distributed, client, jobs, work, step_done)
+        def start_next(process: "_Process") -> None:
+            if waiting:
+                number = waiting.popleft()
+                attempts[number] += 1
+                process.start(jobs[number])
+                running[process.connection] = process, number
+
+        for _ in range(cores):
+            start_next(stack.enter_context(_Process(work)))
+        while running:
+            for connection in wait(list(running)):
+                process, number = running[connection]
+                report = process.report()
+                if isinstance(report, int):
+                    steps.reached(number, report)
+                    continue
+                del running[connection]
+                if report is not None:
+                    steps.reached(number, report.steps, last=True)
+                    answers[number] = report.answer
+                else:
+                    process = stack.enter_context(_Process(work))
+                    if attempts[number] < ATTEMPTS:
+                        waiting.appendleft(number)
+                    else:
+                        answers[number] = Failed(jobs[number], DIED)
+                start_next(process)
+    return [answers[number] for number in range(len(jobs))]
+
+
+@dataclass(frozen=True)
+class _Ended:
+    """What a process reports after a job, once it has done this number of steps."""
+
+    steps: int
+    answer: Any
+
+
+class _Process:
+    """A process of this machine; a context that ends it. It does one job after the other."""
+
+    def __init__(self, work: Work) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.connection, its_end = context.Pipe()
+        self._process = context.Process(target=_serve, args=(its_end, work), daemon=True)
+        with _package_first():
+            self._process.start()
+        its_end.close()  # the process has the only one now, so that its death ends the connection
+
+    def __enter__(self) -> "_Process":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.terminate()
+        self._process.join()
+        self.connection.close()
+
+    def start(self, job: Any) -> None:
+        with contextlib.suppress(OSError):  # it died: report() says so
+            self.connection.send(job)
+
+    def report(self) -> "Union[int, _Ended, None]":
+        """Waits for the number of steps done so far, the end of the job, or None: the process has died."""
+        try:
+            return self.connection.recv()  # type: ignore[no-any-return]
+        except (EOFError, OSError):
+            return None
+
+
+def _serve(connection: "Connection", work: Work) -> None:
+    """In a process of its own: does the jobs that the connection brings."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started this one
+    while True:
+        try:
+            job = connection.recv()
+        except EOFError:
+            return
+        counter = _Counter(connection.send)
+        try:
+            answer = _answered(work, job, counter.step)
+        except Exception as err:  # noqa: BLE001 - the other jobs go on
+            answer = Failed(job, f"{type(err).__name__}: {_line(err)}")
+        connection.send(_Ended(counter.count, answer))
 
 
 def _on_scheduler(jobs: Sequence[Any], work: Work, step_done: Callable[[int], None], address: str) -> List[Any]:
-    distributed = _distributed("--scheduler")
+    try:
+        import distributed
+    except ImportError as err:
+        raise EngineError(f"--scheduler needs the Python package distributed (pip install distributed): {err}") from err
     try:
         client = distributed.Client(address, timeout=CONNECT_S)
     except (OSError, ValueError, distributed.TimeoutError) as err:
@@ -85,19 +169,14 @@ def _on_scheduler(jobs: Sequence[Any], work: Work, step_done: Callable[[int], No
             client.wait_for_workers(1, timeout=WORKER_S)
         except (OSError, distributed.TimeoutError) as err:
             raise EngineError(f"no worker has joined the Dask scheduler at {address} within {WORKER_S:g} s") from err
-        return _gathered(distributed, client, jobs, work, step_done)
-
-
-def _distributed(option: str) -> Any:
-    try:
-        import distributed
-    except ImportError as err:
-        raise EngineError(f"{option} needs the Python package distributed (pip install distributed): {err}") from err
-    return distributed
+        try:
+            return _gathered(distributed, client, jobs, work, step_done, address)
+        except (distributed.CancelledError, OSError) as err:
+            raise EngineError(f"the Dask scheduler at {address} does not answer any more") from err
 
 
 def _gathered(
-    distributed: Any, client: Any, jobs: Sequence[Any], work: Work, step_done: Callable[[int], None]
+    distributed: Any, client: Any, jobs: Sequence[Any], work: Work, step_done: Callable[[int], None], address: str
 ) -> List[Any]:
     futures = [client.submit(_counted, work, job, number, pure=False) for number, job in enumerate(jobs)]
     number_of = {future.key: number for number, future in enumerate(futures)}
@@ -105,18 +184,30 @@ def _gathered(
     answers: Dict[int, Any] = {}
     client.subscribe_topic(TOPIC, steps.heard)
     try:
-        for future in distributed.as_completed(futures):
-            number, error = number_of[future.key], future.exception()
-            if error is None:
-                answers[number], count = future.result()
-                steps.reached(number, count, last=True)
-            else:  # what _counted() lets through: its process was killed, or lacks the package
-                died = isinstance(error, distributed.KilledWorker)
-                reason = "its process died, out of memory?" if died else f"{type(error).__name__}: {_line(error)}"
-                answers[number] = Failed(jobs[number], reason)
+        waiting = set(futures)
+        while waiting:
+            for future in _done(distributed, client, waiting, address):
+                waiting.remove(future)
+                number, error = number_of[future.key], future.exception()
+                if error is None:
+                    answers[number], count = future.result()
+                    steps.reached(number, count, last=True)
+                else:  # what _counted() lets through: its process was killed, or lacks the package
+                    died = isinstance(error, distributed.KilledWorker)
+                    answers[number] = Failed(jobs[number], DIED if died else f"{type(error).__name__}: {_line(error)}")
     finally:
         client.unsubscribe_topic(TOPIC)
     return [answers[number] for number in range(len(jobs))]
+
+
+def _done(distributed: Any, client: Any, futures: "Set[Any]", address: str) -> "Set[Any]":
+    """Waits until one of the futures or more are done, as long as the scheduler has a worker."""
+    while True:
+        try:
+            return set(distributed.wait(futures, timeout=WORKER_S, return_when="FIRST_COMPLETED").done)
+        except distributed.TimeoutError:
+            if not client.scheduler_info()["workers"]:
+                raise EngineError(f"the Dask scheduler at {address} has lost its last worker") from None
 
 
 class _Steps:
@@ -143,20 +234,27 @@ class _Steps:
                 self._ended.add(number)
 
 
+class _Counter:
+    """Counts the steps of a job, and reports their number from time to time."""
+
+    def __init__(self, report: Callable[[int], None]) -> None:
+        self._report, self._reported_s = report, time.monotonic()
+        self.count = 0
+
+    def step(self) -> None:
+        self.count += 1
+        if time.monotonic() - self._reported_s >= REPORT_S:
+            self._reported_s = time.monotonic()
+            self._report(self.count)
+
+
 def _counted(work: Work, job: Any, number: int) -> "Tuple[Any, int]":
-    """On a worker: the answer, and how many steps it took."""
+    """On a worker of Dask: the answer, and how many steps it took."""
     from distributed import get_worker
 
-    worker, count, reported_s = get_worker(), 0, time.monotonic()
-
-    def step() -> None:
-        nonlocal count, reported_s
-        count += 1
-        if time.monotonic() - reported_s >= REPORT_S:
-            reported_s = time.monotonic()
-            worker.log_event(TOPIC, (number, count))
-
-    return _answered(work, job, step), count
+    worker = get_worker()
+    counter = _Counter(lambda count: worker.log_event(TOPIC, (number, count)))
+    return _answered(work, job, counter.step), counter.count
 
 
 def _answered(work: Work, job: Any, step: Callable[[], None]) -> Any:

@@ -1,4 +1,4 @@
-"""Poses that another localization left in a log, at the scans of ours."""
+"""Poses of another localizer that are recorded in a log, at the stamps of the scans."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ BUILDING = "glass_office"
 
 
 def wake_up(seed: int, picture: Path) -> bool:
-    """One robot that wakes up at a random place; whether it found its place and drove the tour."""
+    """Runs one robot that wakes up at a random place; returns whether it found its place and drove the tour."""
     building = building_file.load(shipped_buildings.find(BUILDING))
     atlas = atlas_file.load(shipped_atlases.find(BUILDING))
     start = start_place.random_place(building, np.random.default_rng(seed))

@@ -42,7 +42,7 @@ class Tracked:
 
     @property
     def row(self) -> str:
-        """Its figures, as under HEADER."""
+        """A row of figures, under HEADER."""
         off_m = self.position_m
         return (
             f"{np.mean(off_m):9.3f}{np.percentile(off_m, 95):9.3f}{off_m.max():9.3f}"

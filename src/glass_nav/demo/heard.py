@@ -1,4 +1,4 @@
-"""What the demo has heard of a robot that wakes up, by the stamps of the reports."""
+"""The reports that the demo has received from a robot that wakes up, by stamp."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from glass_nav.world.grid_map import GridMap
 
 @dataclass(frozen=True)
 class SearchNews:
-    """What the search said last."""
+    """The last report of the search."""
 
     stamp_ns: int  # of the meetpoint; 0: of none
     state: SearchState
@@ -29,7 +29,7 @@ class SearchNews:
 
 @dataclass(frozen=True)
 class Candidates:
-    """Where the robot may be."""
+    """The candidates of the search."""
 
     total: int
     nodes: List[int]  # of the first candidates
@@ -69,7 +69,7 @@ class Heard:
         return self.truth[max(self.truth)]
 
     def true_trajectory(self) -> Trajectory:
-        """All of it."""
+        """The whole true trajectory."""
         stamps_ns = np.array(sorted(self.truth), np.int64)
         return Trajectory(stamps_ns, np.array([self.truth[stamp] for stamp in stamps_ns.tolist()]).reshape(-1, 3))
 

@@ -143,7 +143,7 @@ class PlainMcl:
         self._update_due = True
 
     def update(self, scan: Scan, odom_from_base: np.ndarray) -> PlainEstimate:
-        """One scan and the odometry (3,) at its stamp -> pose."""
+        """Processes one scan and the odometry (3,) at its stamp; returns the pose."""
         if self._is_due(odom_from_base):
             if self._odom_from_base is not None:
                 step = se2.compose(se2.inverse(self._odom_from_base), odom_from_base)

@@ -73,7 +73,7 @@ def error_table(metrics: "List[Mapping[str, Any]]") -> Iterator[str]:
 
 
 def lines(log: Path, map_of_log: Path, folders: "List[Path]") -> Iterator[str]:
-    """All that is printed.
+    """All lines to print.
 
     Raises:
         ValueError, OSError: log, map or results cannot be read; one line.

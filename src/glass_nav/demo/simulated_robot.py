@@ -56,7 +56,7 @@ class SimulatedRobot:
         self._robot.wake_up(grid_map)
 
     def listen(self) -> None:
-        """One scan and what follows from it."""
+        """Simulates until the next scan, and processes it."""
         robot, heard = self._robot, self.heard
         frame = robot.step()
         stamp_ns = frame.scan.stamp_ns
@@ -77,7 +77,7 @@ class SimulatedRobot:
         return self._simulation.stamp_ns * 1e-9
 
     def say(self, line: str) -> None:
-        """To whoever watches."""
+        """Prints a line for the user."""
         self._say(line)
 
     def restart_search(self) -> str:

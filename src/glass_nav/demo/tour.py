@@ -1,4 +1,4 @@
-"""Nodes of an atlas to be driven to one after another."""
+"""The nodes of an atlas that the demo drives to, one after another."""
 
 from __future__ import annotations
 

@@ -80,7 +80,7 @@ class DemoRobot(Protocol):
         """The wall clock."""
 
     def say(self, line: str) -> None:
-        """To whoever watches."""
+        """Print a line for the user."""
 
     def restart_search(self) -> str:
         """Why it was not restarted; "" if it was."""
@@ -181,7 +181,7 @@ class WakeUpDemo:
         return right
 
     def _show_row(self, news: SearchNews) -> None:
-        """One row of the search forest: the match edge, the match node, what is left, the turn."""
+        """Prints one row of the search forest: match edge, match node, remaining candidates, turn."""
         heard, stamp_ns = self._heard, news.stamp_ns
 
         def is_complete() -> bool:

@@ -1,1 +1,1 @@
-"""Driving along the edges of the Voronoi graph, and to places of the map."""
+"""Drives along the edges of the Voronoi graph, and to poses of the map."""

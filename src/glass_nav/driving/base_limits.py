@@ -1,4 +1,4 @@
-"""What the base can do, and what it is allowed to."""
+"""The limits of the base: what it can do, and what it is allowed to do."""
 
 from __future__ import annotations
 

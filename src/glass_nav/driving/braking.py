@@ -1,4 +1,4 @@
-"""Commands, what stands around the robot -> commands that can be braked before anything is touched."""
+"""Limits commands so that the base can still brake before it touches an obstacle."""
 
 from __future__ import annotations
 

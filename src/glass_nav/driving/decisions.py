@@ -1,4 +1,4 @@
-"""What the driver decides, for others to carry out: commands, reports, results, requests, lines of the log."""
+"""The decisions of the driver, for a node to carry out: commands, reports, results, requests, log lines."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from glass_nav.vocabulary import DriverPhase
 
 
 class Action(Enum):
-    """Who waits for the end of a task."""
+    """The action whose client waits for the end of a task."""
 
     TRAVERSE_EDGE = "traverse_edge"
     GOTO_NODE = "goto_node"
@@ -25,7 +25,7 @@ class Action(Enum):
 
 @dataclass(frozen=True)
 class Command:
-    """To the base."""
+    """A velocity command for the base."""
 
     velocity: np.ndarray  # (3,) forward, left [m/s], turn [rad/s]
 
@@ -39,14 +39,14 @@ class TraversalReport:
 
 @dataclass(frozen=True)
 class MeetpointReport:
-    """Where the robot stands."""
+    """The meetpoint where the robot stands."""
 
     arrival: Arrival
 
 
 @dataclass(frozen=True)
 class DriveStatus:
-    """What the driver does; to be published."""
+    """The status of the driver, to be published."""
 
     phase: DriverPhase
     reason: str  # one sentence
@@ -78,7 +78,7 @@ class GoalEnd:
 
 @dataclass(frozen=True)
 class VisitReport:
-    """What the robot saw of the nodes that it passed on the way to a goal."""
+    """The nodes that the robot passed on the way to a goal, with what it measured."""
 
     visits: Tuple[NodeVisit, ...]
     stamp_ns: int  # of the last scan

@@ -1,9 +1,9 @@
-"""What is seen and asked for -> what is driven and reported: an edge, a place of the map, or where a search leads.
+"""The decisions of driver_node: from observations and requests to commands and reports.
 
-This is everything that driver_node decides, without ROS and without a clock: each method is an event, and returns the
-decisions that follow from it, in the order in which they are to be carried out. One task is on at a time. A goal of an
-action ends what is on; a turn_choice waits for nobody, and is obeyed only where the robot stands at the meetpoint that
-it answers. While nothing is on the robot drives to a meetpoint by itself if a search needs one.
+Without ROS and without a clock: each method is an event, and returns the decisions that follow from it, in the order
+in which they are to be carried out. There is one task at a time. The goal of an action ends the current task. A
+turn_choice does not wait; it is followed only if the robot stands at the meetpoint that it answers. Without a task,
+the robot drives to a meetpoint by itself if a search needs one.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ class Driver:
 
     @property
     def status(self) -> DriveStatus:
-        """As of now."""
+        """The present status."""
         phase, reason, task = self._said
         if self._job is None:
             return DriveStatus(phase, reason, task, stamp_ns=self._inputs.scan_ns)
@@ -111,14 +111,14 @@ class Driver:
 
     @property
     def health(self) -> Health:
-        """For its operators."""
+        """The entries for /diagnostics."""
         phase, reason, task = self._said
         values = {"task": task, "localization": self._inputs.localization or ""}
         return Health(_LEVELS.get(phase, Level.OK), f"{phase}: {reason}", values)
 
     @property
     def edge_driver(self) -> EdgeDriver:
-        """With the graph around the robot."""
+        """The edge driver, with the graph around the robot."""
         return self._edge
 
     @property
@@ -265,7 +265,7 @@ class Driver:
         return self._decided()
 
     def preempt(self, action: Action) -> List[Decision]:
-        """Whoever waits for this action does not want its goal any more."""
+        """Ends the goal of this action, because its client has cancelled it."""
         if self._job is not None and self._job.action == action:
             self._finish(self._job, Ending(Outcome.PREEMPTED, "cancelled: the robot stands"))
         return self._decided()
@@ -303,7 +303,7 @@ class Driver:
 
     @property
     def _arrival(self) -> Optional[Arrival]:
-        """At the meetpoint where the robot stands; None: at none."""
+        """The meetpoint where the robot stands; None: it stands at none."""
         return self._stay.arrival if self._edge.progress.phase == DriverPhase.ARRIVED else None
 
     def _turn_fault(self, stamp_ns: int) -> Optional[str]:
@@ -323,7 +323,7 @@ class Driver:
         return EdgeTask(self._edge, self._p.recovery, self._p.edge.limits, rank, may_choose)
 
     def _make_way(self, action: Action) -> None:
-        """For a new goal: what is on is over."""
+        """Ends the current task for a new goal."""
         if self._job is not None:
             if self._job.action not in (None, action):
                 self._finish(self._job, Ending(Outcome.PREEMPTED, "another goal took over"))
@@ -431,7 +431,7 @@ class Driver:
         return self._rules.follow_turn_choice and self._search in states
 
     def _decide_alone(self) -> None:
-        """Nothing is on: does a search wait for the robot, or did its edge lead nowhere?"""
+        """Decides without a task: seek a meetpoint if a search waits for it, or if the last edge led nowhere."""
         waits = self._search_is(SearchState.WAITING)
         if self._stay.was_left(self._inputs.odom_from_base):
             self._edge.stop()
@@ -457,7 +457,7 @@ class Driver:
         self._decisions.append(LogLine(text, level, often))
 
     def _stand(self) -> None:
-        """At once."""
+        """Commands zero velocity."""
         self._command(np.zeros(3))
         self._quiet_from_s = self._now_s + QUIET_S
 

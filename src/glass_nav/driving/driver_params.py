@@ -36,7 +36,7 @@ class DriverRules:
 
 @dataclass(frozen=True)
 class DriveParams:
-    """Everything that decides how the robot drives."""
+    """All parameters of the driver."""
 
     rules: DriverRules = field(default_factory=DriverRules)
     edge: EdgeDriverParams = field(default_factory=EdgeDriverParams)

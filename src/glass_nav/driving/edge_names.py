@@ -1,4 +1,4 @@
-"""The names of edges at a meetpoint, as people write them -> ranks."""
+"""Names of edges at a meetpoint, as people write them, and their ranks."""
 
 from __future__ import annotations
 

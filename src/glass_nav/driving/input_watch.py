@@ -1,4 +1,4 @@
-"""Scans, odometry, localization: what was heard last, and why the robot cannot be driven by it.
+"""Watches scans, odometry and localization: what came last, and why the robot cannot drive.
 
 Times are those of the data's clock, as the caller gives them.
 """
@@ -21,7 +21,7 @@ POSE_STATES = (LocalizationState.LOCALIZED, LocalizationState.UNCERTAIN)  # a po
 
 @dataclass(frozen=True)
 class InputNames:
-    """Where the inputs come from, for people."""
+    """Names of the inputs, for messages."""
 
     odom_frame: str = "odom"
     base_frame: str = "base_link"
@@ -31,7 +31,7 @@ class InputNames:
 
 @dataclass(frozen=True)
 class Odometry:
-    """Where the robot is by its odometry."""
+    """A pose by odometry."""
 
     stamp_ns: int
     odom_from_base: np.ndarray  # (3,)

@@ -1,4 +1,4 @@
-"""The meetpoint where the robot stands: what it answers to, when it is reported again, whether the robot was moved."""
+"""The meetpoint where the robot stands: valid answers, when it is reported again, whether the robot was moved."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MOVED_M = 0.3  # farther from where it arrived the robot no longer stands there
 
 
 class MeetpointStay:
-    """From an arrival until the robot leaves or is moved away."""
+    """A stay at a meetpoint, until the robot leaves or is moved away."""
 
     def __init__(self) -> None:
         self.arrival: Optional[Arrival] = None  # None: it stands at no meetpoint

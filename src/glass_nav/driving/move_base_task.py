@@ -1,7 +1,7 @@
-"""A goal in the map that a running move_base drives to.
+"""A goal in the map that is delegated to move_base.
 
-It is sent once move_base is there, called off while the driver has no scan, no odometry or no pose, and sent again after
-that. A move_base that falls silent, because it was killed or hangs, ends the goal after the driver's patience.
+It is sent once move_base is there, cancelled while the driver has no scan, no odometry or no pose, and then sent
+again. If move_base was killed or hangs, the goal ends after the patience of the driver.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from glass_nav.vocabulary import DriverPhase, Outcome
 
 
 class MoveBaseClient(Protocol):
-    """What the task needs of the action of move_base."""
+    """The client of move_base's action, as far as the task needs it."""
 
     name: str  # of the action, for people
 
     @property
     def is_there(self) -> bool:
-        """Its action server is connected."""
+        """Whether the action server is connected."""
 
     def was_heard(self) -> bool:
         """Whether its status came since the last call."""

@@ -1,7 +1,7 @@
-"""Scans of a robot that knows its pose -> the nodes of the atlas that it passed, as it saw them.
+"""The nodes of the atlas that a localized robot passed, with what it measured there.
 
-A robot that searches learns from the meetpoints where it stops; one that drives to a goal passes many more. What it saw
-of them is observed as by edge_tracking/passing.py. A node counts as missed only if no graph around it had any.
+A searching robot learns from the meetpoints where it stops; a robot that drives to a goal passes many more. They are
+detected by edge_tracking/passing.py. A node counts as missed only if none of the graphs made near it had it.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class VisitWatch:
             self._visits += self._visit(observer, node, self._near.pop(node))
 
     def _note_seen(self, observer: PassingObserver) -> None:
-        """What the observer has seen since the last scan goes to the nodes where it was."""
+        """Assigns what the observer has seen since the last scan to the nodes."""
         new = observer.passed[self._taken :]
         self._taken += len(new)
         for each in new:

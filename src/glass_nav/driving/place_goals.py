@@ -1,4 +1,4 @@
-"""A goal in the map -> the task that drives there, or one line that says why none can."""
+"""Turns a goal in the map into the task that drives there, or says in one line why it cannot."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TaskTo = Callable[[np.ndarray], Task]  # the task that drives to a pose (3,) of 
 
 @dataclass(frozen=True)
 class PlaceGoal:
-    """Where to drive to: a node of the atlas, or a pose."""
+    """A goal: a node of the atlas, or a pose."""
 
     node: int  # < 0: the pose
     pose: Optional[np.ndarray] = None  # (3,) in the frame
@@ -29,7 +29,7 @@ class PlaceGoal:
 
     @property
     def name(self) -> str:
-        """For people."""
+        """The goal as text."""
         return str(self.node) if self.node >= 0 else "pose"
 
 

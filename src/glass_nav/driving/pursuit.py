@@ -1,4 +1,4 @@
-"""Pure pursuit as the driver uses it: it creeps over the last bit of a braking distance, so that it arrives."""
+"""Pure pursuit with the settings of the driver: it slows down before the end, so that it arrives."""
 
 from __future__ import annotations
 

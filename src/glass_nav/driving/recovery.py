@@ -1,7 +1,7 @@
-"""Blocked -> what to try: wait, back off, turn in place, the next choice, abort. Each step can be called off at once.
+"""Recovery of a blocked robot: wait, back off, turn in place, next choice, abort. Each step can be cancelled.
 
-A state machine without a clock of its own. After each step that moves the robot's view of things the drive is tried
-again (RETRY); one that comes far enough forgets what was tried before. Velocities (3,) forward, left [m/s], turn
+A state machine without a clock of its own. After each step that may have changed the view of the robot, the drive is
+tried again (RETRY). A drive that gets far enough resets the recovery. Velocities (3,) forward, left [m/s], turn
 [rad/s]; poses (3,) odom_from_base.
 """
 
@@ -51,7 +51,7 @@ class RecoveryParams:
 
 @dataclass(frozen=True)
 class Step:
-    """What to do now."""
+    """The step to take now."""
 
     name: str
     command: np.ndarray  # (3,) wanted, by WAIT, BACK_OFF and TURN; else zero
@@ -97,7 +97,7 @@ class Recovery:
         return self._step in MOVES
 
     def cancel(self) -> None:
-        """Nothing was tried, nothing is."""
+        """Ends the recovery and forgets what was tried."""
         self._rung = -1
         self._step = NONE
         self._why = ""

@@ -1,8 +1,8 @@
-"""atlas, pose, goal -> the shortest path along edges: darts, and a polyline in the frame map.
+"""The shortest path along the edges of the atlas from a pose to a goal.
 
-A robot may stand beside the graph, and so may its goal: the path begins at the nearest point of the nearest edge that is
-reached in a straight line, and ends likewise. Dijkstra's shortest path, by scipy. N nodes, E edges, darts as in
-atlas.py; M points of the path.
+Robot and goal may be off the graph: the path begins at the nearest point of the nearest edge that can be reached in a
+straight line, and ends likewise. Dijkstra's shortest path, by scipy. N nodes, E edges, darts as in atlas.py; M points
+of the path.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ JOINED_M = 0.02  # points of a path nearer to each other are one
 
 
 class RouteError(ValueError):
-    """There is no path; one line: from where, to where, why."""
+    """There is no path; one line says from where, to where, and why."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Route:
 
 @dataclass(frozen=True)
 class _Joint:
-    """Where a place meets the graph."""
+    """The point where a position is connected to the graph."""
 
     edge: int
     way_m: float  # along the edge, as dart 2e runs
@@ -49,7 +49,7 @@ class _Joint:
 
 
 class RoutePlanner:
-    """For one atlas, and the map that it is of if that is known."""
+    """Plans routes in one atlas, with its map if there is one."""
 
     def __init__(self, atlas: Atlas, limits: BaseLimits, grid_map: Optional[GridMap] = None) -> None:
         self.atlas = atlas
@@ -85,7 +85,7 @@ class RoutePlanner:
         return self._route(from_m, darts, points, goal_m, f"x {goal_m[0]:.2f} m, y {goal_m[1]:.2f} m")
 
     def nearest_edge(self, point_m: np.ndarray, darts: Collection[int]) -> Optional[int]:
-        """Of those of the darts, the edge nearest to a point (2,); None without darts."""
+        """The edge, among those of the darts, that is nearest to a point (2,); None without darts."""
 
         def away_m(edge: int) -> float:
             line = self._lines[edge]
@@ -150,7 +150,7 @@ class RoutePlanner:
         return darts[::-1], points[::-1]
 
     def _spokes(self, joint: _Joint, number: int) -> "List[Tuple[float, int, int, int, float, float]]":
-        """From a joint to both ends of its edge."""
+        """Connections from a joint to both ends of its edge."""
         length_m = self._lines[joint.edge].length
         first, last = self._ends[joint.edge].tolist()
         return [
@@ -215,7 +215,7 @@ class RoutePlanner:
 
 
 def _edge_line(atlas: Atlas, edge: int) -> Polyline:
-    """From node to node, by the line that the atlas has of the edge."""
+    """The line of the edge in the atlas, from node to node."""
     ends = atlas.nodes.position_m[atlas.darts.node[2 * edge : 2 * edge + 2]]
     points = _joined(np.concatenate([ends[:1], atlas.edges.polyline_m[edge], ends[1:]]))
     if len(points) < 2:  # a loop of which the atlas has no line

@@ -1,4 +1,4 @@
-"""route, pose -> velocity: pure pursuit within the limits of the base, first a turn on the spot, slower at the end.
+"""Follows a route by pure pursuit within the limits of the base: first a turn in place, slower at the end.
 
 Coulter, Implementation of the Pure Pursuit Path Tracking Algorithm, CMU-RI-TR-92-01 (1992). Poses (3,) in the frame of
 the route; velocities (3,) forward, left [m/s], turn [rad/s].

@@ -1,10 +1,10 @@
-"""When a driver seeks a meetpoint by itself: at the start, for a search that waits, where an edge led nowhere."""
+"""When the driver seeks a meetpoint by itself: at the start, for a waiting search, after an edge that led nowhere."""
 
 from __future__ import annotations
 
 
 class SeekPolicy:
-    """Told what happens to the robot, it says whether to seek; only so often in a row without success."""
+    """Decides whether to seek a meetpoint, with a limited number of attempts in a row."""
 
     def __init__(self, attempts: int) -> None:
         """
@@ -15,7 +15,7 @@ class SeekPolicy:
         self.reset()
 
     def reset(self) -> None:
-        """All begins anew."""
+        """Starts over."""
         self._sought = False
         self._failures = 0
 
@@ -29,7 +29,7 @@ class SeekPolicy:
         self._sought = True
 
     def fails(self) -> None:
-        """What the search asked for, or the drive to a meetpoint, failed."""
+        """The task of the search, or the drive to a meetpoint, failed."""
         self._failures += 1
 
     def succeeds(self) -> None:
@@ -37,7 +37,7 @@ class SeekPolicy:
         self._failures = 0
 
     def leave_to_others(self) -> None:
-        """What somebody else asked for failed: they go on, or succeeds() does."""
+        """A task with another origin failed: its client continues, or succeeds() is called."""
         self._failures = self._attempts
 
     def is_due(self, waits: bool, searching: bool) -> bool:

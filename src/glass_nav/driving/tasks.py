@@ -1,7 +1,7 @@
-"""What somebody asked the driver to do: an edge, or a place of the map. A command at each step, then an outcome.
+"""The tasks of the driver: along an edge, or to a goal in the map. A command at each step, then an outcome.
 
-Recovery is part of a task: what blocks the robot is waited for, backed off from, looked around at and driven round,
-each step to be called off at any time. Velocities (3,) forward, left [m/s], turn [rad/s].
+Recovery is part of a task: if something is in the way, the robot waits, backs off, turns in place and drives around
+it, and each step can be cancelled. Velocities (3,) forward, left [m/s], turn [rad/s].
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ STANDSTILL_M_S = 0.03
 
 @dataclass(frozen=True)
 class Moment:
-    """What is known at a control step."""
+    """The inputs of a control step."""
 
     odom_from_base: np.ndarray  # (3,)
     map_from_base: Optional[np.ndarray]  # (3,); None: not localized
@@ -46,7 +46,7 @@ class Ending:
 
 
 class Task(Protocol):
-    """What the driver may be doing; none of it moves without step()."""
+    """A task of the driver; it moves the robot only in step()."""
 
     needs_pose: bool  # in the map
     steers: bool  # its commands go to the base; False: somebody else's do
@@ -59,7 +59,7 @@ class Task(Protocol):
         """There is no step now; whoever else drives is to stop until the next one."""
 
     def cancel(self) -> None:
-        """Nobody wants it any more."""
+        """Ends the task."""
 
     @property
     def phase(self) -> DriverPhase:
@@ -67,11 +67,11 @@ class Task(Protocol):
 
     @property
     def reason(self) -> str:
-        """One sentence."""
+        """The reason in one sentence."""
 
     @property
     def remaining_m(self) -> float:
-        """To the goal; NaN: not known."""
+        """Remaining distance to the goal; NaN: unknown."""
 
 
 class EdgeTask:
@@ -189,7 +189,7 @@ class EdgeTask:
 
 
 class GoTask:
-    """To a node of the atlas, or to a pose of its map, along edges."""
+    """Drives to a node of the atlas, or to a pose of its map, along edges."""
 
     needs_pose, steers = True, True
 

@@ -1,4 +1,4 @@
-"""What is wanted -> what may be commanded: within the base's speeds, and by its accelerations from the last command.
+"""Limits a desired velocity to the speeds and accelerations of the base.
 
 Velocities (3,) forward, left [m/s], turn [rad/s].
 """

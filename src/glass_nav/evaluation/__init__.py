@@ -1,1 +1,1 @@
-"""How good was it?  Trajectories to errors, tables and pictures."""
+"""Scores trajectories and cases: errors, tables and pictures."""

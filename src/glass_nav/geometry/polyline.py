@@ -1,4 +1,4 @@
-"""A line through points, by the distance along it. W points (W, 2), one unit of length throughout."""
+"""A line through points, parametrized by the distance along it. W points (W, 2), one unit of length throughout."""
 
 from __future__ import annotations
 

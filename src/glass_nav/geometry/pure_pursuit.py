@@ -1,4 +1,4 @@
-"""A point ahead on a line -> the velocity along the arc through it, for a base that drives forward and turns.
+"""Pure pursuit: the velocity along the arc through a point ahead on a line.
 
 Coulter, Implementation of the Pure Pursuit Path Tracking Algorithm, CMU-RI-TR-92-01 (1992). Ours: slower in bends, and
 only speeds from which the base can still brake. Velocities (3,) forward, left [m/s], turn [rad/s], within the speeds of

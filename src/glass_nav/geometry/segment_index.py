@@ -1,4 +1,4 @@
-"""Points -> the segment nearest to each, without testing all of them.
+"""The nearest segment of each point, without testing all segments.
 
 Nearest as the seed document segment_localization.txt defines it, "Classification of Data Points": by the distance to
 the segment itself, which is that to its line where the foot of the perpendicular lies on it, else that to the nearer

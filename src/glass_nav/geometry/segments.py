@@ -1,4 +1,4 @@
-"""Points in order along walls -> line segments, by split and merge with total least squares.
+"""Fits line segments to points in order along walls: split and merge with total least squares.
 
 Split: Ramer (1972), Douglas and Peucker (1973). Merge and fit: Pavlidis and Horowitz (1974). A segment is a row
 x1 y1 x2 y2 in the direction of its points. N points, S segments; one unit of length throughout.

@@ -1,4 +1,4 @@
-"""Increments of two driven wheels <-> a step of the robot: equations (2) to (4) of the glass document.
+"""Converts increments of two driven wheels to a step of the robot and back: equations (2) to (4) of the document.
 
 Seed document glass_localization.txt. Its equations move the robot along a straight line in the heading before the step;
 here it moves along the arc that wheels of constant speed drive, of which they are the limit for short steps. N steps.

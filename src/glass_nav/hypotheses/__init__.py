@@ -1,1 +1,1 @@
-"""Where may the scan have been taken?  SCANS -> POSES -> BELIEF: many poses at once, each followed and scored."""
+"""Many poses at once, each followed and scored: where may the scans have been taken?"""

@@ -1,7 +1,7 @@
-"""bearings -> weights: how well does each particle explain the directions in which landmarks were seen?
+"""Weights of the particles by bearings to landmarks.
 
-Each bearing is normal around what the particle expects, or it is wrong and uniform; so a tag seen in a mirror, or a
-wrong id, changes no weight by more than a constant. P particles, N bearings; weights are
+Each bearing is either normally distributed around the one expected by the particle, or wrong and uniform. So a tag
+seen in a mirror, or a wrong id, changes the weights only by a bounded amount. P particles, N bearings; weights are
 natural logarithms, not normalised.
 """
 

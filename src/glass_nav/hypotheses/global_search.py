@@ -1,16 +1,16 @@
-"""Scans, odometry -> the one place of the map where they fit, with no initial pose.
+"""Global localization: finds the one place of the map where the scans fit, without an initial pose.
 
-Multi-hypothesis tracking over an exhaustive search. The first scan is matched against every pose of the map
-(place_search.py, in slices); each place where it fits becomes a candidate. Odometry moves the candidates, every scan
-aligns them as far as odometry allows, and each gathers evidence. From time to time a scan is matched everywhere again,
-because the true place may have been missed (people, wheels that slipped). A place is found when all others are behind
-by a margin. Whoever knows something about the place beside the scans gives a prior.
+Multi-hypothesis tracking after an exhaustive search. The first scan is matched against every pose of the map
+(place_search.py, in slices); each place where it fits becomes a candidate. Candidates move with odometry, are
+registered to every scan within the limits of odometry, and gather evidence. From time to time a scan is matched
+everywhere again, because the true place may have been missed (people, slipping wheels). A place is found when it
+leads over all others by a margin. A prior over places can be given.
 
-The formulation is ours. Evidence is the log likelihood of Thrun, Burgard, Fox, Probabilistic Robotics (2005), sec. 6.4,
-much flattened: scans taken close to each other have the same errors, and so has a map that has changed since.
-Therefore evidence grows with the distance driven, not with the number of scans, and it distinguishes places
-by differences of decimetres. A particle filter finds a place only if a particle falls near it; here every place is tried,
-and places that look alike remain candidates until a scan distinguishes them. K candidates, B beams.
+The formulation is ours. Evidence is the log likelihood of Thrun, Burgard, Fox, Probabilistic Robotics (2005), sec.
+6.4, much flattened, because scans taken close to each other share their errors, and a changed map errs in all of
+them. So evidence grows with the distance driven, not with the number of scans, and differences of decimetres
+distinguish places. A particle filter finds a place only if a particle is near it; here every place is tried, and
+places that look alike remain candidates until a scan tells them apart. K candidates, B beams.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ class GlobalSearch:
         self._counted_at_m: Dict[str, float] = {}  # id of a landmark -> distance driven when its bearing last counted
 
     def decide_by(self, params: SearchParams) -> None:
-        """Other limits from the next scan on."""
+        """Use other limits from the next scan on."""
         self._params = params
 
     def update(
@@ -125,14 +125,16 @@ class GlobalSearch:
         odom_from_base: np.ndarray,
         bearings: Sequence[Tuple[LandmarkBearings, LandmarkMap]] = (),
         log_prior: Optional[Callable[[np.ndarray], np.ndarray]] = None,
+        period_s: Optional[float] = None,
     ) -> Candidates:
-        """One more scan; a scan with too few returns only moves the candidates.
+        """Process a scan; one with too few returns only moves the candidates.
 
         Args:
             scan: one revolution of a lidar.
             odom_from_base: (3,) odometry at its stamp.
             bearings: from the robot's pose at the scan, each with the landmarks that they are of.
             log_prior: poses (K, 3) of the robot at this scan -> (K,) log likelihoods of what else is known of them.
+            period_s: from one scan to the next; None: not known.
         """
         self._move(odom_from_base)
         points = evidence_points(scan)
@@ -142,7 +144,7 @@ class GlobalSearch:
             if self._places is None and (not self._searched or self._is_due(points)):
                 self._places = PlaceSearch(self._matcher, self._field, points, odom_from_base)
                 self._since_places = np.zeros(2)
-            if self._places is not None and self._places.advance():
+            if self._places is not None and self._places.advance(period_s):
                 self._take_in(self._places.places(odom_from_base), points)
         if self._searched:
             for taken, landmarks in bearings:
@@ -150,7 +152,7 @@ class GlobalSearch:
         return self._candidates(log_prior)
 
     def add(self, map_from_base: np.ndarray, head_start: float) -> None:
-        """Before the first scan: a candidate at the tracked pose, with a head start of log likelihood."""
+        """Add the tracked pose as a candidate, with a head start in log likelihood; before the first scan."""
         self._append(np.asarray(map_from_base, float)[None], np.array([head_start]))
 
     def correct(self, map_from_base: np.ndarray) -> None:

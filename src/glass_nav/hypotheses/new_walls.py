@@ -1,8 +1,8 @@
-"""Scans, odometry -> the pieces of wall that a scan shows for the first time.
+"""The pieces of wall that a scan shows for the first time.
 
-What a scan says of a pose is no new evidence if earlier scans have said it: the same cupboard that was moved contradicts
-the true pose in every scan, and the same two parallel walls support a wrong one. So evidence is counted by pieces of
-wall, each once, however often it is seen. B beams, S pieces.
+The same observation is not new evidence in later scans: one cupboard that was moved contradicts the true pose in
+every scan, and two parallel walls support a wrong pose in every scan. So each piece of wall counts once, however
+often it is seen. B beams, S pieces.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class NewWalls:
         return count
 
     def add(self, ends_m: np.ndarray, odom_from_base: np.ndarray, driven_m: float) -> None:
-        """What the scan shows was seen."""
+        """Mark the pieces of wall of a scan as seen."""
         at, new = self._new(ends_m, odom_from_base, driven_m)
         self._seen = np.concatenate([self._seen, np.column_stack([at[new], np.full(len(new), driven_m)])])
 

@@ -1,13 +1,14 @@
-"""One scan, odometry since -> the places of the whole map where it fits, found in slices.
+"""Finds all places of the map where a scan fits, in slices over several scans.
 
-Matching a scan against every pose of a large map takes longer than a robot may wait for its pose. So the search goes on
-a little with each later scan, and the places it ends with are carried by odometry to where the robot is by then. A slice
-is a count of look-ups in the map and no time, so that a replay gives the same answer. K places, B beams.
+Matching a scan against every pose of a large map takes longer than a robot may wait for its pose. So the search
+continues a little with each later scan, and odometry moves the places found to the present. A slice is a number of
+look-ups in the map, not a time, so that a replay gives the same result; it is smaller if scans follow each other
+quickly. K places, B beams.
 """
 
 from __future__ import annotations
 
-from typing import List
+from typing import List, Optional
 
 import numpy as np
 
@@ -19,8 +20,10 @@ from glass_nav.sensing.distance_field import DistanceField
 _STARTS = 4000  # poses that the matcher proposes
 _SLIDE_M = 0.6  # that an alignment may move one; farther away it is another place
 _SLICE = 20_000_000  # look-ups of the matcher: about 40 ms
+_PERIOD_S = 0.1  # from scan to scan, for which that is; where there is less time, the slice is smaller
+_LEAST_SHARE = 0.05  # of a slice: two lidars may have one stamp
 _CACHED_CELLS = 1_000_000  # a look-up in a larger map takes about three times as long
-_LOOK_UPS_PER_BEAM = 75  # that the alignment of one beam costs as much as
+_LOOK_UPS_PER_BEAM = 30  # that the alignment of one beam costs as much as
 
 
 class PlaceSearch:
@@ -45,9 +48,14 @@ class PlaceSearch:
         self._aligned: List[np.ndarray] = []  # (N, 3) poses
         self._fits: List[np.ndarray] = []  # (N,) of them
 
-    def advance(self) -> bool:
-        """One slice; whether the search is complete."""
-        left = self._slice
+    def advance(self, period_s: Optional[float] = None) -> bool:
+        """Search one slice; returns whether the search is complete.
+
+        Args:
+            period_s: from the scan before to this one; None: not known.
+        """
+        share = 1.0 if period_s is None else min(max(period_s / _PERIOD_S, _LEAST_SHARE), 1.0)
+        left = int(share * self._slice)
         if not self._matched:
             before = self._matching.look_ups
             self._matched = self._matching.advance(left)

@@ -1,20 +1,21 @@
-"""Scans, odometry, what else is known -> the poses that are possible, each with its evidence.
+"""A belief over poses of the map: hypotheses, each with its evidence from scans.
 
-The first scan is matched against every pose of the map. Each pose from which it may have been taken is carried by
-odometry, slides to where later scans fit best, and gathers evidence from the walls that it sees, each piece of wall once
-(new_walls.py): a piece speaks for the pose if the map explains it, glass included, and against it otherwise. From time to
-time a scan is matched everywhere again, because the true pose may have been missed; a new pose is traced back to the
-scans before, so that all poses are judged by the same evidence.
+The first scan is matched against every pose of the map. The poses where it fits move with odometry, are registered to
+later scans, and gather evidence from the walls seen, each piece of wall once (new_walls.py): a piece supports the
+pose if the map explains it, glass included, and contradicts it otherwise. From time to time a scan is matched
+everywhere again, because the true pose may have been missed. A new pose is traced back to the earlier scans, so that
+all poses are judged by the same evidence.
 
-Evidence is a log likelihood ratio to `elsewhere`: the robot is at none of these poses, in another building or where
-nobody looked. There the map explains as much as it does by chance, which depends on the scan (two parallel walls
-fit everywhere), so that is measured: what the tenth best of the distinct places of the map explains. The tenth and not the
-second, because places that look alike are no proof that the robot is elsewhere. The ratio for one piece is flat: pieces
-of one thing that was moved are wrong together. A pose that would have driven through walls (driven_path.py) loses, too.
+Evidence is a log likelihood ratio to `elsewhere`: the robot is at none of these poses, but in another building or at
+a pose that was missed. There the map explains as much as it does by chance. How much that is depends on the scan (two
+parallel walls fit everywhere), so it is measured: it is what the tenth best of the distinct places of the map
+explains. The tenth and not the second, because places that look alike are no evidence for elsewhere. The ratio of one
+piece is bounded, since the pieces of one moved object are wrong together. A pose whose path crosses walls loses, too
+(driven_path.py).
 
 The formulation is ours; the document (seed document global_localization_procedure.txt) has no scans. Multi-hypothesis
-tracking: Jensfelt, Kristensen, Active global localization for a mobile robot using multiple hypothesis tracking (2001).
-K poses, B beams, V views (scans that showed new walls).
+tracking: Jensfelt, Kristensen, Active global localization for a mobile robot using multiple hypothesis tracking
+(2001). K poses, B beams, V views (scans that showed new walls).
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ NEW = -2  # label of a pose that nobody has weighed
 
 
 class Search(Protocol):
-    """Of one scan in the whole map; hypotheses/place_search.py is one."""
+    """A search of one scan in the whole map, such as hypotheses/place_search.py."""
 
     def advance(self) -> bool:
         """One slice; whether it is complete."""
@@ -68,7 +69,7 @@ class MapScans(Protocol):
     """How a map would be seen; hypotheses/scan_explanation.py is one."""
 
     def search(self, scan: Scan, odom_from_base: np.ndarray) -> Optional[Search]:
-        """For poses from which the scan may have been taken; None: the scan is no evidence."""
+        """Begins a search for poses where the scan fits; None: the scan is no evidence."""
 
     def beams(self, scan: Scan, map_from_base: np.ndarray, most_m: float, most_rad: float) -> Optional[BeamsExplained]:
         """Poses (K, 3) slid by no more than that, with the beams explained from there; None: no evidence."""
@@ -98,7 +99,7 @@ class _View:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Of K poses."""
+    """The evidence for K poses."""
 
     nats: np.ndarray  # (K,) log likelihood ratios to elsewhere, by the scans and the path
     checked_nats: np.ndarray  # (K,) the part of them by scans that did not choose the pose
@@ -116,7 +117,7 @@ class Evidence:
         return Evidence(*(values[chosen] for values in vars(self).values()))
 
     def then(self, more: Evidence) -> Evidence:
-        """Of these poses and more of them."""
+        """The evidence for these poses and for more of them."""
         return Evidence(*map(np.concatenate, zip(vars(self).values(), vars(more).values())))
 
     def with_view(self, nats: np.ndarray, explained: np.ndarray, seen: np.ndarray) -> Evidence:
@@ -185,7 +186,7 @@ class PoseBelief:
         self._path.add(odom_from_base, self.driven_m)
 
     def see(self, scan: Scan, odom_from_base: np.ndarray) -> bool:
-        """One more scan.
+        """Process a scan.
 
         Args:
             scan: one revolution of a lidar.
@@ -363,7 +364,7 @@ class PoseBelief:
 
 
 class _SearchedScan:
-    """One scan in the whole map: advance() until it is complete."""
+    """A scan that is searched in the whole map: advance() until it is complete."""
 
     def __init__(
         self, scans: MapScans, search: Search, scan: Scan, odom_from_base: np.ndarray, driven_m: float, most: int

@@ -1,7 +1,6 @@
-"""Poses, odometry, scores -> the same poses further on, each place once, the best first.
+"""Follows many poses by odometry and scans: duplicates are merged, the best comes first.
 
-What everything shares that follows many poses at once: GlobalSearch and PoseBelief, whose scores are log likelihoods.
-K poses.
+Common to GlobalSearch and PoseBelief, whose scores are log likelihoods. K poses.
 """
 
 from __future__ import annotations
@@ -46,11 +45,11 @@ class PoseTracker:
         return step
 
     def add(self, poses: np.ndarray) -> None:
-        """More poses (N, 3), behind those that are followed."""
+        """Add poses (N, 3) after those that are followed."""
         self.poses = np.concatenate([self.poses, poses])
 
     def keep_distinct(self, score: np.ndarray, has_chance: Optional[np.ndarray] = None) -> np.ndarray:
-        """Of poses that have become one keep the best, of all of them those that have a chance, the best first.
+        """Merge poses that have become one, and keep those that have a chance, best first.
 
         Args:
             score: (K,) of the poses, more is better.
@@ -75,7 +74,7 @@ def same_place(poses: np.ndarray, pose: np.ndarray) -> np.ndarray:
 
 
 def lead(pose: np.ndarray, score: float, poses: np.ndarray, scores: np.ndarray) -> float:
-    """By how much a pose (3,) is ahead of its best rival among poses (K, 3) with scores (K,); inf: it has none."""
+    """Score of a pose (3,) minus that of its best rival among poses (K, 3) with scores (K,); inf without a rival."""
     return float(score - scores[~same_place(poses, pose)].max(initial=-np.inf))
 
 

@@ -1,9 +1,9 @@
-"""Poses, scan -> the poses nearby where the scan fits the walls best.
+"""Aligns a scan to the nearest walls, from many poses at once.
 
-Gauss-Newton on the squared distance of the beams' end points to the nearest wall, with a
-Geman-McClure kernel that narrows from coarse to fine, so that people, furniture and mirrored echoes do
-not pull. K poses are refined at once; the steps are in the compiled module _distance_field. The formulation is ours; the
-field is the likelihood field of sensing/distance_field.py.
+Gauss-Newton on the squared distance of the beams' end points to the nearest wall, with a Geman-McClure kernel that
+narrows from coarse to fine, so that people, furniture and mirrored echoes have little influence. K poses are refined
+at once; the steps are in the compiled module _distance_field. The formulation is ours; the field is the likelihood
+field of sensing/distance_field.py.
 """
 
 from __future__ import annotations

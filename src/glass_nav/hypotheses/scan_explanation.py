@@ -1,11 +1,11 @@
-"""A scan, poses that it may come from -> the share of its beams that the map explains from each, glass included.
+"""The share of the beams of a scan that the map explains, glass included, at each of many poses.
 
-A beam is explained if it ended at one of the ranges that the five cases expect: the first surface along it, the next
-ones behind if the walls before are thin enough for glass, or the mirrored one (seed document glass_localization.txt).
-So beams that passed panes do not rule a candidate out, and a wall at any distance does not support it. A beam that
-ended in unmapped space is no evidence, unless it crossed a wall too thick for glass: the mapper was not there. Nor did
-he see the back of a wall, so a beam that comes to it from there may end before the face that is drawn. Each pose may
-first slide to where the scan fits best, since it is known to about a decimetre.
+A beam is explained if it ended at one of the ranges of the five cases: at the first surface, at a later one if the
+walls before are thin enough for glass, or at the mirrored range (seed document glass_localization.txt). So beams that
+passed panes do not rule a pose out, and a wall at another distance does not support it. A beam that ended in unmapped
+space is no evidence, unless it crossed a wall too thick for glass. The mapper did not see the back of walls either,
+so a beam that reaches one from behind may end before the face that is drawn. Each pose may first be registered to the
+scan, since it is known to about a decimetre.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _MIN_KNOWN = 0.25  # of the beams that returned; where the map knows fewer of th
 
 @dataclass(frozen=True)
 class BeamsExplained:
-    """Of B beams of a scan, seen from P poses."""
+    """How the map explains the B beams of a scan, from P poses."""
 
     poses: np.ndarray  # (P, 3) where the scan fits best
     ends_m: np.ndarray  # (B, 2) of the beams, in the robot's frame
@@ -47,7 +47,7 @@ class BeamsExplained:
 
 
 class ScanExplanation:
-    """For one map."""
+    """Explains scans by one map."""
 
     def __init__(self, grid_map: GridMap) -> None:
         self._grid_map = grid_map
@@ -64,7 +64,7 @@ class ScanExplanation:
             self._matcher = ScanMatcher(self._grid_map, self._field)
 
     def shares(self, scan: Scan, map_from_base: np.ndarray) -> np.ndarray:
-        """Of the beams that returned from mapped space, the share that the map explains.
+        """Share of the beams that the map explains, of those that returned from mapped space.
 
         Args:
             scan: as it was measured.
@@ -96,7 +96,7 @@ class ScanExplanation:
         return beams.poses, np.where(few, np.nan, beams.explained.sum(axis=1) / np.maximum(count, 1))
 
     def beams(self, scan: Scan, map_from_base: np.ndarray, most_m: float, most_rad: float) -> Optional[BeamsExplained]:
-        """As fitted(), beam by beam; None if hardly any beam returned."""
+        """As fitted(), but for each beam; None if hardly any beam returned."""
         used = _used_beams(scan)
         if used is None:
             return None

@@ -1,10 +1,10 @@
-"""GridMap, scan -> all poses from which the scan may have been taken, with no initial pose.
+"""Finds all poses of the map from which a scan may have been taken, without an initial pose.
 
-Correlative scan matching (Olson (2009)) of the beams' end points against a likelihood field, over every position
-and heading, by branch and bound (Hess, Kohler, Rapp, Andor (2016)): the face of MatchGrid and ScanSearch in the compiled
-module _grid. It ignores what the beams passed and which wall they met, so it proposes poses and judges none. On a
-large map that takes longer than a robot may wait for its pose, so a search can be done in slices. Their size is
-a count of look-ups and no time, so that a replay gives the same answer.
+Correlative scan matching (Olson (2009)) of the beams' end points against a likelihood field, over every position and
+heading, by branch and bound (Hess, Kohler, Rapp, Andor (2016)): the Python interface of MatchGrid and ScanSearch in
+the compiled module _grid. It ignores what the beams passed and which wall they met, so it proposes poses and does not
+judge them. On a large map that takes longer than a robot may wait for its pose, so a search can be done in slices. A
+slice is a number of look-ups, not a time, so that a replay gives the same result.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class ScanMatcher:
         return np.rint(_HIGHEST * _SCALE_M**2 / (_SCALE_M**2 + distance**2)).astype(np.uint8)
 
     def search(self, points_m: np.ndarray, keep: int) -> Places:
-        """At most so many places, one for each square of 0.8 m and each of the headings.
+        """Find at most this number of places, one for each square of 0.8 m and each of the headings.
 
         Args:
             points_m: (B, 2) finite end points of beams in the robot's frame.
@@ -90,7 +90,7 @@ class ScanMatcher:
 
 
 class SlicedSearch:
-    """One scan, to be matched slice by slice."""
+    """A search of one scan, done slice by slice."""
 
     def __init__(self, search: _grid.ScanSearch, map_from_grid: np.ndarray, cell_m: float) -> None:
         """Made by ScanMatcher.begin()."""
@@ -102,12 +102,12 @@ class SlicedSearch:
 
     @property
     def look_ups(self) -> int:
-        """So far."""
+        """Number of look-ups so far."""
         return int(self._search.look_ups)
 
     @property
     def places(self) -> Places:
-        """Of a complete search."""
+        """The places found, once the search is complete."""
         row, column, heading, score = self._search.places()
         grid_from_base = np.stack(
             [(column + 0.5) * self._cell_m, (row + 0.5) * self._cell_m, _HEADINGS_RAD[heading]], -1

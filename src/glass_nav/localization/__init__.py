@@ -1,1 +1,1 @@
-"""Where in the map?  SCAN -> CASES -> WEIGHTS -> POSE."""
+"""Localization in a known map: classify the beams of each scan, weight particles, estimate and check the pose."""

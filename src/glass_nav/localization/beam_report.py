@@ -1,4 +1,4 @@
-"""What the beams of a scan say at the reported pose: what each met, the scan cut at glass, how much the map explains."""
+"""The beams of a scan at the reported pose: case of each, the scan cut at glass, share explained by the map."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
 
 @dataclass(frozen=True)
 class BeamReport:
-    """Of one scan."""
+    """The report on the beams of one scan."""
 
     cases: BeamCases  # of every beam
     surface_scan: SurfaceScan  # the scan in which glass is an obstacle

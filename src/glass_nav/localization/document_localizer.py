@@ -1,10 +1,10 @@
-"""ODOMETRY -> SAMPLES -> CASES -> WEIGHTS -> POSE: the glass document alone (`method: document`).
+"""The algorithm of the glass document alone (`method: document`), for comparison with localizer.py.
 
-Seed document glass_localization.txt, sec. III.A, and nothing beside it, for comparison with localizer.py: preliminary
-samples stand around the pose that odometry predicts, each votes for one of the four expected ranges, the case with the
-highest vote wins whatever its share, and the particles are weighed by the ranges of these cases, cast from each of them.
-No scan registration, no glass map, no search, no kidnap detector. What the document does not give (its text breaks off
-at step 1) is as in `vote_mode: paper` and `weight_mode: ranges`.
+Seed document glass_localization.txt, sec. III.A. Preliminary samples around the pose predicted by odometry vote for
+one of the four expected ranges of each beam. The case with the most votes wins, whatever its share. Particles are
+weighted by the ranges of these cases, cast from each particle. There is no scan registration, glass map, global
+search or kidnap detector. What the document does not give (its text breaks off at step 1) is as in `vote_mode: paper`
+and `weight_mode: ranges`.
 """
 
 from __future__ import annotations
@@ -56,13 +56,13 @@ class DocumentLocalizer:
     # -- where it is, and how it starts
 
     def set_map(self, grid_map: GridMap) -> None:
-        """Another map; the particles stay where they are."""
+        """Use another map; the particles stay where they are."""
         self._resolution_m = grid_map.resolution_m
         self._classifier = BeamClassifier(self._params.classifier, grid_map)
         self._schedule.request()
 
     def reconfigure(self, params: LocalizerParams) -> None:
-        """Other parameters from the next scan on; the particles stay."""
+        """Use other parameters from the next scan on; the particles stay."""
         self._params = _plain(params)
         self._classifier.reconfigure(self._params.classifier)
         self._quality.limit_by(params.quality)
@@ -79,7 +79,7 @@ class DocumentLocalizer:
 
     @property
     def found_panes(self) -> Tuple[Pane, ...]:
-        """Those that were remembered."""
+        """The panes that were restored."""
         return self._remembered
 
     def remember(self, panes: Sequence[Pane], glass: Mapping[str, np.ndarray]) -> None:
@@ -112,10 +112,10 @@ class DocumentLocalizer:
         self._schedule.request()
 
     def add_bearings(self, bearings: LandmarkBearings, landmarks: LandmarkMap, odom_from_base: np.ndarray) -> None:
-        """Left aside: the document has no landmarks."""
+        """Ignored: the document has no landmarks."""
 
     def update(self, scan: Scan, odom_from_base: np.ndarray) -> Estimate:
-        """One scan and the odometry at its stamp -> pose. For arguments and errors see Localizer.update()."""
+        """Process a scan and the odometry at its stamp. For arguments and errors see Localizer.update()."""
         if not len(self._particles):
             raise RuntimeError("update() needs set_pose() first")
         scan = scan.limited(self._params.limits.laser_min_range, self._params.limits.laser_max_range)
@@ -140,7 +140,7 @@ class DocumentLocalizer:
     # -- one update
 
     def _weigh(self, scan: Scan, cases: BeamCases) -> None:
-        """By the beams of known case, each compared with the range of that case from the particle."""
+        """Weight the particles by the beams of known case, against the range of that case from each particle."""
         chosen = spread_evenly(cases.case, self._params.mixture.laser_max_beams)
         log_w = importance_weights.by_ranges(
             self._classifier.caster,

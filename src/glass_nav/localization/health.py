@@ -1,4 +1,4 @@
-"""How well the localization is doing, for /diagnostics: the pose, the scans, the beams, the time, the map."""
+"""The entries of the localization for /diagnostics: pose, scans, beams, time, map."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FEW_BEAMS = 20  # that answered; a pose does not follow from fewer
 
 @dataclass(frozen=True)
 class Situation:
-    """What is being reported on."""
+    """The data for the entries."""
 
     estimate: Optional[Estimate]  # the last one, None before the first
     scan: Optional[Scan]  # that it was made of
@@ -49,12 +49,12 @@ class LocalizationHealth:
         self._wall_s: List[float] = []
 
     def add_update(self, cpu_s: float, wall_s: float) -> None:
-        """One update took this much CPU time, and this long."""
+        """Add the CPU time and the duration of an update."""
         self._cpu_s.append(cpu_s)
         self._wall_s.append(wall_s)
 
     def report(self, now: Situation) -> Dict[str, Health]:
-        """All entries by name; those that cover the time since the last report start over."""
+        """All entries by name; those over a period start again."""
         entries = {
             "pose": self._pose(now),
             "scans": self._scans(now),

@@ -1,4 +1,4 @@
-"""Where the robot starts: by default, in AMCL's names, and as somebody says."""
+"""The initial pose: default, AMCL's parameters, or as requested."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class StartRules:
 
 @dataclass(frozen=True)
 class PoseGuess:
-    """Where somebody says that the robot was at some time."""
+    """A given pose, and its time."""
 
     stamp_ns: int  # 0: now, whenever that is
     map_from_base: np.ndarray  # (3,)

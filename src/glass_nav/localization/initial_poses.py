@@ -1,4 +1,4 @@
-"""Which pose the localization starts from: the one given last, the one of the pose file, or the default."""
+"""Chooses the initial pose: the one given last, the one of the pose file, or the default."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class InitialPoses:
         self._waiting = None
 
     def begin_at(self, map_from_base: np.ndarray, covariance: np.ndarray) -> None:
-        """Where begin() places the particles from now on: the last pose of a localizer."""
+        """Let begin() place the particles at the last pose of a localizer from now on."""
         self._home, self._whose = (map_from_base, covariance), "its last pose"
 
     def apply(

@@ -1,7 +1,8 @@
-"""SCAN -> CASES -> WEIGHTS -> POSE: Monte Carlo localization that knows glass.
+"""Monte Carlo localization in buildings with glass: scan -> cases of the beams -> weights -> pose.
 
 The filter of Thrun, Burgard, Fox, Probabilistic Robotics (2005), ch. 8, with the sensor model of the seed document
-glass_localization.txt: decide beam by beam what the beam met, then weigh the particles by the beams that are understood.
+glass_localization.txt: each beam is first classified by what it met, then the particles are weighted by the beams
+whose case is known.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ _SHOWN = 500  # candidates drawn for particlecloud
 
 @dataclass(frozen=True)
 class Estimate:
-    """What the filter says after one scan."""
+    """The result of the filter after one scan."""
 
     stamp_ns: int
     map_from_base: np.ndarray  # (3,) pose of the best cluster
@@ -65,12 +66,12 @@ class Estimate:
 
     @cached_property
     def report(self) -> BeamReport:
-        """Of the beams. Worked out when it is first asked for, which is to be before the next scan."""
+        """Report on the beams. Computed on first access, which must be before the next scan."""
         return self.report_beams()
 
     @property
     def cases(self) -> BeamCases:
-        """Of every beam of the scan."""
+        """Case of every beam of the scan."""
         return self.report.cases
 
     @property
@@ -80,7 +81,7 @@ class Estimate:
 
     @property
     def inlier_ratio(self) -> float:
-        """Of the beams that say something, the share that the map explains; NaN without any."""
+        """Share of the beams that the map explains, of those that are evidence; NaN without any."""
         return self.report.inlier_ratio
 
 
@@ -111,12 +112,12 @@ class SeenBeams:
     def between(
         cls, classifier: BeamClassifier, scan: Scan, map_from_base: np.ndarray, covariance: np.ndarray
     ) -> SeenBeams:
-        """Those of a scan between two updates, from a pose (3,) with that covariance (3, 3)."""
+        """The beams of a scan between two updates, from a pose (3,) with that covariance (3, 3)."""
         cases, expected = classifier.classify(scan, map_from_base, covariance, for_weights=False)
         return cls(classifier, scan, map_from_base, cases, expected)
 
     def report(self, trusted: bool) -> BeamReport:
-        """All of it; `trusted`: the pose is."""
+        """Report on the beams; `trusted`: whether the pose is."""
         surfaces = self._classifier.surfaces(self._scan, self._cases, self._expected, trusted)
         return BeamReport(self._cases, surfaces, self.evidence.inlier_ratio)
 
@@ -157,7 +158,7 @@ class Localizer:
     # -- where it is, and how it starts
 
     def set_map(self, grid_map: GridMap) -> None:
-        """Another map; the particles stay where they are. A search goes on in all of it."""
+        """Use another map; the particles stay where they are. A search continues in the whole new map."""
         field = DistanceField(grid_map)
         self._filter.set_field(field)
         self._look_at(grid_map, field)
@@ -178,7 +179,7 @@ class Localizer:
         self._integrity = IntegrityMonitor(field, grid_map.resolution_m)
 
     def reconfigure(self, params: LocalizerParams) -> None:
-        """Other parameters from the next scan on; the particles, the glass map and what the filter learnt stay."""
+        """Use other parameters from the next scan on; particles, glass map and all that was learnt stay."""
         self._classifier.reconfigure(params.classifier)
         self._panes.reconfigure(params.pane_use)
         self._filter.reconfigure(params.particle_filter)
@@ -205,11 +206,11 @@ class Localizer:
 
     @property
     def found_panes(self) -> Tuple[Pane, ...]:
-        """All of them, the most probable first, also those that do not count."""
+        """All panes found, most probable first, including those below the limit."""
         return self._panes.candidates
 
     def remember(self, panes: Sequence[Pane], glass: Mapping[str, np.ndarray]) -> None:
-        """What an earlier run on the same map found: its found_panes and the arrays() of its glass map.
+        """Restore the found_panes and the glass map's arrays() of an earlier run on the same map.
 
         Raises:
             ValueError: the glass map is of another one; nothing is changed.
@@ -286,7 +287,7 @@ class Localizer:
         self.request_update()
 
     def update(self, scan: Scan, odom_from_base: np.ndarray) -> Estimate:
-        """One scan and the odometry at its stamp -> pose.
+        """Process a scan and the odometry at its stamp.
 
         Args:
             scan: one revolution of a lidar.
@@ -341,11 +342,11 @@ class Localizer:
     def _watch(
         self, scan: Scan, odom_from_base: np.ndarray, map_from_base: np.ndarray, step: Optional[np.ndarray]
     ) -> Verdict:
-        """What the scan says about the tracked pose; `step` since the last update: None at an update."""
+        """Check the tracked pose by the scan; `step` since the last update: None at an update."""
         reckoned = self._dead_reckoning
         if reckoned is not None and step is not None:
             reckoned = reckoned.carried(step, self._params.odometry)
-        verdict = self._kidnap_detector.observe(scan, odom_from_base, map_from_base, reckoned)
+        verdict = self._kidnap_detector.observe(scan, odom_from_base, map_from_base, reckoned, self._schedule.period_s)
         self._quality.doubt(verdict)
         return verdict
 
@@ -381,7 +382,9 @@ class Localizer:
     def _find(self, scan: Scan, odom_from_base: np.ndarray) -> BeamCases:
         """The pose is not known: follow all places where it may be. The particles are those places."""
         assert self._search is not None
-        candidates = self._search.update(scan, odom_from_base, self._bearings_from(odom_from_base))
+        candidates = self._search.update(
+            scan, odom_from_base, self._bearings_from(odom_from_base), period_s=self._schedule.period_s
+        )
         self._quality.follow_search(candidates)
         if candidates.found:
             return self._settle(scan, odom_from_base, candidates.poses[0], candidates.fit)
@@ -466,7 +469,7 @@ class Localizer:
         self._bearings = []
 
     def _new_search(self, area: Optional[np.ndarray] = None) -> GlobalSearch:
-        """Over the free cells of area (H, W), or all of them."""
+        """A search over the free cells of area (H, W), or all of them."""
         matcher = self._everywhere if area is None else ScanMatcher(self._grid_map, self._field, area)
         assert matcher is not None  # there are free cells
         return GlobalSearch(matcher, self._field, self._params.search, self._known_area)

@@ -98,7 +98,7 @@ class LocalizerParams:
 
     @property
     def classifier(self) -> BeamClassifierParams:
-        """Those of the beam classifier."""
+        """Parameters of the beam classifier."""
         return BeamClassifierParams(
             self.samples,
             self.vote,
@@ -111,7 +111,7 @@ class LocalizerParams:
 
     @property
     def particle_filter(self) -> ParticleFilterParams:
-        """Those of the particle filter."""
+        """Parameters of the particle filter."""
         return ParticleFilterParams(
             self.count,
             self.odometry,

@@ -1,11 +1,11 @@
-"""Scans as they arrive, corrections as they are computed -> when tf map -> odom is sent, with which stamp.
+"""When tf map -> odom is sent, and with which stamp, from scans and corrections as they arrive.
 
-Navigation asks tf for "now" and does not wait. So the last correction is sent again the moment a scan arrives, before the
-filter has worked on it, and the new correction follows when it is computed. Each transform is stamped ahead of its scan
-by `transform_tolerance`, as AMCL's are, and by more where that ends before the next scan has arrived and its transform
-has reached the listeners: at ten scans a second and a tolerance of 0.1 s, on a busy machine, or from a slow lidar. A
-stamp is never sent twice, so a correction holds from the time on up to which transforms were sent already, and never
-moves one that somebody may have used.
+Navigation asks tf for the present and does not wait. So the last correction is sent again as soon as a scan arrives,
+before the filter has processed it, and the new correction follows when it is computed. Each transform is stamped
+ahead of its scan by `transform_tolerance`, as by AMCL. It is stamped further ahead if the tolerance would end before
+the transform of the next scan reaches the listeners, as with ten scans per second and a tolerance of 0.1 s, on a busy
+machine, or with a slow lidar. No stamp is sent twice: a correction applies from the end of the transforms sent
+before, and never changes one that a listener may have used.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _AHEAD_NS = 500_000_000  # a scan stamped further in the future has a wrong cloc
 
 @dataclass(frozen=True)
 class StampedTransform:
-    """To be sent on tf."""
+    """A transform to be sent on tf."""
 
     stamp_ns: int
     map_from_odom: np.ndarray  # (3,) x [m], y [m], yaw [rad]

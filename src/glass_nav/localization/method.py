@@ -1,4 +1,4 @@
-"""Which method localizes: ours, or the glass document and nothing else, for comparison."""
+"""The choice of the localization method: the default, or the glass document alone."""
 
 from __future__ import annotations
 

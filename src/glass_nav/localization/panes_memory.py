@@ -1,4 +1,4 @@
-"""Panes that the map lacks, and the glass map: told to people, and kept in a file for the next run on the same map."""
+"""Reports the panes that the map lacks, and stores them with the glass map in a file for the next run."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class PanesFilePath:
-    """Where panes and the glass map are kept."""
+    """The file for panes and the glass map."""
 
     panes_file: str = ""  # "": nowhere
 
@@ -59,13 +59,13 @@ class PanesMemory:
             _log.info(f"{self._path}: {len(kept.panes)} panes that the map lacks, {self._told_m:.1f} m of them in use")
 
     def tell(self, localizer: PoseFilter) -> None:
-        """One line for the log when markedly more glass was found than was told before."""
+        """A log line if markedly more glass was found than was reported before."""
         if _length_m(localizer) >= self._told_m + max(_NEWS_M, _NEWS_SHARE * self._told_m):
             self._told_m = _length_m(localizer)
             _log.warning(self.summary(localizer))
 
     def summary(self, localizer: PoseFilter) -> Optional[str]:
-        """What the map lacks and how to draw it in; None if nothing was found."""
+        """How much glass the map lacks and how to draw it in; None if none was found."""
         count = len(localizer.unmapped_panes)
         if not count:
             return None

@@ -1,4 +1,4 @@
-"""The places that a global search holds for possible, as a display draws them: a ring, a heading and a share of each."""
+"""The candidates of a global search for a display: ring, heading and probability of each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When the last pose is kept for the next start: where a node keeps its parameters, as AMCL does, and in ~pose_file."""
+"""Stores the last pose for the next start: on the parameter server, as AMCL does, and in ~pose_file."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The last pose of a robot in a file, for the next start, and whether it is still valid then.
+"""The file with the last pose of a robot, and the check whether it is still valid at the next start.
 
-It is valid if the map is the same, it is not too old, and odometry either continues from it or began anew when the
-robot was switched on.
+The pose is valid if the map is the same, it is not too old, and odometry either continues from it or started from
+zero when the robot was switched on.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class SavedPoseError(ValueError):
 
 @dataclass(frozen=True)
 class PoseFile:
-    """Where the pose is kept, and how long it is valid."""
+    """The file for the pose, and how long it is valid."""
 
     pose_file: str = ""  # "": none
     pose_file_max_age_s: float = 604800.0  # [s] a week
@@ -93,7 +93,7 @@ def save(path: Path, saved: SavedPose) -> None:
 
 
 def load(path: Path) -> SavedPose:
-    """What save() wrote.
+    """Read the file that save() wrote.
 
     Raises:
         FileNotFoundError: there is no file.
@@ -126,7 +126,7 @@ def load(path: Path) -> SavedPose:
 def resumed(
     saved: SavedPose, now_ns: int, map_digest: str, odom_from_base: np.ndarray, limits: PoseFile
 ) -> Tuple[np.ndarray, np.ndarray, str]:
-    """Where the robot is now: pose (3,), covariance (3, 3), and in words why it is valid.
+    """The present pose (3,), its covariance (3, 3), and in words why it is valid.
 
     Args:
         saved: what was written.

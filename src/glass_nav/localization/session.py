@@ -1,4 +1,4 @@
-"""What the localization node decides: when a localizer begins and where, when it starts over, and what is missing."""
+"""The decisions of the localization node: when a localizer starts and where, when it restarts, what is missing."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class SessionParams:
-    """What a session begins with."""
+    """Parameters of a session."""
 
     localizer: LocalizerParams
     start: StartPose
@@ -40,7 +40,7 @@ class SessionParams:
 
 @dataclass(frozen=True)
 class Inputs:
-    """What the node knows of its inputs, for missing()."""
+    """The state of the node's inputs, for missing()."""
 
     now_s: float  # ROS time; 0: nothing publishes /clock yet
     last_scan_s: float  # when the last scan arrived
@@ -50,7 +50,7 @@ class Inputs:
 
 
 class LocalizationSession:
-    """One localizer after the other: a new one begins with the first map, and each time that time jumps back."""
+    """A sequence of localizers: a new one starts with the first map, and whenever time jumps back."""
 
     def __init__(
         self,
@@ -128,7 +128,7 @@ class LocalizationSession:
         self._running().request_update()
 
     def reconfigure(self, params: SessionParams) -> None:
-        """Other parameters from now on; what the localizer knows stays."""
+        """Use other parameters from now on; the localizer keeps its state."""
         if self.localizer is not None:
             self.localizer.reconfigure(params.localizer)
         self._params = params
@@ -150,7 +150,7 @@ class LocalizationSession:
                 localizer.request_update()
 
     def update(self, scan: Scan, odom_from_base: np.ndarray, now_s: float) -> Optional[Estimate]:
-        """One scan through the localizer; None if its pose is not finite: that must not go out.
+        """Process a scan; None if the pose is not finite, which must not be published.
 
         Raises:
             ValueError: the scan cannot be used.
@@ -214,7 +214,7 @@ class LocalizationSession:
 
     @property
     def state_without_scans(self) -> LocalizationState:
-        """What to report while no scan is being used."""
+        """The state to report while no scan is used."""
         return LocalizationState.UNKNOWN if self.estimate is None else LocalizationState.UNCERTAIN
 
     def _running(self) -> PoseFilter:
@@ -231,7 +231,7 @@ class LocalizationSession:
         return self._starts.begin(self.localizer)
 
     def _wait_no_more(self) -> None:
-        """There is a pose, or somebody wants one to be found."""
+        """Stop waiting: there is a pose, or a search was requested."""
         if self.waits_for_pose:
             self.waits_for_pose = False
             if self.grid_map is not None:

@@ -1,4 +1,4 @@
-"""What is known of the robot's place at the start -> the cells of the map that it may be in. H rows, W columns."""
+"""The cells of the map in which the robot may be at the start. H rows, W columns."""
 
 from __future__ import annotations
 

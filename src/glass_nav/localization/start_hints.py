@@ -1,4 +1,4 @@
-"""What has to be started, for somebody who launched the localization alone."""
+"""Hints which programs to start, for users who launched the localization alone."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Optional
 
 
 def what_to_start(no_map: bool, no_scan_on: str, no_odometry: str) -> Optional[str]:
-    """One line that names what is missing and what gives it; None if all is there.
+    """A line that names what is missing and how to start it; None if nothing is missing.
 
     Args:
         no_map: there is no map, and no service offers one.

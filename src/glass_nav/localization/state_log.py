@@ -1,4 +1,4 @@
-"""What is logged about the state of the localization: each change once, with where and why."""
+"""The log lines about the state of the localization: each change once, with place and reason."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ QUIET_S = 5.0  # a state that comes and goes is said to be lost at most that oft
 
 @dataclass(frozen=True)
 class _Moment:
-    """Where the robot was said to be, and when."""
+    """A reported pose and its time."""
 
     stamp_ns: int
     map_from_base: np.ndarray  # (3,)

@@ -1,4 +1,4 @@
-"""The state of the localization in words above the robot, as a display shows it."""
+"""The state of the localization as a text above the robot, for displays."""
 
 from __future__ import annotations
 

@@ -15,6 +15,7 @@ class UpdateSchedule:
     """Remembers when each lidar had its last update, and where odometry was then."""
 
     def __init__(self) -> None:
+        self.period_s: Optional[float] = None  # from the scan before to the last one, of whatever lidars; None: unknown
         self._stamps_ns: Dict[str, int] = {}  # of the last scan of each lidar
         self._odom_from_base: Optional[np.ndarray] = None  # at the last update
         self._up_to_date: Set[str] = set()  # lidars that had an update since the robot moved
@@ -31,11 +32,13 @@ class UpdateSchedule:
         last_ns = self._stamps_ns.get(scan.lidar, scan.stamp_ns)
         if scan.stamp_ns < last_ns:
             raise ScanError(f"time runs backwards, the last scan was at {last_ns * 1e-9:.3f} s", scan.stamp_ns)
+        if self._stamps_ns:
+            self.period_s = 1e-9 * max(scan.stamp_ns - max(self._stamps_ns.values()), 0)
         self._stamps_ns[scan.lidar] = scan.stamp_ns
         return odom_from_base
 
     def is_due(self, lidar: str, odom_from_base: np.ndarray, schedule: Schedule) -> bool:
-        """Each lidar has one update after enough distance or turn by odometry."""
+        """Whether an update is due: for each lidar, after enough distance or turn by odometry."""
         step = self.step_to(odom_from_base)
         if step is not None:
             distance_m, turn_rad = se2.travelled(step)

@@ -1,1 +1,1 @@
-"""Which glass does the map lack? Scans at trusted poses -> panes."""
+"""Finds glass that the map lacks, from scans at trusted poses."""

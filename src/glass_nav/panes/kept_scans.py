@@ -1,4 +1,4 @@
-"""Scans at trusted poses -> a bounded memory of them: one for each place and heading of the robot, the newest.
+"""A bounded memory of scans at trusted poses: the newest for each place and heading of the robot.
 
 Each scan is kept on a fixed circle of directions, whatever the lidar. S scans, D directions.
 """
@@ -77,7 +77,7 @@ class KeptScans:
         return row
 
     def _beams(self, scan: Scan) -> Tuple[np.ndarray, np.ndarray]:
-        """As nearest_beams(); a lidar's angles are nearly always those of its last scan."""
+        """As nearest_beams(); the angles are nearly always those of the last scan of the lidar."""
         if scan.lidar in self._beams_of:
             angles_rad, beams, direction = self._beams_of[scan.lidar]
             if np.array_equal(angles_rad, scan.angles_rad):

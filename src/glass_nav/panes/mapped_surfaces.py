@@ -1,4 +1,4 @@
-"""GridMap -> which returns does the map not explain?
+"""Finds the returns that the map does not explain.
 
 A beam that ended in front of the first mapped surface met something that the map lacks. Specks of occupied cells are no
 surfaces here: a mapper that erases what beams pass leaves specks of a pane, where beams met it near its normal.

@@ -1,10 +1,10 @@
-"""A line, kept scans -> is it a pane?
+"""Decides from the kept scans whether a line is a pane.
 
 Pieces of the line are looked up in every scan that saw them: a beam returned there, passed, or ended before. A pane
-returns what comes along its normal and lets the rest pass; a thing returns what comes from anywhere; clutter and people
-return little. Where a line of glass ends, and where another piece of it begins, follows from all pieces together: one
-piece alone is seen head-on by a scan or two. Where the map has nothing behind a pane, its own weak echo may be the only one, so
-that it returns oblique beams too; a thing returns the same there and elsewhere. L pieces, S scans.
+returns beams along its normal and lets the others pass; other objects return beams from all directions; clutter and
+people return few. The ends of a pane follow from all pieces together, since a single piece is seen head-on by only a
+scan or two. Where the map has nothing behind a pane, its own weak echo may be the only one, so that it returns
+oblique beams too; other objects return the same there and elsewhere. L pieces, S scans.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ _CHANGE = 3.4  # nats: a line changes from one kind to another once in 3 m
 
 
 class Kind(IntEnum):
-    """What a piece of a line is."""
+    """The kind of a piece of a line."""
 
     PANE = 0
     NOTHING = 1
@@ -59,7 +59,7 @@ class Kind(IntEnum):
 
 @dataclass(frozen=True)
 class Counts:
-    """What was seen of pieces of a line, by incidence, before something mapped and before nothing."""
+    """Returns and passes at pieces of a line, by incidence, in front of mapped surfaces and of nothing."""
 
     returns: np.ndarray  # (L, 2, INCIDENCES)
     passes: np.ndarray  # (L, 2, INCIDENCES)
@@ -75,7 +75,7 @@ class Counts:
 
 
 def counts(scans: KeptScans, middle_m: np.ndarray, normal: np.ndarray, reach_m: float) -> Counts:
-    """What all scans say of pieces of a line.
+    """Counts returns and passes of all scans at pieces of a line.
 
     Args:
         scans: the memory.

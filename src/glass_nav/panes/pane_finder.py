@@ -1,10 +1,11 @@
-"""Scans at trusted poses -> the panes that the map lacks, each with its probability.
+"""Finds the panes that the map lacks, each with its probability, from scans at trusted poses.
 
-A beam that ended in front of the first mapped surface met something that the map lacks, and time shows what: a pane
-answers within some degrees of its normal only, wherever the robot looks at it head-on, and lets beams pass at other
-angles; a thing that was put there answers from everywhere and lets none pass; a person moves on. Where the lidar gives
-intensities, those that differ from this lidar's own walls count too (wall_intensity.py). The formulation is ours. Lines are traced through the returns (pane_lines.py), and every piece of a line is looked up in the kept scans
-(pane_evidence.py).
+A beam that ended in front of the first mapped surface met something that the map lacks. What it was shows over time:
+a pane returns beams only within some degrees of its normal, from wherever the robot looks at it head-on, and lets
+beams pass at other angles; a new object returns beams from all directions and lets none pass; a person moves on. If
+the lidar gives intensities, those that differ from ordinary walls count too (wall_intensity.py). Lines are traced
+through the returns (pane_lines.py), and every piece of a line is looked up in the kept scans (pane_evidence.py). The
+formulation is ours.
 """
 
 from __future__ import annotations
@@ -151,7 +152,7 @@ class PaneFinder:
         return True
 
     def panes(self, anew: bool = False) -> List[Pane]:
-        """All candidates by what was seen so far, the most probable first.
+        """All candidates so far, most probable first.
 
         Looks again where the robot has been since the last call, which takes some ten milliseconds.
 
@@ -205,7 +206,7 @@ class PaneFinder:
         return walls.excess(ranges_m, incidence_rad, scan.intensities)
 
     def _returns(self, boxes: "Sequence[_Box]") -> Returns:
-        """All returns in some boxes."""
+        """All returns in the given boxes."""
         laser_m = self._scans.map_from_laser[:, :2]
         rows = np.flatnonzero(np.any([box.contains(laser_m, self._p.pane_reach_m) for box in boxes], axis=0)).tolist()
         parts = [self._unmapped[row] for row in rows] or [(np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros(0))]
@@ -288,7 +289,7 @@ class PaneFinder:
         return bool(self._mapped.is_speck(line.centre_m + along_m[:, None] * line.along).any())
 
     def _to_wall(self, line: Line, end_m: float, sign: float) -> float:
-        """Where the pane ends along the line: at the mapped wall near its end, if there is one."""
+        """The end of the pane along the line: the mapped wall near its end, if there is one."""
         reach_m = self._p.pane_to_wall_m + self._p.pane_near_wall_m
         step_m = 0.5 * self._mapped.resolution_m
         along_m = end_m + sign * np.arange(0.0, reach_m + step_m, step_m)

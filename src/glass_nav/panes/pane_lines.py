@@ -1,6 +1,6 @@
-"""Returns that the map does not explain -> lines that they trace.
+"""Finds lines among the returns that the map does not explain.
 
-A pane returns beams near its normal only: a beam that came back from it says where the pane is and how it runs. Each
+A pane returns beams only near its normal, so each return tells where the pane is and in which direction it runs. Each
 return votes for the lines through it that are nearly at right angles to its beam (Hough transform with known
 directions, in pieces of the plane); total least squares through the voters gives the line. N returns.
 """
@@ -26,7 +26,7 @@ _LEAST_RETURNS = 3
 
 @dataclass(frozen=True)
 class Returns:
-    """What beams met where the map has nothing."""
+    """Returns from where the map has nothing."""
 
     points_m: np.ndarray  # (N, 2) in map
     beam_rad: np.ndarray  # (N,) direction of the beam in map
@@ -197,7 +197,7 @@ def _connected(at_m: np.ndarray, seed_m: np.ndarray) -> np.ndarray:
 
 
 def _covariance(offset_m: np.ndarray, at_m: np.ndarray) -> np.ndarray:
-    """Of offset and direction at the centre, errors within one scan being correlated."""
+    """Covariance of offset and direction at the centre, with correlated errors within a scan."""
     variance = float(np.mean(offset_m**2)) / max(np.sqrt(len(offset_m)), 1.0)
     spread = max(float(np.mean((at_m - at_m.mean()) ** 2)), 1e-4)
     return np.diag([variance, variance / spread])

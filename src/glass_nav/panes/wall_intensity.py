@@ -1,8 +1,8 @@
-"""Returns of mapped walls -> how bright walls are for this lidar -> does a return stand out from them?
+"""Learns the intensity of mapped walls, and tells which returns differ from it.
 
-Drivers give intensities in units of their own, of which some fall with range and incidence, some were corrected for it,
-and some are a constant. What the map explains shows which: mean and deviation of the intensities of walls are learnt while
-the robot drives, by range and incidence. Nothing is calibrated. N returns.
+Drivers give intensities in their own units: some fall with range and incidence, some are corrected for that, some are
+constant. Mean and deviation of the intensities of mapped walls are learnt while the robot drives, by range and
+incidence, so no calibration is needed. N returns.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class WallIntensity:
 
 
 def log_odds(excess: np.ndarray) -> float:
-    """Of a pane against a thing, by the excess (N,) of the returns near its normal; 0 where nothing is known."""
+    """Log odds of a pane against other objects, from the excess (N,) of returns near its normal; 0 if unknown."""
     known = excess[np.isfinite(excess)]
     if not len(known):
         return 0.0

@@ -1,1 +1,1 @@
-"""Recorded robots: bags and rawlogs to our own types. No roscore, no rospy."""
+"""Reads recorded robots: bags and rawlogs to our own types. No roscore, no rospy."""

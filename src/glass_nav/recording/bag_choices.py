@@ -1,4 +1,4 @@
-"""A bag and what was asked for -> the topic of the scans, the frames, and where odometry and mountings come from.
+"""Chooses topics, frames, odometry and mountings of a bag, as requested or by what it contains.
 
 What was not asked for is found where there is one candidate, or one with the usual name; each choice is noted.
 """
@@ -26,7 +26,7 @@ BASE_FRAMES = ("base_link", "base_footprint")  # tried in this order when no bas
 
 @dataclass(frozen=True)
 class OdometrySource:
-    """Where odom_from_base comes from: a frame of tf, a topic, or counts of wheels."""
+    """The source of odom_from_base: a tf frame, a topic, or encoder counts."""
 
     frame: Optional[str] = None
     trajectory: Optional[Trajectory] = None
@@ -75,7 +75,7 @@ class BagChoices:
     base_frame: str
 
     def transforms(self, options: LogOptions) -> BagTransforms:
-        """For its scans."""
+        """The transforms for the scans."""
         return BagTransforms(self.tree, self.odometry, self.base_frame, options)
 
 
@@ -139,7 +139,7 @@ def _frame_tree(bag: Bag) -> FrameTree:
 
 
 def _odometry(bag: Bag, tree: FrameTree, options: LogOptions, notes: List[str]) -> OdometrySource:
-    """From tf, unless wheels or a topic are asked for or tf has no odometry."""
+    """From tf, unless wheels or a topic are requested, or tf has no odometry."""
     if options.wheels.wheel_topics:
         notes.append(f"odometry from the counts of {' and '.join(options.wheels.wheel_topics)}")
         return OdometrySource(trajectory=bag_wheels.trajectory(bag, options.wheels, options.wheel_base_m))
@@ -201,7 +201,7 @@ def _check_laser(bag: Bag, scan_topic: str, tree: FrameTree, base_frame: str, op
 
 
 def _scan_notes(bag: Bag, scan_topic: str, options: LogOptions) -> List[str]:
-    """What the first scans say of the lidar's range, and of the time that a sweep takes."""
+    """Notes on the range and the sweep time of the lidar, from its first scans."""
     first = [bag_messages.raw_scan(message) for _, message in itertools.islice(bag.messages(scan_topic), 3)]
     limits = RangeLimits(options.laser_max_range)
     notes = [range_limits.warning(raw.lidar, raw.range_max_m) for raw in first if limits.is_assumed(raw.range_max_m)]

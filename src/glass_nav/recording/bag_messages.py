@@ -1,4 +1,4 @@
-"""A bag of ROS 1 or ROS 2 -> messages, through rosbags 0.9.23 or later: no ROS is needed.
+"""Reads the messages of a bag of ROS 1 or ROS 2 with rosbags 0.9.23 or later: no ROS is needed.
 
 Several bags of ROS 1 are read as the one run that `rosbag record --split` cut them from: merged by the time of
 recording.
@@ -65,7 +65,7 @@ class Bag:
 
     @property
     def duration_s(self) -> float:
-        """From the first to the last message, by the time of recording."""
+        """Time from the first to the last message, by the time of recording."""
         return max(float(self._reader.duration) * 1e-9, 0.0)
 
     def topics_of(self, *kinds: str) -> List[str]:
@@ -149,7 +149,7 @@ class Bag:
             )
 
     def only_or_usual(self, found: List[str], usual: str, what: str, option: str) -> str:
-        """Of the topics found, at least one: the only one, or the one with the usual name."""
+        """The only topic found, or the one with the usual name; at least one was found."""
         if len(found) == 1:
             return found[0]
         if usual not in found:

@@ -1,4 +1,4 @@
-"""A bag -> Observed: every scan, transform and odometry message as it was recorded."""
+"""Reads every scan, transform and odometry message of a bag as recorded."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from glass_nav.recording.observed import HeardOdometry, HeardScan, HeardTransfor
 
 
 def observe(paths: Sequence[Path], step_done: Optional[Callable[[], None]] = None) -> Observed:
-    """All that the bags say of lidars, frames and odometry.
+    """Reads all messages about lidars, frames and odometry.
 
     Args:
         paths: one bag, or the parts of one run.

@@ -1,4 +1,4 @@
-"""A bag of ROS 1 or ROS 2 -> Recording.
+"""Reads a bag of ROS 1 or ROS 2 as a Recording.
 
 The bag is read twice: first everything but the scans (small), then scan by scan while the replay runs, so that a long
 log does not have to fit into memory.

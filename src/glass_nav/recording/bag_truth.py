@@ -1,4 +1,4 @@
-"""A bag -> the truth that it knows: where the robot was in the map, and what each beam met."""
+"""Reads the ground truth of a bag: poses in the map, and true cases of the beams."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def ground_truth(bag: Bag, choices: BagChoices, options: LogOptions, notes: List
 
 
 def _by_tf(bag: Bag, choices: BagChoices, map_frame: str, odom_frame: Optional[str], notes: List[str]) -> Trajectory:
-    """Where tf says the robot is in the map, at the stamp of each scan that it covers.
+    """Pose in the map by tf, at the stamp of each scan that it covers.
 
     As tf answers afterwards: between two transforms map <- odom it interpolates.
     """

@@ -1,4 +1,4 @@
-"""Counts of wheels in a bag -> odom_from_base."""
+"""Reads encoder counts of a bag as odom_from_base."""
 
 from __future__ import annotations
 

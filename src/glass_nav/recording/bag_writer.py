@@ -1,4 +1,4 @@
-"""A simulated robot -> a ROS 1 bag as of a real robot, plus the ground truth.
+"""Writes a simulated robot as a ROS 1 bag, with the ground truth.
 
 /scan, /odom, /tf (odom -> base_link), /joint_states (of two wheels), /tf_static (base_link -> laser), /clock; and the truth: /ground_truth in the
 frame map, /true_beams with the stamps of /scan.
@@ -36,7 +36,7 @@ class BagWriter(MessageWriter):
     OWN_TYPES = {"glass_nav/msg/TrueBeams": TRUE_BEAMS}
 
     def mounting(self, stamp_ns: int, base_from_laser: np.ndarray) -> None:
-        """Where the laser sits on the robot, (3,): /tf_static, once, before the first scan."""
+        """Writes the pose of the laser on the robot, (3,), to /tf_static; once, before the first scan."""
         self._send("/tf_static", stamp_ns, transforms=[self._transform(stamp_ns, BASE, LASER, base_from_laser)])
 
     def odometry(self, stamp_ns: int, odom_from_base: np.ndarray, velocity: np.ndarray) -> None:

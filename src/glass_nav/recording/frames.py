@@ -35,7 +35,7 @@ class FrameTree:
         return sorted(set(self._links) | {link.parent for link in self._links.values()})
 
     def add(self, parent: str, child: str, stamp_ns: int, transform: Transform, static: bool) -> None:
-        """One transform parent <- child. A child that changes its parent keeps the first one."""
+        """Adds a transform parent <- child. A child that changes its parent keeps the first one."""
         parent, child = parent.lstrip("/"), child.lstrip("/")
         link = self._links.setdefault(child, _Link(parent))
         if link.parent == parent:

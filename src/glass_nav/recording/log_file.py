@@ -1,4 +1,4 @@
-"""Paths -> Recording, by what the files are."""
+"""Opens a log as a Recording, by the kind of its files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Messages of a robot in the plane -> a ROS 1 bag, through rosbags: the common part of all bag writers.
+"""Writes messages of a planar robot to a ROS 1 bag, through rosbags: common to all bag writers.
 
 Needs no ROS; works with rosbags 0.9.23 and later.
 """

@@ -1,4 +1,4 @@
-"""Definitions of our messages, and of those that bags of ROS 2 may not bring along; for rosbags 0.9.23 and later."""
+"""Definitions of our messages, and of those that bags of ROS 2 may lack; for rosbags 0.9.23 and later."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def text_of(connection: Any) -> str:
 
 
 def noetic_md5(kind: str) -> Optional[str]:
-    """Of a type as rosbags writes it; None if Noetic does not have it."""
+    """The md5 of a type written by rosbags; None if Noetic does not have the type."""
     store = noetic_store()
     return str(store.generate_msgdef(kind)[1]) if kind in definitions_of(store) else None
 

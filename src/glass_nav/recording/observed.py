@@ -1,4 +1,4 @@
-"""All messages of a robot before anything is chosen or rejected: for whoever looks for faults.
+"""All messages of a robot before anything is chosen or rejected, for the checks of the doctor.
 
 The same whether it was read from a bag or heard on a running robot.
 """

@@ -1,4 +1,4 @@
-"""How far a bag has been played, in words: at its start, every few seconds, and at its end."""
+"""The progress of a playing bag as log lines: at the start, every few seconds, and at the end."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PERIOD_S = 10.0  # between two lines, by the wall clock
 
 @dataclass(frozen=True)
 class PlayedPart:
-    """What `rosbag play` plays of its bags, in the time of the bags [s]."""
+    """The part of its bags that `rosbag play` plays, in bag time [s]."""
 
     begin_s: float
     duration_s: float
@@ -32,7 +32,7 @@ class PlayedPart:
 
 
 def played_part(arguments: Sequence[str], spans_s: Sequence[Tuple[float, float]]) -> PlayedPart:
-    """What these arguments of `rosbag play` play of bags from and to these times [s].
+    """The part that these arguments of `rosbag play` play, of bags from and to these times [s].
 
     An option that cannot be read counts as not given: rosbag play says what is wrong with it.
     """

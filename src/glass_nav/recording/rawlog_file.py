@@ -1,4 +1,4 @@
-"""An MRPT .rawlog -> Recording: sensory frames with actions between them, or single observations."""
+"""Reads an MRPT .rawlog as a Recording: sensory frames with actions, or single observations."""
 
 from __future__ import annotations
 

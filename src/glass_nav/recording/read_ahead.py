@@ -1,4 +1,4 @@
-"""Items read by another thread while the caller works on those before: reading and decompressing need no lock of Python."""
+"""Reads items in another thread while the caller works: reading and decompressing release the GIL."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ class RecordingError(ValueError):
 
 @dataclass(frozen=True)
 class Step:
-    """What the filter gets at once."""
+    """The input of the filter for one scan."""
 
     scan: Scan
     odom_from_base: np.ndarray  # (3,) at the stamp of the scan
@@ -37,7 +37,7 @@ Entry = Union[Step, Refusal]
 
 @dataclass(frozen=True)
 class BeamTruth:
-    """What each beam of one scan truly met, as a simulator knows it."""
+    """True cases of the beams of one scan, from a simulator."""
 
     stamp_ns: int
     case: np.ndarray  # (B,) uint8: 0..4
@@ -48,7 +48,7 @@ class BeamTruth:
 
 @dataclass
 class Recording:
-    """One log, opened. Iterating reads it from the start, every time the same."""
+    """An open log. Iterating reads it from the start, with the same result every time."""
 
     name: str
     scan_count: int  # entries to come: for a progress bar

@@ -1,4 +1,4 @@
-"""The results of a replay -> a ROS 1 bag for rviz and PlotJuggler: topics, types and frames of the running node.
+"""Writes the results of a replay as a ROS 1 bag for rviz and PlotJuggler, as the running node would publish them.
 
 The bag is complete: it has the map, tf from map to laser, and the scans. Stamps are those of the scans, map -> odom included, so
 that nothing lies ahead of its data. Not compressed: the player of ROS cannot read what rosbags compresses by lz4.
@@ -72,7 +72,7 @@ class ResultBag(MessageWriter):
         residual_m: np.ndarray,
         weight: np.ndarray,
     ) -> None:
-        """One scan, the cases of its beams (B,), and where each is cut (B,), as measured by the lidar."""
+        """Writes a scan, the cases of its beams (B,), and where each is cut (B,), as measured by the lidar."""
         frame = scan.lidar or "laser"
         if frame not in self._mounted:
             self._mounted.add(frame)
@@ -182,7 +182,7 @@ class ResultBag(MessageWriter):
         )
 
     def legend(self, stamp_ns: int, pixels: np.ndarray) -> None:
-        """What the marks mean: (H, W, 3) uint8."""
+        """Writes the legend of the markers: (H, W, 3) uint8."""
         height, width, _ = pixels.shape
         self._send(
             "/legend",
@@ -243,7 +243,7 @@ class ResultBag(MessageWriter):
         return self._new("geometry_msgs/Point", x=x, y=y, z=z)
 
     def truth(self, stamp_ns: int, map_from_base: np.ndarray) -> None:
-        """Where the robot truly was, (3,)."""
+        """Writes the true pose of the robot, (3,)."""
         self._send("/ground_truth", stamp_ns, header=self._header(stamp_ns, self._map), pose=self._pose(map_from_base))
 
     def glass_map(self, stamp_ns: int, grid_map: GridMap, glass: np.ndarray) -> None:

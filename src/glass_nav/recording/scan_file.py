@@ -1,4 +1,4 @@
-"""A file with one scan -> Scan: what `rostopic echo -n 1 scan > scan.yaml` writes, or a table of angles and ranges."""
+"""Reads a file with one scan: of `rostopic echo -n 1 scan > scan.yaml`, or a table of angles and ranges."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files of poses <-> Trajectory: TUM (as evo reads and writes it) and MRPT's ground truth."""
+"""Reads and writes files of poses: TUM (as evo) and MRPT's ground truth."""
 
 from __future__ import annotations
 

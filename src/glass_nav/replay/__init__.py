@@ -1,1 +1,1 @@
-"""A recording through the filter, scan by scan, and what is written of it. No roscore."""
+"""Runs a recording through the filter, scan by scan, and writes the results. No roscore."""

@@ -1,4 +1,4 @@
-"""Options -> a log, a map and a filter, ready to run."""
+"""Prepares a replay: log, map and filter, from its options."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class PreparedReplay:
     def run(
         self, step_done: Callable[[], None] = lambda: None, listen: Listener = lambda step, estimate: None
     ) -> ReplayResult:
-        """Once only: the filter is not the same afterwards. For the arguments see replay_run.run().
+        """Runs the replay, once: the filter is different afterwards. Arguments as of replay_run.run().
 
         Raises:
             RecordingError: not one scan of the log can be used.
@@ -99,7 +99,7 @@ def _source(given: LogOptions, settings: ReplayParams) -> LogOptions:
 def _start(
     localizer: PoseFilter, recording: Recording, given: StartOptions, defaults: StartPose
 ) -> Tuple[Callable[[int], None], str]:
-    """What places the particles at the first scan, and a text that says where."""
+    """A function that places the particles at the first scan, and a description of the start."""
     covariance = defaults.covariance if given.variance is None else np.diag(given.variance)
     pose, truth = given.pose, recording.ground_truth
     if given.everywhere:

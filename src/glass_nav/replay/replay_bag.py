@@ -1,4 +1,4 @@
-"""The filter's answers, scan by scan, into the bag of `glass_nav replay --bag`."""
+"""Writes the output of the filter into the bag of `glass_nav replay --bag`."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class _Writer:
         self._glass_ns = self._last_ns = self._markers_ns = -1
 
     def take(self, step: Step, estimate: Estimate) -> None:
-        """All about one scan."""
+        """Writes everything about one scan."""
         bag, scan, cases, stamp_ns = self._bag, step.scan, estimate.cases, estimate.stamp_ns
         if self._last_ns < 0:
             bag.begin(stamp_ns, self._grid_map)

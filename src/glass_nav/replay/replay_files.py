@@ -1,4 +1,4 @@
-"""A replay and the files that it leaves: results, glass map, pictures, a bag, and what it passed of an atlas."""
+"""Runs a replay and writes its files: results, glass map, pictures, a bag, nodes passed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from glass_nav.world.grid_map import GridMap
 
 @dataclass(frozen=True)
 class Outputs:
-    """What a replay leaves."""
+    """The files to write."""
 
     folder: Path
     bag: Optional[Path] = None  # for rviz and PlotJuggler
@@ -39,7 +39,7 @@ class Outputs:
 
 
 class FiledReplay:
-    """One replay with its files: run(), then write()."""
+    """A replay with its files: run(), then write()."""
 
     def __init__(self, ready: PreparedReplay, outputs: Outputs) -> None:
         """Makes the folders.
@@ -59,7 +59,7 @@ class FiledReplay:
             outputs.bag.parent.mkdir(parents=True, exist_ok=True)
 
     def run(self, step_done: Callable[[], None]) -> ReplayResult:
-        """All scans, and the bag.
+        """Runs all scans, and writes the bag.
 
         Raises:
             RecordingError: not one scan of the log can be used, or the bag cannot be written.
@@ -75,7 +75,7 @@ class FiledReplay:
             return ready.run(step_done, _all_of(listeners))
 
     def write(self, result: ReplayResult) -> Optional[TopologyScore]:
-        """All other files; what the robot passed of the atlas, where there is one."""
+        """Writes all other files, including the nodes passed if there is an atlas."""
         ready, folder = self._ready, self._outputs.folder
         grid_map, options = ready.grid_map, ready.options
         topology = self._write_topology(result)
@@ -122,7 +122,7 @@ class FiledReplay:
 
 
 def versions() -> Dict[str, str]:
-    """Of what the numbers depend on."""
+    """Versions of the libraries that the figures depend on."""
     import scipy
 
     return {

@@ -1,4 +1,4 @@
-"""What a replay is asked for; the options of `glass_nav replay`, without the command line."""
+"""The options of `glass_nav replay`, without the command line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Triple = Tuple[float, float, float]
 
 @dataclass(frozen=True)
 class StartOptions:
-    """Where the robot starts; without any of them at the first pose of the ground truth, else of the parameters."""
+    """The initial pose; by default the first pose of the ground truth, else that of the parameters."""
 
     pose: Optional[Triple] = None  # x [m], y [m], yaw [rad] in the map
     variance: Optional[Triple] = None  # of x [m^2], y [m^2], yaw [rad^2]; None: that of the parameters
@@ -23,7 +23,7 @@ class StartOptions:
 
 @dataclass(frozen=True)
 class LogUse:
-    """What is taken from a log, and where the robot starts in it: the same for all runs over it."""
+    """What to read from a log, and the initial pose: common to all runs over it."""
 
     source: LogOptions = field(default_factory=LogOptions)
     start: StartOptions = field(default_factory=StartOptions)
@@ -32,7 +32,7 @@ class LogUse:
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """One run over one log."""
+    """The options of one run over one log."""
 
     log: Tuple[Path, ...]  # several: the parts of one run
     map: Path

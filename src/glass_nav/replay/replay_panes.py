@@ -1,4 +1,4 @@
-"""Logs -> the panes that their map lacks.
+"""Finds the panes that a map lacks in recorded logs.
 
 A log is read twice: first through the filter, whose sure poses are smoothed, then scan by scan into the finder. A stretch
 on which the filter was not sure, because the glass that the map lacks is all that there is to see, counts as far as
@@ -55,7 +55,7 @@ class PaneSearch:
         self._scans = 0
 
     def add(self, ready: PreparedReplay, step_done: Callable[[], None] = lambda: None) -> None:
-        """One log.
+        """Adds a log.
 
         Args:
             ready: the log and a filter on this map.
@@ -94,7 +94,7 @@ class PaneSearch:
             self._drives.append(_Drive(scans, smoother, truth, poses))
 
     def panes(self) -> List[Pane]:
-        """All candidates, the most probable first.
+        """All candidates, most probable first.
 
         Raises:
             NoUsablePose: no scan was taken at a trusted pose.
@@ -110,7 +110,7 @@ class PaneSearch:
         return found
 
     def _found(self) -> List[Pane]:
-        """What all scans say at the poses as they are known now."""
+        """The panes found from all scans at their present poses."""
         finder = PaneFinder(self._grid_map, self._params)
         if not sum(_observed(drive, finder) for drive in self._drives):
             raise NoUsablePose(
@@ -120,7 +120,7 @@ class PaneSearch:
         return finder.panes(anew=True)
 
     def _smooth_again(self, panes: Sequence[Pane]) -> None:
-        """All drives on the map with these panes."""
+        """Smooths all drives again, on the map with these panes."""
         field = DistanceField(drawn_panes.drawn(self._grid_map, panes))
         for drive in self._drives:
             drive.poses = drive.smoother.smooth_sure(drive.truth, (field, drive.poses)) or drive.poses

@@ -1,4 +1,4 @@
-"""The file of --params: parameters of the filter, and where the robot starts, under AMCL's names.
+"""The file of --params: parameters of the filter, and the initial pose, under AMCL's names.
 
 The file of a running node serves as it is: what only a node can use is left aside, and said.
 """
@@ -47,7 +47,7 @@ class Frames:
 
 @dataclass(frozen=True)
 class ReplayParams:
-    """All that a file may set."""
+    """All parameters that a file may set."""
 
     frames: Frames = field(default_factory=Frames)
     start: StartPose = field(default_factory=StartPose)

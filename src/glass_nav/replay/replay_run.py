@@ -1,4 +1,4 @@
-"""A recording through the filter, scan by scan: the loop of the replay. Drops nothing, knows no clock."""
+"""The loop of a replay: every scan of a recording through the filter. Drops nothing, uses no clock."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def run(
 
 
 class _Scores:
-    """What the truth about the beams, where the log has it, says of the cases and of scan_surfaces."""
+    """Scores of cases and scan_surfaces against the true beams, where the log has them."""
 
     def __init__(self, recording: Recording, expected_scans: int) -> None:
         self.cases: Optional[CaseScores] = None  # None: no truth
@@ -156,7 +156,7 @@ def _example(scan: Scan, estimate: Estimate, truth: BeamTruth) -> BeamExample:
 
 
 class _Row:
-    """What is kept of one scan: not the particles themselves, a long log would not fit."""
+    """The data kept of one scan; without the particles, since a long log would not fit into memory."""
 
     def __init__(
         self, odom_from_base: np.ndarray, estimate: Estimate, cpu_ms: float, true_case: Optional[np.ndarray]

@@ -1,4 +1,4 @@
-"""glass_nav replay --topology: which nodes of an atlas a recorded robot drove through, and which of them it saw.
+"""glass_nav replay --topology: which nodes of an atlas a recorded robot passed, and which of them it detected.
 
 The robot's eyes are those of the driver (driving/edge_tracking/passing.py), which knows no map; they are compared with the atlas
 where the robot truly was.
@@ -51,7 +51,7 @@ def atlas_of(given: str, map_path: Path, grid_map: GridMap) -> Atlas:
 
 
 def known_nodes(atlas: Atlas) -> KnownNodes:
-    """What is compared of an atlas. Markers on plain rings are left out: nothing is there to be seen."""
+    """The nodes to compare with. Markers on plain rings are left out, since there is nothing to see."""
     ring = atlas.nodes.kind == RING_MARKER
     position_m = np.where(ring[:, None], np.inf, atlas.nodes.position_m)
     return KnownNodes(
@@ -67,7 +67,7 @@ def known_nodes(atlas: Atlas) -> KnownNodes:
 def score(
     atlas: Atlas, grid_map: GridMap, observer: PassingObserver, stamps_ns: np.ndarray, map_from_base: np.ndarray
 ) -> TopologyScore:
-    """What the observer saw against what was there.
+    """Compares the detections of the observer with the atlas.
 
     Args:
         atlas: of the map.
@@ -111,7 +111,7 @@ class Watch:
         self.atlas, self._grid_map, self._observer = atlas, grid_map, PassingObserver()
 
     def listen(self, step: Step, estimate: Estimate) -> None:
-        """Each scan; what the filter says of it does not matter."""
+        """Observes a scan; the filter's result is not used."""
         self._observer.see(step.scan, step.odom_from_base)
 
     def finish(self, result: ReplayResult) -> TopologyScore:

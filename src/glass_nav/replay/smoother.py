@@ -1,4 +1,4 @@
-"""All scans and odometry steps of a log -> the trajectory that they agree on best.
+"""Smooths a trajectory over all scans and odometry steps of a log.
 
 Maximum a posteriori smoothing on SE(2), by Gauss-Newton, after Thrun, Burgard, Fox, Probabilistic Robotics (2005), ch. 11:
 odometry ties each pose to the next, the likelihood field of the map ties each scan to the walls. Both are robust
@@ -84,7 +84,7 @@ class Smoother:
         self._sure: List[bool] = []
 
     def listen(self, step: Step, estimate: Estimate) -> None:
-        """One scan, with the filter's pose; of several lidars at one moment the first counts."""
+        """Adds a scan with the filter's pose; of several lidars at one moment, only the first."""
         if self._stamps_ns and step.scan.stamp_ns <= self._stamps_ns[-1]:
             return
         self._stamps_ns.append(step.scan.stamp_ns)

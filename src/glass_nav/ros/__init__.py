@@ -1,4 +1,4 @@
-"""The only room that knows rospy, tf2 and messages: nodes are wiring."""
+"""The nodes: the only package that imports rospy, tf2 and messages. Nothing is decided here."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""ROS messages <-> the types of the core: every conversion of the package, with its checks.
+"""Conversions between ROS messages and the types of the core, with checks of the input.
 
 Stamps are integer nanoseconds on the core's side. Invalid messages raise ValueError (ScanError
 for scans) with one line for the log. B beams, P particles.

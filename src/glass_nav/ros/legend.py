@@ -1,4 +1,4 @@
-"""The legend of rviz as a message; each node that has marks of its own publishes it."""
+"""The legend for rviz as a message; each node with markers publishes its own."""
 
 from __future__ import annotations
 

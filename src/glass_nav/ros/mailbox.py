@@ -1,4 +1,4 @@
-"""From callback threads to the run loop: callbacks only store, the run loop takes."""
+"""Passes messages from callback threads to the run loop: callbacks only store, the run loop takes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a node starts, runs, ends, and reports that it cannot start."""
+"""How a node starts, runs and ends, and how it reports that it cannot start."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ class TfTransforms(Transforms):
 
     @property
     def odometry_name(self) -> str:
-        """Of its transform, in words."""
+        """The name of the transform, for messages."""
         return f"{self._odom_frame} <- {self._base_frame}"
 
     def has_odometry(self) -> bool:

@@ -1,1 +1,1 @@
-"""What the robot senses, and what the map lets it expect: scans and ray casts."""
+"""Scans, ray casts, and what the map lets a sensor expect."""

@@ -1,4 +1,4 @@
-"""Pose -> the bearings that it would give, and how they change with it. N bearings; poses (..., 3).
+"""The bearings expected at a pose, and their derivatives. N bearings; poses (..., 3).
 
 The bearing to a landmark at L, taken by a sensor at the place o and turned by psi on the robot (both change from
 bearing to bearing while the robot drives and the sensor turns), is
@@ -29,7 +29,7 @@ class Sightings:
     place_m2: np.ndarray  # (N,) variance across the line of sight, of landmark and sensor [m^2]
 
     def subset(self, chosen: np.ndarray) -> "Sightings":
-        """Those of a mask (N,) or of indices."""
+        """The bearings of a mask (N,) or of indices."""
         return Sightings(
             self.number[chosen],
             self.landmarks_m[chosen],

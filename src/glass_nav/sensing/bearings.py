@@ -1,4 +1,4 @@
-"""Directions in which landmarks were seen, N of them, and where on the robot's path each was taken."""
+"""Directions in which landmarks were seen, N of them, and where on the path each was measured."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from glass_nav.geometry import angles, se2
 
 @dataclass(frozen=True)
 class LandmarkBearing:
-    """One landmark, seen in one direction."""
+    """A landmark, seen in one direction."""
 
     stamp_ns: int
     landmark_id: str
@@ -67,7 +67,7 @@ class LandmarkBearings:
         return len(self.ids)
 
     def subset(self, chosen: np.ndarray) -> "LandmarkBearings":
-        """Those of a mask (N,) bool or of indices (M,)."""
+        """The bearings of a mask (N,) bool or of indices (M,)."""
         numbers = np.arange(len(self.ids))[chosen]
         return LandmarkBearings(
             self.stamp_ns,

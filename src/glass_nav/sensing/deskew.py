@@ -1,4 +1,4 @@
-"""A scan measured while the robot moves -> the same scan seen from one place.
+"""Corrects a scan for the motion of the robot during the sweep.
 
 A lidar measures its beams one after the other, the first at the scan's stamp. At 1 rad/s and with a sweep of 50 ms the
 last beam points 3 degrees away from where its angle says. Odometry between the beams corrects that. B beams.
@@ -28,7 +28,7 @@ class Deskew:
 
 
 def sweep_ns(beams: int, time_increment_s: float) -> int:
-    """From the first beam to the last one [ns]; 0 if that is not known."""
+    """Time from the first beam to the last one [ns]; 0 if unknown."""
     if not (np.isfinite(time_increment_s) and time_increment_s > 0.0):
         return 0
     sweep_s = time_increment_s * max(beams - 1, 0)

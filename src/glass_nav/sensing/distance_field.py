@@ -1,4 +1,4 @@
-"""GridMap -> how far is the nearest wall, everywhere: smooth enough to slide a scan along.
+"""The distance of every point of the map from the nearest wall, with its gradient.
 
 The "likelihood field" of Thrun, Burgard, Fox, Probabilistic Robotics (2005), sec. 6.4, as a
 distance with its gradient. Wherever a beam ends, near some wall is good: it asks neither which wall

@@ -1,4 +1,4 @@
-"""Tags that answer a turning emitter -> bearings, from coarse to fine.
+"""Searches for tags with a rotating emitter, from coarse to fine.
 
 Seed document landmark_bearings.txt, sec. 4: the emitter turns by coarse moves; where a tag answers, it turns back and
 goes over that move again in fine ones; it stops as soon as all tags have been found. The bearing of a tag is the middle of the
@@ -49,7 +49,7 @@ class EmitterSearchParams:
 
 
 class EmitterSearch:
-    """One search over the span; the next one goes the other way."""
+    """A search over the span; the next one goes the other way."""
 
     def __init__(self, p: EmitterSearchParams, way: int = 1) -> None:
         """

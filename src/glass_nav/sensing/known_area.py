@@ -1,4 +1,4 @@
-"""GridMap -> where does the map know something?  Beams that end elsewhere are no evidence about a pose.
+"""The area that the map knows. Beams that end elsewhere are no evidence about a pose.
 
 A mapper draws what it saw. Behind a pane, through an open door of a room that it did not enter and beyond the edge of
 the grid there may be anything: a beam that ends there agrees with every pose. Near a mapped wall it does not: a beam

@@ -1,4 +1,4 @@
-"""Where a sensor that sees one plane sits on the robot: level, upright or upside down."""
+"""The mounting of a planar sensor on the robot: level, upright or upside down."""
 
 from __future__ import annotations
 

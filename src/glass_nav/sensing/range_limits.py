@@ -1,4 +1,4 @@
-"""How far a lidar sees: its range_max, or what its scans show where the driver sets no limit.
+"""The longest range of a lidar: its range_max, or what its scans show if the driver sets no limit.
 
 pointcloud_to_laserscan writes range_max inf by default, other drivers the largest float. B beams.
 """
@@ -38,7 +38,7 @@ class RangeLimits:
         self._longest_m: Dict[str, float] = {}
 
     def use(self, laser_max_range_m: float) -> None:
-        """Another laser_max_range from now on; what the lidars showed stays known."""
+        """Use another laser_max_range from now on; the ranges seen are kept."""
         self._given_m = laser_max_range_m
 
     def is_assumed(self, range_max_m: float) -> bool:

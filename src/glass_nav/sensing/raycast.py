@@ -1,4 +1,4 @@
-"""GridMap, poses -> what beams would meet: the face of the compiled modules _grid and _mrpt_rays.
+"""Ray casts on a GridMap: the Python interface of the compiled modules _grid and _mrpt_rays.
 
 P poses, B beams, H rows and W columns of the map. Poses are in the frame map, beam angles in the frame of their
 pose; a cell is named by its flat index row * W + column. Ranges are exact: the length of the ray from its origin
@@ -141,7 +141,7 @@ class RayCaster:
         return self._grid.cast(poses, angles_rad, max_range_m, self._threads)
 
     def cast_first(self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float) -> FirstHits:
-        """As cast(), with the cells met."""
+        """As cast(), also returning the cells met."""
         poses, angles_rad = self._checked(poses, angles_rad, max_range_m)
         return FirstHits(*self._grid.cast_first(poses, angles_rad, max_range_m, self._threads))
 
@@ -188,7 +188,7 @@ class RayCaster:
         min_linearity: float = 0.9,
         min_gap_m: float = 0.1,
     ) -> Paths:
-        """Where the paths of cast_surfaces() end, each beam followed only so far as it matters.
+        """Ends of the paths of cast_surfaces(), each beam followed only as far as it matters.
 
         Args:
             poses, angles_rad, max_thickness_m, min_linearity, min_gap_m: as for cast_surfaces().
@@ -219,7 +219,7 @@ class RayCaster:
         min_gap_m: float = 0.1,
         mirrored_by_line: bool = True,
     ) -> ExpectedPaths:
-        """What beams may measure from poses near the first of them.
+        """The ranges that beams may measure from poses near the first of them.
 
         Ranges are as of cast_paths(), but from all poses except the first every other beam passes surfaces without a
         normal. With a gate, paths that cannot have ended a beam are left out: besides the first surface only those are
@@ -262,7 +262,7 @@ class RayCaster:
         return ExpectedPaths(*found)
 
     def simulate_scan_ray_raw(self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float) -> np.ndarray:
-        """As cast(), by MRPT's simulateScanRay as it is, faults included: to be compared with, not to be used."""
+        """As cast(), by MRPT's unmodified simulateScanRay with its faults: for comparison only."""
         poses, angles_rad = self._checked(poses, angles_rad, max_range_m)
         return self._grid.free_ranges(self._guide or _mrpt_rays(self._grid_map), poses, angles_rad, max_range_m)
 

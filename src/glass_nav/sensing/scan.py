@@ -1,4 +1,4 @@
-"""One sweep of a 2D lidar, its fields checked.
+"""One sweep of a 2D lidar, with checked fields.
 
 B beams. Ranges follow REP 117: -inf too near, +inf nothing met, NaN no measurement.
 """

@@ -1,4 +1,4 @@
-"""A lidar's message or record + transforms -> a scan with its place on the robot, its odometry, and deskewed.
+"""Makes a scan from a message or record: its pose on the robot, its odometry, and deskewed.
 
 Every scan enters here, whether the robot runs, a bag is read, or a scan is looked up by its stamp. B beams.
 """
@@ -22,18 +22,18 @@ class NoTransform(ScanError):
 
 
 class Transforms(Protocol):
-    """What tf, a bag or a rawlog knows of the robot's frames."""
+    """The transforms of the robot, from tf, a bag or a rawlog."""
 
     def odom_from_base(self, stamp_ns: int) -> np.ndarray:
         """(3,) odometry at that time; NoTransform without it, ScanError if it is no pose."""
 
     def mounting(self, lidar: str, stamp_ns: int) -> Mounting:
-        """Where that lidar sits at that time; NoTransform if that is not known, ScanError if it is not level."""
+        """Pose of that lidar on the robot at that time; NoTransform if unknown, ScanError if it is not level."""
 
 
 @dataclass(frozen=True)
 class RawScan:
-    """One sweep of a lidar as its driver wrote it: the fields of a LaserScan."""
+    """A sweep of a lidar as its driver sends it: the fields of a LaserScan."""
 
     stamp_ns: int  # of the first beam
     lidar: str  # by its frame, without a leading slash
@@ -54,7 +54,7 @@ class RawScan:
 
     @property
     def sweep_ns(self) -> int:
-        """From its first beam to its last one; 0 if that is not known, or cannot be true."""
+        """Time from the first beam to the last one; 0 if unknown or impossible."""
         if self.timing_fault is not None:
             return 0
         return deskew.sweep_ns(len(self.ranges_m), self.time_increment_s)

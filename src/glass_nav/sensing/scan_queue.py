@@ -22,7 +22,7 @@ _WARNING_PERIOD_S, _FAULT_PERIOD_S, _ONCE_S = 5.0, 60.0, float("inf")  # between
 
 @dataclass
 class ScanCounts:
-    """Where the scans went since the start; received is the sum of the others."""
+    """Numbers of scans since the start; received is the sum of the others."""
 
     received: int = 0
     used: int = 0  # counted by whoever uses them
@@ -61,7 +61,7 @@ class ScanQueue:
         self.trouble = "no scan used yet"  # why the last scan that was not used was not
 
     def use(self, placement: ScanPlacement, max_wait_s: float) -> None:
-        """Other parameters from now on."""
+        """Use other parameters from now on."""
         self._placement, self._max_wait_s = placement, max_wait_s
 
     @property
@@ -71,7 +71,7 @@ class ScanQueue:
 
     @property
     def period_s(self) -> Optional[float]:
-        """From one scan to the next, of whatever lidar; None: not known yet."""
+        """Time from one scan to the next, of any lidar; None: not known yet."""
         periods_s = [self._lidars[lidar].period_s for lidar in self._usable]
         rate_hz = sum(1.0 / period_s for period_s in periods_s if period_s is not None)
         return 1.0 / rate_hz if rate_hz > 0.0 else None

@@ -1,4 +1,4 @@
-"""Scan -> the line segments that its beams draw, with how well each line is known.
+"""Line segments in a scan, with the accuracy of each line.
 
 Split and merge (geometry/segments.py) over the end points in their order around the robot, cut where neighbours are far
 apart; then each line is fitted once more, every point weighing by how well a beam that meets a wall at that angle gives
@@ -21,7 +21,7 @@ _ALL_ROUND = 1.5  # steps between the last beam and the first
 
 @dataclass(frozen=True)
 class ScanSegmentParams:
-    """What makes a segment."""
+    """Limits of the segments of a scan."""
 
     range_sigma_m: float = 0.02  # of a range
     bearing_sigma_rad: float = 0.004  # of a beam's direction: half a step of half a degree
@@ -55,7 +55,7 @@ class ScanSegments:
 def extract(
     scan: Scan, params: ScanSegmentParams = ScanSegmentParams(), used: Optional[np.ndarray] = None
 ) -> ScanSegments:
-    """All segments of a scan.
+    """Fits all segments of a scan.
 
     Args:
         scan: one sweep of a lidar, its beams in either direction.

@@ -1,4 +1,4 @@
-"""A turning emitter on a serial port, by lines of text.
+"""A rotating emitter on a serial port, controlled by lines of text.
 
     to the device     T -150.00       turn to that angle [degrees], counterclockwise from ahead
     from the device   I A1            the tag A1 answered

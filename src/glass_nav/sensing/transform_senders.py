@@ -1,4 +1,4 @@
-"""Who sends a transform: two nodes that send the same one make the robot jump between their answers.
+"""Finds out which nodes send a transform: if two do, the robot jumps between their values.
 
 Such as an EKF beside wheel odometry (odom -> base), or a static map -> odom beside a localization.
 """

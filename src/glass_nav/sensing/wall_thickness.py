@@ -1,4 +1,4 @@
-"""GridMap -> how thick is each wall drawn?
+"""The thickness with which each wall is drawn in a map.
 
 A mapper draws a wall as thick as its scans disagree: one or two cells, or half a metre. The wall itself
 is somewhere inside. Where the map is solid the question has no answer, and the thickness is one cell.

@@ -1,4 +1,4 @@
-"""Encoder counts of two wheels -> odom_from_base at any recorded time.
+"""Odometry from encoder counts of two wheels: odom_from_base at any recorded time.
 
 The odometry of bases that send no tf (`wheel_topics`), by equations (2) to (4) of the glass document
 (geometry/wheel_steps.py). Both wheels may report at different times: each is interpolated to the stamps of the other.
@@ -49,7 +49,7 @@ class WheelParams:
 
 @dataclass(frozen=True)
 class Counts:
-    """What one message says of the wheels; None: nothing."""
+    """The encoder counts in one message; None: none."""
 
     left: Optional[float]
     right: Optional[float]

@@ -1,4 +1,4 @@
-"""maps/NAME/building.yaml -> Building. The format is in maps/README.md."""
+"""Reads a Building from maps/NAME/building.yaml. The format is described in maps/README.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Building -> GridMap: the map that a lidar mapper drew before anything changed.
+"""The map of a Building, as a lidar mapper drew it before anything changed.
 
 The mapper drove all paths and looked into the rooms that contain the points `seen`. Cells that can be reached from
 there without crossing a surface are free; surfaces that border on them are occupied, glass like any wall. The rest is

@@ -1,4 +1,4 @@
-"""Which panes of a building its map lacks: mappers erase glass, because beams pass it."""
+"""Chooses the panes that a map lacks: mappers erase glass, because beams pass it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Glass and near infrared light: what a pane reflects, transmits and returns.
+"""The optics of glass in near infrared: how much a pane reflects, transmits and returns.
 
 Fresnel's equations for a sheet with two surfaces, light unpolarised and not coherent (Hecht, Optics, 5th ed., sec. 4.6;
 Born, Wolf, Principles of Optics, sec. 1.6.4 for the sheet). Incidence is the angle to the normal; any shape.

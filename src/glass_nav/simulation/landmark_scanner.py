@@ -1,4 +1,4 @@
-"""Robot, tags, walls -> bearings: a rotating slit of light, and tags that answer by radio when it hits them.
+"""Simulates a rotating slit of light, and tags that answer by radio when it hits them.
 
 The device of the seed document landmark_bearings.txt, secs. 3 and 4. A motor turns a vertical slit of modulated light
 in steps. It searches from coarse to fine: if a tag answers a coarse move, the emitter returns and repeats it in fine
@@ -68,7 +68,7 @@ class Turn:
 
 @dataclass(frozen=True)
 class _Move:
-    """From one angle to another [rad], as commanded; the motor goes to its nearest step."""
+    """A commanded move from one angle to another [rad]; the motor goes to its nearest step."""
 
     start_rad: float
     end_rad: float

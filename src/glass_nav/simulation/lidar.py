@@ -1,4 +1,4 @@
-"""Building, lidar, pose -> one scan and the truth about each of its beams.
+"""Simulates one scan of a lidar in a building with glass, with the true case of each beam.
 
 Every beam has several return paths: from each pane on its path, from the surface behind them, and by reflection in the
 first or the second glazing. Each path has an echo power (reference figures: Fresnel for panes, Lambert for diffuse
@@ -104,7 +104,7 @@ def preset(name: str) -> LidarModel:
 
 @dataclass(frozen=True)
 class TrueScan:
-    """What the lidar reports, and what each beam did in terms of the map.
+    """A scan as the lidar reports it, with the true case of each beam in terms of the map.
 
     Cases: 1 ended at the first mapped surface on its path; 3 and 4 passed one and two mapped panes and ended at the
     second and third mapped surface; 2 was mirrored at the first mapped surface, then ended at the first mapped one on
@@ -171,7 +171,7 @@ class _Echoes:
 def scan(
     model: LidarModel, building: Building, map_from_laser: np.ndarray, time_s: float, rng: np.random.Generator
 ) -> TrueScan:
-    """One sweep of the lidar, all beams at one moment.
+    """Simulates one sweep, all beams at one moment.
 
     Args:
         model: the lidar.
@@ -227,7 +227,7 @@ def _direct_echoes(
     first_m: np.ndarray,
     rng: np.random.Generator,
 ) -> List[_Echoes]:
-    """From every pane on the path and from its end; passing (B, K + 1) is the light that gets that far."""
+    """Echoes from every pane on the path and from its end; passing (B, K + 1) is the light that gets there."""
     behind = np.array([BeamCase.DIFFUSE, BeamCase.FIRST_PENETRATION, BeamCase.SECOND_PENETRATION, BeamCase.UNCERTAIN])
     pane_power = _pane_power(model, surfaces, direct, rng)
     echoes = []
@@ -250,7 +250,7 @@ def _direct_echoes(
 
 
 def _fan(model: LidarModel, map_from_laser: np.ndarray) -> _Fans:
-    """All beams from the laser."""
+    """All beams of the laser."""
     angles_rad = map_from_laser[2] + model.angles_rad
     cos, sin = angles.cos_sin(angles_rad)
     beams = len(angles_rad)
@@ -304,7 +304,7 @@ def _mirrored_echoes(
     first_m: np.ndarray,
     rng: np.random.Generator,
 ) -> List[_Echoes]:
-    """By reflection in the first and in the second glazing."""
+    """Echoes by reflection in the first and in the second glazing."""
     glazing = np.where(direct.met, surfaces.glazing[direct.pane], -1)
     beams = len(glazing)
     echoes: List[_Echoes] = []
@@ -421,7 +421,7 @@ def _nearest(
 def _crossings(
     surfaces: Surfaces, chosen: np.ndarray, fans: _Fans
 ) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Where rays cross the chosen surfaces: ray and surface by index, range [m], cos of the incidence; all (C,).
+    """Crossings of rays and chosen surfaces: indices of both, range [m], cos of the incidence; all (C,).
 
     Seen from the centre of a fan, a surface covers an interval of beams: only those are computed.
     """

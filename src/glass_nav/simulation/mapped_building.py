@@ -1,4 +1,4 @@
-"""GridMap -> Building: a floor known only from its map, with opaque walls where the map shows them.
+"""A building made from a map, with opaque walls where the map shows them.
 
 The floor is the largest part of the map's free space that a robot fits into. Everything that bounds it is a wall:
 occupied cells, and unknown ones, although a real floor might go on there. Only specks of unknown cells without an

@@ -1,4 +1,4 @@
-"""Scans at known poses -> the map that an occupancy grid mapper draws of a building.
+"""Draws the map that an occupancy grid mapper makes of scans at known poses.
 
 Every beam counts a pass in the cells that it crosses and a hit in the one where it ends; a cell is occupied if enough of
 its beams ended there (the counting model of Haehnel, as in GMapping). Panes let most beams pass: they vanish, but for

@@ -1,4 +1,4 @@
-"""true motion -> what the wheels report: wrong radii, a wrong wheel base, slip.
+"""Simulates wheel odometry: wrong radii, a wrong wheel base, slip.
 
 The errors are those of Borenstein, Feng, Measurement and correction of systematic odometry errors in mobile robots
 (1996): systematic ones, drawn once per robot, and others, drawn as it drives. Poses and twists as in robot.py.

@@ -1,4 +1,4 @@
-"""waypoints -> velocity commands: pure pursuit, which steers for a point a short distance ahead on the path.
+"""Follows waypoints by pure pursuit: steers for a point a short distance ahead on the path.
 
 The point ahead continues beyond the end, so that steering stays calm there; an omnidirectional base drives to it
 directly.

@@ -1,4 +1,4 @@
-"""Where walking people are at a given time."""
+"""The positions of walking people at a given time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Seed -> a bridge of glass between two lobbies, with open surroundings that no map shows.
+"""A random bridge of glass between two lobbies, with open surroundings that no map shows.
 
 The bridge has panes on both sides, whole or between posts, and on some floors pieces of wall. Outdoors stand trees,
 vehicles and facades of other buildings: most beams of a robot on the bridge end there. The same seed gives the same

@@ -1,4 +1,4 @@
-"""Seed -> a random floor: rooms along corridors that form loops, doors, furniture, some glass walls.
+"""A random floor: rooms along corridors that form loops, doors, furniture, some glass walls.
 
 Corridors of several widths cross and cut the floor into blocks; some pieces are walled off, which leaves rings and dead
 ends. A block is one or two rows of rooms with a door each, an open hall with columns, or unseen by the mapper. Then the

@@ -1,4 +1,4 @@
-"""velocity commands -> motion: a base on two driven wheels, or an omnidirectional one, on a floor with obstacles.
+"""Simulates a base on a floor with obstacles: two driven wheels, or omnidirectional.
 
 Poses (3,) x [m], y [m], yaw [rad] in the frame map. Velocities (3,) forward, left [m/s], turn [rad/s] in the robot's
 own frame (REP 103). A twist (3,) is a velocity times a time: forward, left [m], turn [rad] along one arc.

@@ -1,4 +1,4 @@
-"""A name -> the file of a building: those in maps/ of the package."""
+"""Finds the file of a shipped building in maps/ by name."""
 
 from __future__ import annotations
 

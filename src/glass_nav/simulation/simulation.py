@@ -1,4 +1,4 @@
-"""Building, lidar, robot, wheels -> what a robot records as it drives, and the ground truth.
+"""Simulates a driving robot with lidar and odometry, and records the ground truth.
 
 One seed determines everything: the moved furniture, the lidar's noise, the robot's wheels. The same seed gives the same
 bytes, and the noise of one part does not depend on the draws of another. Times are simulated; nothing waits.
@@ -36,7 +36,7 @@ class SimulationError(ValueError):
 
 @dataclass(frozen=True)
 class OdometrySample:
-    """One reading of the wheels."""
+    """A reading of the wheels."""
 
     stamp_ns: int
     odom_from_base: np.ndarray  # (3,)
@@ -59,7 +59,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class _Moment:
-    """Where the robot was, and what odometry reported."""
+    """A true pose, and what odometry reported."""
 
     stamp_ns: int
     map_from_base: np.ndarray  # (3,)
@@ -140,7 +140,7 @@ class Simulation:
 
     @property
     def reading(self) -> OdometrySample:
-        """What the wheels report now."""
+        """The present reading of the wheels."""
         rolled_m = self._wheels.rolled_m
         wheels_rad = None if rolled_m is None else rolled_m / WHEEL_RADIUS_M
         return OdometrySample(self.stamp_ns, self._wheels.odom_from_base, self._wheels.velocity, wheels_rad)
@@ -180,7 +180,7 @@ class Simulation:
         ]
 
     def look(self) -> Frame:
-        """One sweep of the lidar, which ends now. If no sweep fits into the time so far, it is instantaneous."""
+        """Simulates a sweep that ends now. If no sweep fits into the time so far, it is instantaneous."""
         model = self.lidar_model
         turn_ns = self._turn_ns if self._turn_ns <= self._time_ns else 0
         stamp_ns = self.stamp_ns - turn_ns
@@ -270,7 +270,7 @@ class Simulation:
         return [self._time_ns + whole_ns * part // parts for part in range(1, parts + 1)]
 
     def _control(self, end_ns: int, command: np.ndarray) -> None:
-        """One command for the base, and then one reading of its wheels."""
+        """Commands the base, then reads its wheels."""
         part_s = (end_ns - self._time_ns) * 1e-9
         self._wheels.step(self._robot.step(command, part_s), part_s)
         self._time_ns = end_ns

@@ -1,4 +1,4 @@
-"""Where a robot wakes up: a random place in a building, or one given as text."""
+"""The start of a robot: a random free pose of a building, or one given as text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who steers the simulated robot, and when its time advances."""
+"""Steers the simulated robot by cmd_vel or a path, and decides when its time advances."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Audience:
-    """Who follows the robot."""
+    """The localization that the robot waits for."""
 
     answers: int  # received transforms map -> odom
     listeners: int  # to its scans

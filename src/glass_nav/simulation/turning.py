@@ -1,4 +1,4 @@
-"""A lidar that takes its beams one after the other while the robot moves, in sectors of some milliseconds each."""
+"""Simulates the sweep of a rotating lidar on a moving robot, in sectors of some milliseconds each."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def scan(
     start_ns: int,
     rng: np.random.Generator,
 ) -> TrueScan:
-    """One sweep of the lidar, its first beam at the first pose and its last beam at the last one.
+    """Simulates a sweep, from the first beam at the first pose to the last beam at the last one.
 
     Args:
         model: the lidar.

@@ -1,1 +1,1 @@
-"""Where in the atlas?  MEETPOINT -> FOREST -> VOTE -> TURN."""
+"""Finds the robot in an atlas: meetpoint -> search forest -> vote -> turn."""

@@ -1,9 +1,9 @@
-"""A confirmed meetpoint -> where the robot's environment frame lies in the atlas.
+"""The pose of the robot's environment frame in the atlas, from a confirmed meetpoint.
 
 Seed document global_localization_procedure.txt: the localization is complete if one place is left "and the robot has
 enough information to determine its environment frame's relation to the solution meetpoint's frame". The environment
-frame is that of the robot's dead reckoning, since the robot has no other one before it is localized. The frame of a
-meetpoint of the atlas has its origin there and looks along the meetpoint's first edge.
+frame is that of dead reckoning, the only frame of a robot that is not localized. The frame of a meetpoint has its
+origin at the meetpoint and its x axis along the meetpoint's first edge.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from glass_nav.topology.atlas.atlas import Atlas
 
 @dataclass(frozen=True)
 class FrameRelation:
-    """Where the environment frame lies; poses (3,) x [m], y [m], yaw [rad]."""
+    """The pose of the environment frame; poses (3,) x [m], y [m], yaw [rad]."""
 
     map_from_environment: np.ndarray  # (3,) in the map of the atlas
     node: Optional[int] = None  # the solution meetpoint; None: scans confirmed a place that the atlas does not have

@@ -1,9 +1,8 @@
-"""What the robot reports on its path through the Voronoi graph: meetpoints, and edges between them.
+"""What the robot observes on its path through the Voronoi graph: meetpoints, and edges between them.
 
-The document's match nodes and match edges (seed document global_localization_procedure.txt). The edges of a meetpoint
-have ranks: 0 is the reference edge, the one along which the robot came (any edge at the first meetpoint, if it came
-along none); the others count clockwise, seen from above. Rank 1 is to the LEFT, the last one to the RIGHT, rank 0 a
-U_TURN.
+These are the match nodes and match edges of the seed document global_localization_procedure.txt. The edges of a
+meetpoint have ranks: 0 is the reference edge, along which the robot came (any edge at the first meetpoint); the
+others count clockwise, seen from above. Rank 1 is to the LEFT, the last one to the RIGHT, rank 0 a U_TURN.
 """
 
 from __future__ import annotations

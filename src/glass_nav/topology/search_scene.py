@@ -1,8 +1,8 @@
-"""What a person sees of a search, in the frame of the map, before the pose is known.
+"""The search as markers in the frame of the map, before the pose is known.
 
-The leading hypotheses as robots with their share; on the best three the last scan, laid over the map; the path by dead
-reckoning that led to each of them; the rows of the forest, with each search node that went and the value that ruled it
-out. Shapes are free of ROS. K hypotheses.
+The leading hypotheses as robots with their probability; on the best three the last scan and the path by dead
+reckoning, laid over the map; the rows of the forest, with each search node that was ruled out and the reason. Without
+ROS. K hypotheses.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class SearchScene:
         self._rows: List[Tuple[str, List[RuledOut]]] = []  # of the forest: what was seen and left, what went
 
     def forget(self) -> None:
-        """Another search begins."""
+        """Start over for another search."""
         self._driven, self._rows = [], []
 
     def saw(self, points_in_base: np.ndarray, odom_from_base: np.ndarray) -> None:
@@ -65,7 +65,7 @@ class SearchScene:
 
     @property
     def ruled_out(self) -> Sequence[RuledOut]:
-        """By the last meetpoint."""
+        """Search nodes that the last meetpoint ruled out."""
         return self._rows[-1][1] if self._rows else ()
 
     def shapes(self, atlas: Atlas, belief: Optional[Belief], alive: np.ndarray) -> List[Union[Shape, Text]]:
@@ -166,7 +166,7 @@ def _robot(pose: np.ndarray) -> np.ndarray:
 
 
 def _row_words(atlas: Atlas, forest: SearchForest, gone: Sequence[RuledOut]) -> str:
-    """One row of the forest in a line, as the document's figures draw it: search nodes left, and those crossed out."""
+    """One row of the forest as text, as in the document's figures: search nodes left, and those ruled out."""
     nodes, here = atlas.darts.node, forest.meetpoints[-1]
     alive = np.unique(nodes[forest.candidates()[0]]).tolist()
     crossed = {int(nodes[each.dart]): mismatches.words(each) for each in gone}

@@ -1,9 +1,9 @@
-"""What the robot reports and what people ask for -> what to publish: one search after another in an atlas.
+"""The decisions of topology_node: one search after another in an atlas, from reports and requests to what is published.
 
-This is everything that topology_node decides, without ROS and without a clock: each method is an event, and returns
-the decisions that follow from it, in the order in which they are to be carried out. A search begins with a meetpoint
-and ends CONFIRMED, AMBIGUOUS or LOST, or when its goal gives up; before and after, the state is WAITING (the next
-meetpoint begins a search) or IDLE, and NO_ATLAS while there is no atlas of the map.
+Without ROS and without a clock: each method is an event, and returns the decisions that follow from it, in the order
+in which they are to be carried out. A search begins at a meetpoint and ends CONFIRMED, AMBIGUOUS or LOST, or when its
+goal gives up. Before and after, the state is WAITING (the next meetpoint begins a search), IDLE, or NO_ATLAS without
+an atlas of the map.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class GoalOutcome(Enum):
 
 @dataclass(frozen=True)
 class SearchStatus:
-    """What is known; to be published."""
+    """The status of the search, to be published."""
 
     state: SearchState
     reason: str  # one sentence
@@ -144,7 +144,7 @@ Decision = Union[SearchStatus, Progress, Turn, InitialPose, GoalEnd, LogLine, At
 
 
 class SearchSession:
-    """One search at a time, for as long as the node runs; start() first."""
+    """One search at a time, as long as the node runs; call start() first."""
 
     def __init__(self, read_atlas: Optional[ReadAtlas], p: SessionParams, search: SearchParams) -> None:
         """
@@ -178,7 +178,7 @@ class SearchSession:
 
     @property
     def localizer(self) -> Optional[AtlasLocalizer]:
-        """Of the atlas; None without one."""
+        """The localizer of the atlas; None without an atlas."""
         return self._localizer
 
     @property
@@ -335,7 +335,7 @@ class SearchSession:
         return [loaded, self._show(SearchState.IDLE, "no search was asked for")]
 
     def goal(self, goal: Goal) -> List[Decision]:
-        """Somebody asks for a search; another goal that is on was preempted by that."""
+        """Start the search of a new goal; the previous goal was preempted by it."""
         self._goal = goal
         if self._localizer is None:
             return self._end_goal(self._status.reason)
@@ -346,7 +346,7 @@ class SearchSession:
         return [self._await_meetpoint("asked for by the action"), *self.meetpoint(self._last_meetpoint)]
 
     def preempt(self) -> List[Decision]:
-        """Whoever asked for the search does not want it any more."""
+        """End the goal, because its client has cancelled it."""
         if self._goal is None:
             return []
         status = self._show(SearchState.IDLE, "the search was preempted")
@@ -410,7 +410,7 @@ class SearchSession:
         return LogLine(f"{text}; it {warning}", logging.WARNING) if warning else LogLine(text)
 
     def _with_visits(self, atlas: Atlas) -> Atlas:
-        """With what the file of visits knows of it."""
+        """The atlas with the statistics of the file of visits."""
         path = self._p.visits_file
         if not path or not Path(path).exists():
             return atlas
@@ -504,7 +504,7 @@ class SearchSession:
         return decisions
 
     def _count_visits(self, localizer: AtlasLocalizer) -> List[Decision]:
-        """What was measured on the path that is confirmed, into the statistics of the atlas and its file."""
+        """Add the measurements of the confirmed path to the statistics of the atlas and its file."""
         localizer.count_visits(localizer.atlas.visits)
         return self._save_visits(localizer)
 

@@ -1,4 +1,4 @@
-"""What a search tells in a terminal: one plain line at each meetpoint, and now and then on the way."""
+"""The progress of a search as log lines: one at each meetpoint, and some in between."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from glass_nav.topology.search.search_forest import SearchForest
 
 
 def after(estimate: SearchEstimate, forest: SearchForest, stamp_ns: int) -> str:
-    """What was seen, what is known by that, and what is asked next.
+    """A line with what was seen, what is known now, and the next turn.
 
     Args:
         estimate: that follows from it.

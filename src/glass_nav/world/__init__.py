@@ -1,1 +1,1 @@
-"""The map: cells, metres, and map files."""
+"""The map: grid, landmarks, panes, wall segments, and their files."""

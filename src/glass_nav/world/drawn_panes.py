@@ -1,4 +1,4 @@
-"""GridMap, panes -> the same map with the panes drawn in; every other cell is untouched."""
+"""Draws panes into a copy of a map; every other cell stays as it is."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ def cells(grid_map: GridMap, pane: Pane, number: int = 1) -> np.ndarray:
     Raises:
         PaneError: the pane lies outside the map.
     """
+    if not grid_map.contains(*grid_map.cells(np.stack([pane.start_m, pane.end_m]))).all():
+        raise PaneError(f"pane {number}, {_place(pane)}, lies outside the map")
     steps = int(np.ceil(pane.length_m / grid_map.resolution_m * _STEPS_PER_CELL)) + 1
     points = pane.start_m + np.linspace(0.0, 1.0, steps)[:, None] * (np.asarray(pane.end_m) - pane.start_m)
     rows, columns = grid_map.cells(points)
-    if not grid_map.contains(rows, columns).all():
-        raise PaneError(f"pane {number}, {_place(pane)}, lies outside the map")
     crossed, count = np.unique(rows * grid_map.occupancy.shape[1] + columns, return_counts=True)
     held = count >= min(_MIN_SHARE * _STEPS_PER_CELL, float(count.max()))
     return crossed[held]

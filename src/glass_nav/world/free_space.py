@@ -1,4 +1,4 @@
-"""The free space of a map in a few kilobytes: enough to count the cells in which another map differs from it.
+"""A compact fingerprint of the free space of a map, which counts the cells that differ from another map.
 
 Two drawings of one floor may differ in the few cells that a line just touches; a hash only shows that the maps are not
 identical.

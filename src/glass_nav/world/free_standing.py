@@ -1,4 +1,4 @@
-"""GridMap -> things that stand free on the floor and are too thick to be glass: furniture, pillars.
+"""Finds free-standing objects of a map that are too thick to be glass: furniture, pillars.
 
 A mapper sees the outside of such a thing only: its inside stays unknown. Panes are thin, and stand between walls. H rows,
 W columns.

@@ -1,4 +1,4 @@
-"""The map of one floor: an occupancy grid with its place in the frame `map`.
+"""The map of one floor: an occupancy grid and its pose in the frame `map`.
 
 Rows and columns as in nav_msgs/OccupancyGrid: occupancy[row, column], row 0 at the grid's own y = 0.
 H rows, W columns. The grid may be rotated in the map (a map_server origin with yaw).
@@ -40,7 +40,7 @@ class GridMap:
 
     @property
     def place(self) -> str:
-        """Where the cells are: rows, columns, resolution, x, y, yaw.
+        """Geometry of the grid: rows, columns, resolution, x, y, yaw.
 
         The resolution counts to a micrometre (messages carry it as float32), the origin to a millimetre.
         """

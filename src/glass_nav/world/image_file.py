@@ -1,4 +1,4 @@
-"""Image file -> its pixels, all of them or none: of any size that the memory holds. H rows, W columns, C channels."""
+"""Reads an image file completely or not at all, of any size that the memory holds. H rows, W columns, C channels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""landmarks.yaml <-> LandmarkMap. Lengths in m, angles in degrees, all in the frame map:
+"""Reads and writes landmarks.yaml. Lengths in m, angles in degrees, all in the frame map:
 
     sigma: 0.01               # how well the positions were surveyed; default 0.01
     view_deg: 90              # for all tags without their own; default 90

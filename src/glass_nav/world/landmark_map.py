@@ -1,4 +1,4 @@
-"""Landmarks of one floor with their places in the frame map: tags that report their id when a beam hits them.
+"""The landmarks of one floor in the frame map: tags that report their id when a beam hits them.
 
 N landmarks, M points. A tag's detector looks in one direction and sees beams from within an angle and a range (seed
 document landmark_bearings.txt, sec. 3: 90 degrees, 15 m); a landmark without a direction is visible from all sides.
@@ -25,7 +25,7 @@ class UnknownLandmark(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class LandmarkMap:
-    """Where the landmarks are and from where they are visible, ignoring walls."""
+    """Positions of landmarks, and from where they are visible, ignoring walls."""
 
     ids: Tuple[str, ...]
     positions_m: np.ndarray  # (N, 2) in map

@@ -1,4 +1,4 @@
-"""A map file -> the same file with more cells occupied: thresholds, mode, origin and every other pixel are kept."""
+"""Copies a map file with more cells occupied: thresholds, mode, origin and every other pixel stay."""
 
 from __future__ import annotations
 

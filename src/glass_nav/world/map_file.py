@@ -1,4 +1,4 @@
-"""Files -> GridMap and back: map_server's yaml with its image, MRPT's .gridmap and .gridmap.gz.
+"""Reads and writes maps: map_server's yaml with its image, MRPT's .gridmap and .gridmap.gz.
 
 The yaml means here what it means to map_server of ROS 1: numbers as yaml-cpp reads them, an alpha channel averaged with
 the colours in mode trinary. Values that map_server silently accepts but that make no sense

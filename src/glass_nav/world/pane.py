@@ -1,4 +1,4 @@
-"""A pane of glass that the map lacks: where it is, and how it was seen."""
+"""A pane of glass that the map lacks: its position, and the evidence for it."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ class Pane:
         for name in ("start_m", "end_m"):
             value = getattr(self, name)
             if np.shape(value) != (2,) or not np.all(np.isfinite(value)):
-                raise ValueError(f"a pane goes from x, y to x, y, all finite, got {value}")
+                raise ValueError(f"a pane goes from x, y to x, y, all finite, got {np.asarray(value).tolist()}")
         if not self.length_m > _SHORTEST_M:
-            raise ValueError(f"a pane needs a length > 0 m, got one from {self.start_m} to {self.end_m}")
+            (x0, y0), (x1, y1) = self.start_m, self.end_m
+            raise ValueError(f"a pane needs a length > 0 m, got one from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m")
         if not 0.0 <= self.probability <= 1.0:
             raise ValueError(f"the probability of a pane must be in [0, 1], got {self.probability}")
 

@@ -1,4 +1,4 @@
-"""panes.yaml -> the panes that one map lacks, and back; with arrays that a node keeps over restarts.
+"""Reads and writes panes.yaml: the panes that a map lacks, and arrays that a node keeps over restarts.
 
 The file names its map by the fingerprint: panes of another map are refused.
 """
@@ -27,7 +27,7 @@ class PanesFileError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class PanesFile:
-    """What a file of panes holds."""
+    """The contents of a file of panes."""
 
     panes: Tuple[Pane, ...]
     arrays: Dict[str, np.ndarray] = field(default_factory=dict)  # by name, as given to save()

@@ -1,4 +1,4 @@
-"""GridMap -> line segments of its walls as seen from free space.
+"""Fits line segments to the walls of a map as seen from free space.
 
 The outline of free space is followed face by face, a face being a side between a free cell and another. Segments are
 fitted to the centres of the occupied cells behind the faces: beams that end at a wall draw it there. Glass is a wall.
@@ -45,7 +45,7 @@ def walls_closed(grid_map: GridMap) -> GridMap:
 
 
 def extract(grid_map: GridMap, tolerance_cells: float = TOLERANCE_CELLS) -> WallSegments:
-    """All walls of a map, no cell of a wall further from its line; without any, no segments."""
+    """Fits segments to all walls of a map, each cell within tolerance of its line; none without walls."""
     grid_map = walls_closed(grid_map)
     resolution_m = grid_map.resolution_m
     cell, side = _faces(grid_map.free)

@@ -27,7 +27,6 @@ def rows(folder):
 
 @pytest.mark.long_run
 def test_any_number_of_jobs_gives_the_same_answer_bit_for_bit(run, room_bag, room_map, few, tmp_path):
-    pytest.importorskip("distributed", reason="scripts/setup installs distributed")
     path = room_bag(scans=12).write()
     for jobs in (1, 2):
         code, out, _ = run(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
@@ -31,9 +32,14 @@ def wait_until(condition, timeout_s):
 
 @pytest.fixture(scope="module")
 def scheduler(tmp_path_factory):
-    """Address of a scheduler with one worker, both processes of their own on free ports."""
+    with dask_scheduler(tmp_path_factory.mktemp("dask")) as (address, _):
+        yield address
+
+
+@contextlib.contextmanager
+def dask_scheduler(folder):
+    """Address and process of a scheduler with one worker, a process too; on free ports."""
     pytest.importorskip("distributed", reason=WHY)
-    folder = tmp_path_factory.mktemp("dask")
     environment = {
         **os.environ,
         "PYTHONPATH": os.pathsep.join(
@@ -68,7 +74,7 @@ def scheduler(tmp_path_factory):
         assert wait_until(lambda: told.exists() and told.read_text().endswith("}"), 60), "no scheduler within 60 s"
         address = json.loads(told.read_text())["address"]
         start("worker", address, "--nthreads", "1", "--no-nanny")
-        yield address
+        yield address, started[0]
     finally:
         for process in reversed(started):
             process.terminate()
@@ -77,8 +83,6 @@ def scheduler(tmp_path_factory):
 
 @pytest.mark.parametrize("cores", [1, 2])
 def test_answers_come_in_the_order_of_the_jobs_and_a_failure_stops_no_other(cores):
-    if cores > 1:
-        pytest.importorskip("distributed", reason=WHY)
     steps = []
     assert engine.run(JOBS, engine_jobs.squared, steps.append, cores) == ANSWERS
     assert sum(steps) == 3 + 1 + 5 + 0 + 2
@@ -93,16 +97,25 @@ def test_a_dask_cluster_gives_the_same_answers(scheduler):
 
 
 def test_more_than_one_core_means_other_processes():
-    pytest.importorskip("distributed", reason=WHY)
     assert os.getpid() not in engine.run([1, 2], engine_jobs.process, lambda count: None, cores=2)
     assert set(engine.run([1, 2], engine_jobs.process, lambda count: None)) == {os.getpid()}
 
 
-def test_a_process_that_is_killed_is_told_in_one_line():
-    pytest.importorskip("distributed", reason=WHY)
-    answers = engine.run([1, 2], engine_jobs.ended, lambda count: None, cores=2)
-    assert [answer.job for answer in answers] == [1, 2]
-    assert {answer.reason for answer in answers} == {"its process died, out of memory?"}
+def test_a_process_that_is_killed_is_told_in_one_line_and_the_others_go_on():
+    answers = engine.run([2, "end", 3, "end", 4], engine_jobs.squared_or_ended, lambda count: None, cores=2)
+    assert answers == [4, Failed("end", engine.DIED), 9, Failed("end", engine.DIED), 16]
+
+
+def test_a_job_whose_process_was_killed_once_is_done_by_another(tmp_path):
+    jobs, steps = [str(tmp_path / "a"), str(tmp_path / "b")], []
+    assert engine.run(jobs, engine_jobs.ended_once, steps.append, cores=2) == ["done"] * 2
+    assert sum(steps) == 2
+
+
+def test_an_error_that_nobody_expects_is_told_and_stops_no_other():
+    done, failed = engine.run([2, "two"], engine_jobs.squared, lambda count: None, cores=2)
+    assert done == 4
+    assert failed.job == "two" and failed.reason.startswith("TypeError: ")
 
 
 def test_what_a_worker_of_the_cluster_cannot_do_stops_no_other(scheduler):
@@ -121,13 +134,27 @@ def test_a_scheduler_without_workers_is_told(monkeypatch):
     assert str(caught.value) == f"no worker has joined the Dask scheduler at {address} within 0.5 s"
 
 
-@pytest.mark.parametrize("option, given", [("--jobs 2", {"cores": 2}), ("--scheduler", {"scheduler": "tcp://a:1"})])
-def test_without_the_package_the_option_that_needs_it_is_named(monkeypatch, option, given):
+def test_a_scheduler_that_loses_its_last_worker_is_told(monkeypatch, tmp_path):
+    monkeypatch.setattr(engine, "WORKER_S", 1.0)
+    with dask_scheduler(tmp_path) as (address, _):
+        with pytest.raises(EngineError) as caught:
+            engine.run(["end"], engine_jobs.squared_or_ended, lambda count: None, scheduler=address)
+    assert str(caught.value) == f"the Dask scheduler at {address} has lost its last worker"
+
+
+def test_a_scheduler_that_ends_is_told(tmp_path):
+    with dask_scheduler(tmp_path) as (address, process):
+        with pytest.raises(EngineError) as caught:
+            engine.run([process.pid], engine_jobs.killed, lambda count: None, scheduler=address)
+    assert str(caught.value) == f"the Dask scheduler at {address} does not answer any more"
+
+
+def test_without_the_package_the_option_that_needs_it_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(
-        EngineError, match=rf"^{option} needs the Python package distributed \(pip install distributed\)"
+        EngineError, match=r"^--scheduler needs the Python package distributed \(pip install distributed\)"
     ):
-        engine.run([1, 2], engine_jobs.squared, lambda count: None, **given)
+        engine.run([1, 2], engine_jobs.squared, lambda count: None, scheduler="tcp://a:1")
 
 
 def test_a_scheduler_that_does_not_answer_is_told(monkeypatch):

@@ -21,10 +21,10 @@ def search_from(true, odom_from_base):
     return PlaceSearch(ScanMatcher(grid_map, field), field, points, odom_from_base)
 
 
-def complete(search):
+def complete(search, period_s=None):
     """How many slices it took."""
     slices = 1
-    while not search.advance():
+    while not search.advance(period_s):
         slices += 1
     return slices
 
@@ -39,6 +39,14 @@ def test_the_size_of_the_slices_does_not_change_the_places(monkeypatch, slice_si
     sliced = search_from(true, np.zeros(3))
     assert complete(sliced) > 2
     np.testing.assert_array_equal(sliced.places(np.zeros(3)), at_once.places(np.zeros(3)))
+
+
+def test_the_slices_are_smaller_where_scans_follow_each_other_quickly(monkeypatch):
+    monkeypatch.setattr(place_search, "_SLICE", 2_000_000)
+    true = loop_drive(3)[-1]
+    slices = [complete(search_from(true, np.zeros(3)), period_s) for period_s in (None, 3.0, 0.1, 0.025, 0.0)]
+    assert slices[0] == slices[1] == slices[2] < slices[3] < slices[4]
+    assert slices[3] == pytest.approx(4 * slices[2], abs=4)
 
 
 def test_the_best_place_is_the_one_where_the_robot_is_by_then():

@@ -76,3 +76,13 @@ def test_odometry_that_is_no_pose_is_refused_and_leaves_the_stamp_alone(odometry
     with pytest.raises(ScanError, match="^scan at 2.000 s: odometry must be finite x, y, yaw, got"):
         schedule.admit(scan(2.0), odometry)
     schedule.admit(scan(1.0), START)
+
+
+def test_the_period_is_that_of_all_lidars_together():
+    schedule = UpdateSchedule()
+    periods = []
+    for stamp_s, lidar in ((1.0, "front"), (1.1, "rear"), (1.2, "front"), (1.15, "rear")):
+        schedule.admit(scan(stamp_s, lidar), START)
+        periods.append(schedule.period_s)
+    assert periods[0] is None
+    assert periods[1:] == pytest.approx([0.1, 0.1, 0.0])

@@ -39,27 +39,45 @@ std::vector<py::ssize_t> common_shape(const py::array& x_m, const py::array& y_m
   return shape;
 }
 
+/// Calls take(first, count, slopes) for one block of the points after the other.
+template <class Take>
+void for_each_block(const DistanceField& field, const double* x_m, const double* y_m, std::size_t points,
+                    const Take& take) {
+  using Slopes = DistanceField::Slopes;
+  Slopes at;
+  Slopes::Values x, y;
+  for (std::size_t first = 0; first < points; first += Slopes::kMost) {
+    const std::size_t count = std::min(Slopes::kMost, points - first);
+    std::copy_n(x_m + first, count, x.begin());
+    std::copy_n(y_m + first, count, y.begin());
+    at.find(field, x, y, count);
+    take(first, count, at);
+  }
+}
+
 py::array_t<double> distance(const DistanceField& field, const Array<double>& x_m, const Array<double>& y_m) {
   py::array_t<double> result(common_shape(x_m, y_m));
   const double *x = x_m.data(), *y = y_m.data();
   double* to = result.mutable_data();
-  const py::ssize_t count = result.size();
+  const auto points = static_cast<std::size_t>(result.size());
   py::gil_scoped_release unlocked;
-  for (py::ssize_t i = 0; i < count; ++i) to[i] = field.distance(x[i], y[i]);
+  for_each_block(field, x, y, points,
+                 [to](std::size_t first, std::size_t count, const DistanceField::Slopes& found) {
+                   std::copy_n(found.distance.begin(), count, to + first);
+                 });
   return result;
 }
 
 py::tuple at(const DistanceField& field, const Array<double>& x_m, const Array<double>& y_m) {
   const std::vector<py::ssize_t> shape = common_shape(x_m, y_m);
   py::array_t<double> distance_m(shape), along_x(shape), along_y(shape);
-  const double *x = x_m.data(), *y = y_m.data();
   double *to = distance_m.mutable_data(), *to_x = along_x.mutable_data(), *to_y = along_y.mutable_data();
-  for (py::ssize_t i = 0; i < distance_m.size(); ++i) {
-    const Slope slope = field.at(x[i], y[i]);
-    to[i] = slope.distance;
-    to_x[i] = slope.along_x;
-    to_y[i] = slope.along_y;
-  }
+  for_each_block(field, x_m.data(), y_m.data(), static_cast<std::size_t>(distance_m.size()),
+                 [=](std::size_t first, std::size_t count, const DistanceField::Slopes& found) {
+                   std::copy_n(found.distance.begin(), count, to + first);
+                   std::copy_n(found.along_x.begin(), count, to_x + first);
+                   std::copy_n(found.along_y.begin(), count, to_y + first);
+                 });
   return py::make_tuple(distance_m, along_x, along_y);
 }
 

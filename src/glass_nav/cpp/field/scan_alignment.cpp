@@ -6,6 +6,8 @@
 namespace glass_nav {
 namespace {
 
+using Slopes = DistanceField::Slopes;
+
 constexpr double kPi = 3.14159265358979323846;
 
 double wrap(double angle_rad) { return angle_rad - 2.0 * kPi * std::floor((angle_rad + kPi) / (2.0 * kPi)); }
@@ -19,23 +21,36 @@ struct Equations {
 /// Of the squared distances, with Geman-McClure weights.
 Equations normal_equations(const DistanceField& field, const Points& points, const Pose& pose, double scale_m) {
   const double cos = std::cos(pose[2]), sin = std::sin(pose[2]), square = scale_m * scale_m;
+  Slopes at;
+  Slopes::Values x, y, map_x, map_y, along_yaw, weight;
   Equations sums;
-  for (std::size_t i = 0; i < points.count; ++i) {
-    const double x = cos * points.xy_m[2 * i] - sin * points.xy_m[2 * i + 1];
-    const double y = sin * points.xy_m[2 * i] + cos * points.xy_m[2 * i + 1];
-    const Slope at = field.at(pose[0] + x, pose[1] + y);
-    const double root = square / (square + at.distance * at.distance), weight = root * root;
-    const double along_yaw = at.along_y * x - at.along_x * y;
-    const double w0 = weight * at.along_x, w1 = weight * at.along_y, w2 = weight * along_yaw;
-    sums.a00 += w0 * at.along_x;
-    sums.a01 += w0 * at.along_y;
-    sums.a02 += w0 * along_yaw;
-    sums.a11 += w1 * at.along_y;
-    sums.a12 += w1 * along_yaw;
-    sums.a22 += w2 * along_yaw;
-    sums.b0 += w0 * at.distance;
-    sums.b1 += w1 * at.distance;
-    sums.b2 += w2 * at.distance;
+  for (std::size_t first = 0; first < points.count; first += Slopes::kMost) {
+    const std::size_t count = std::min(Slopes::kMost, points.count - first);
+    const double* from = points.xy_m + 2 * first;
+    for (std::size_t i = 0; i < count; ++i) {
+      x[i] = cos * from[2 * i] - sin * from[2 * i + 1];
+      y[i] = sin * from[2 * i] + cos * from[2 * i + 1];
+      map_x[i] = pose[0] + x[i];
+      map_y[i] = pose[1] + y[i];
+    }
+    at.find(field, map_x, map_y, count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double root = square / (square + at.distance[i] * at.distance[i]);
+      weight[i] = root * root;
+      along_yaw[i] = at.along_y[i] * x[i] - at.along_x[i] * y[i];
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const double w0 = weight[i] * at.along_x[i], w1 = weight[i] * at.along_y[i], w2 = weight[i] * along_yaw[i];
+      sums.a00 += w0 * at.along_x[i];
+      sums.a01 += w0 * at.along_y[i];
+      sums.a02 += w0 * along_yaw[i];
+      sums.a11 += w1 * at.along_y[i];
+      sums.a12 += w1 * along_yaw[i];
+      sums.a22 += w2 * along_yaw[i];
+      sums.b0 += w0 * at.distance[i];
+      sums.b1 += w1 * at.distance[i];
+      sums.b2 += w2 * at.distance[i];
+    }
   }
   return sums;
 }
@@ -82,11 +97,18 @@ Matrix3 information_at(const DistanceField& field, const Points& points, const P
 
 double fit_at(const DistanceField& field, const Points& points, const Pose& pose, double scale_m) {
   const double cos = std::cos(pose[2]), sin = std::sin(pose[2]), square = scale_m * scale_m;
+  Slopes at;
+  Slopes::Values x_m, y_m;
   double total = 0.0;
-  for (std::size_t i = 0; i < points.count; ++i) {
-    const double x = points.xy_m[2 * i], y = points.xy_m[2 * i + 1];
-    const double distance = field.distance(pose[0] + cos * x - sin * y, pose[1] + sin * x + cos * y);
-    total += square / (square + distance * distance);
+  for (std::size_t first = 0; first < points.count; first += Slopes::kMost) {
+    const std::size_t count = std::min(Slopes::kMost, points.count - first);
+    const double* from = points.xy_m + 2 * first;
+    for (std::size_t i = 0; i < count; ++i) {
+      x_m[i] = pose[0] + cos * from[2 * i] - sin * from[2 * i + 1];
+      y_m[i] = pose[1] + sin * from[2 * i] + cos * from[2 * i + 1];
+    }
+    at.find(field, x_m, y_m, count);
+    for (std::size_t i = 0; i < count; ++i) total += square / (square + at.distance[i] * at.distance[i]);
   }
   return total / static_cast<double>(points.count);
 }

@@ -1,1 +1,1 @@
-"""Along the edges of the Voronoi graph around the robot, and what it reports of them: needs no map."""
+"""Follows the edges of the Voronoi graph around the robot and reports them. Needs no map."""

@@ -1,12 +1,12 @@
-"""Scans, odometry -> commands along the edges of the Voronoi graph, and what the robot reports of them.
+"""Drives along the edges of the Voronoi graph by scans and odometry, and reports meetpoints and traversals.
 
-No pose in a map is needed: the graph is that of a small map around the robot, see local_map.py, made by the same code
-as the atlas, so that both see the same meetpoints. What lies ahead may turn out otherwise (a pane that was not seen
-yet, a corner that hid something), so a meetpoint counts only once the robot stands there and has looked again. What
-comes in is odom_from_base (3,); map, graph and lines are in the frame local, odom without its drift, see local_pose.py.
+No pose in a map is needed: the graph is that of a small local map (local_map.py), made by the same code as the atlas,
+so that both have the same meetpoints. What lies ahead may change (a pane that was not seen yet, a hidden corner), so
+a meetpoint counts only once the robot stands there and has looked again. Input poses are odom_from_base (3,); map,
+graph and lines are in the frame local, odom without its drift, see local_pose.py.
 
 Choset, Burdick, Sensor-based exploration: the hierarchical generalized Voronoi graph (IJRR 2000): tracing and homing;
-here both go along a line of the local graph instead of a gradient of the distances.
+here both follow a line of the local graph instead of a gradient of the distances.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class EdgeDriverParams:
 
 @dataclass(frozen=True)
 class Arrival:
-    """What is reported at a meetpoint."""
+    """The report at a meetpoint."""
 
     stamp_ns: int  # of the scan that showed it
     odom_from_base: np.ndarray  # (3,) then
@@ -64,7 +64,7 @@ class Arrival:
 
 @dataclass(frozen=True)
 class Progress:
-    """Where the driver is."""
+    """The progress of the driver."""
 
     phase: DriverPhase
     reason: str  # one sentence
@@ -268,7 +268,7 @@ class EdgeDriver:
         return float(np.abs(self._velocity).max()) < 0.02
 
     def _think(self, graph: LocalGraph) -> None:
-        """Once for each graph."""
+        """Decides once for each new graph."""
         leg = self._leg
         if leg.looking:
             if self._stands:

@@ -1,4 +1,4 @@
-"""The line along which the robot drives, as a new graph has it."""
+"""The line along which the robot drives, in the newest graph."""
 
 from __future__ import annotations
 

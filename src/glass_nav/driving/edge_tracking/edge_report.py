@@ -1,7 +1,7 @@
-"""Where the robot was, the local graph -> what it reports: Meetpoint and Traversal.
+"""Measures what the robot reports of its path: Meetpoint and Traversal.
 
-Measured as the atlas builder measures: lengths along the smooth line of the edge from node to node, directions from a
-node to the point BEARING_AT_M along.
+The same measures as in the atlas builder: lengths along the smoothed line of the edge from node to node, directions
+from a node to the point at BEARING_AT_M along the line.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Trace:
         self._points = [np.array(start_m, float)]
 
     def add(self, point_m: np.ndarray) -> None:
-        """Where the robot is on the edge now; small steps are left out, what it backed off from is forgotten."""
+        """Adds the robot's position on the edge; small steps are left out, stretches backed off are removed."""
         if np.hypot(*(point_m - self._points[-1])) < _MIN_TRACE_M:
             return
         late = np.array(self._points[1:][-_LATE_POINTS:]).reshape(-1, 2)
@@ -87,7 +87,7 @@ def ranked(branches: Sequence[Branch], back_rad: float) -> List[Branch]:
 
 
 def sigma_r_m(spread_m: float, doubt_m: float) -> float:
-    """Of an equidistance, from what the graph says of a node."""
+    """Standard deviation of an equidistance, from the graph at a node."""
     return math.sqrt(_R_SIGMA_M**2 + spread_m**2 + doubt_m**2)
 
 

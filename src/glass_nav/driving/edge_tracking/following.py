@@ -1,4 +1,4 @@
-"""A new graph -> the line along which the robot follows its edge, or seeks any meetpoint."""
+"""Finds in a new graph the line along which the robot continues: its edge, or the way to any meetpoint."""
 
 from __future__ import annotations
 

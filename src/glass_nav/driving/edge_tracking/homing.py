@@ -1,4 +1,4 @@
-"""The last stretch to a node of the graph, and whether it is a meetpoint once the robot stands there and looks.
+"""The last stretch to a node of the graph, and the decision whether it is a meetpoint.
 
 A node seen from afar may turn out otherwise, so it counts only if several graphs in a row have it.
 """

@@ -1,4 +1,4 @@
-"""What the edge driver does just now: its phase, the line it drives along, and what it found out on that."""
+"""The current state of the edge driver: its phase, its line, and what it has measured so far."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SPLIT_M = 0.6  # so much: it would be a part of the one that the robot left
 
 @dataclass
 class Leg:
-    """From one order to the next: seeking, following an edge with homing at its end, returning, or standing."""
+    """One order: seeking, following an edge with homing at its end, returning, or standing."""
 
     phase: DriverPhase
     reason: str

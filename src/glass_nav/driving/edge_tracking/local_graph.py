@@ -1,6 +1,6 @@
-"""The Voronoi graph around the robot: where the robot is on it, what lies ahead, which branches leave a node.
+"""The Voronoi graph around the robot: its position on it, the way ahead, the branches of a node.
 
-Coordinates are those of the grid, odom. A line (n, 2) runs from where the robot is along an edge to a node.
+Coordinates are those of the grid, odom. A line (n, 2) runs from the robot along an edge to a node.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Branch:
 
 
 def params_beside(atlas: VoronoiParams) -> VoronoiParams:
-    """What the graph of a local map is made with, beside an atlas that was made with those."""
+    """Parameters of the local graph, to match an atlas that was built with the given ones."""
     return replace(atlas, passage_margin_m=max(atlas.passage_margin_m - _THICKER_M, 0.0))
 
 
@@ -99,7 +99,7 @@ class LocalGraph:
         return in_sight(self._grid, from_m, to_m)
 
     def ahead(self, foot: int, along: np.ndarray) -> Ahead:
-        """From a point of the graph on, in that direction (2,)."""
+        """The line from a point of the graph onwards in a direction (2,)."""
         edge, index = int(self._edge[foot]), int(self._index[foot])
         line, (first, last) = self.graph.lines_m[edge], self.graph.edge_node[edge].tolist()
         if self._tangents[foot] @ along >= 0.0:

@@ -1,15 +1,15 @@
-"""Scans, odometry -> a small grid of what is around the robot, in which glass stands.
+"""A small occupancy grid around the robot, made of scans and odometry, that contains glass.
 
-A single scan shows a pane only where beams meet it almost at right angles, and what lies behind everywhere else. So
-each cell counts by the direction of the beams how many ended in it and how many passed it, and stands if they end
-there from any one direction: beams that pass a pane at a flat angle do not contradict those that came back from it,
-beams from about where others came back do (somebody who walked on). As a robot drives along a pane it sees every
-piece of it that way, and the piece next to it always: the nearest point of a plane is met at right angles.
+A single scan shows a pane only where beams meet it almost at right angles, and elsewhere what lies behind. So each
+cell counts, by beam direction, how many beams ended in it and how many passed it, and is occupied if beams from any
+one direction end there. Beams that pass a pane at a flat angle do not contradict those that returned from it; beams
+from about the same direction do (a person who walked on). A robot that drives along a pane sees every piece of it at
+a right angle once, and always the piece beside it, since the nearest point of a plane is met at a right angle.
 
-Between and beside such pieces there is more of the pane, most likely: they are extended along their line until
-something stands there, or beams have passed there about as directly as they would have to to be sent back.
+Between and beside such pieces there is probably more of the pane. They are extended along their line until there is
+an obstacle, or beams have passed there almost at right angles.
 
-The window is bound to the robot and moves in whole cells; poses are odom_from_base (3,). n x n cells, D directions.
+The window moves with the robot in whole cells; poses are odom_from_base (3,). n x n cells, D directions.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Odometry, scans -> the robot's pose in the frame of the local map, without odometry's drift over a few metres.
+"""The pose of the robot in the local map, without the drift of odometry over a few metres.
 
-Each scan slides along the walls of the local map as it was when its graph was made, held by what odometry says. So
-walls stay thin, and the edges of a traversal are as long as they are. The frame is called local; it goes away from odom
-as odometry errs.
+Each scan is registered to the walls of the local map as it was when its graph was made, with odometry as the prior.
+So walls stay thin, and edges have their true length. The frame is called local; it drifts from odom by the error of
+odometry.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Scans, odometry -> the grid around the robot that its graph is made of: a coarser one in a hall too wide for the window.
+"""The grid from which the local graph is made: coarser in halls too wide for the window.
 
-A window that ends before the walls of a hall do shows ways between its own edge and a wall, which go with the robot: it
-would follow them for ever. A coarser map has as many cells, takes over what the fine one knows, and is given
-up where the fine one reaches far enough again.
+A window that ends before the walls of a hall shows edges between its own border and a wall, which move with the
+robot, so it would follow them for ever. A coarser map has as many cells, takes over what the fine one contains, and
+is dropped as soon as the fine one is large enough again.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ class MapAround:
             self._wide.add(scan, local_from_base)
 
     def walls(self) -> GridMap:
-        """What stands there, as fine as it is known; all else is free."""
+        """The walls at the finest resolution known; everything else is free."""
         walls = self._fine.walls()
         return walls if self._wide is None or walls.occupied.any() else self._wide.walls()
 
     @property
     def coarse_m(self) -> float:
-        """By how much the cells of the last grid are larger than those of the fine map."""
+        """How much larger the cells of the last grid are than those of the fine map."""
         fine_m = self._fine.params.resolution_m
         return 0.0 if self._wide is None else self._wide.params.resolution_m - fine_m
 

@@ -1,8 +1,8 @@
-"""Scans of a robot that stands -> where something moved: somebody who walks by is no obstacle that an atlas knows.
+"""Finds moving objects in the scans of a robot that stands still: people are no obstacles of an atlas.
 
-Somebody who walks at 0.1 m/s looks like a wall to a map of cells: each holds the person for seconds. To a robot that
-stands still the person shifts by centimetres along several beams side by side, which no wall does, and no pane: a pane
-answers or it does not, and what is behind it is farther away.
+A person who walks at 0.1 m/s looks like a wall to an occupancy grid, whose cells are each covered for seconds. To a
+robot that stands still, the person moves by centimetres along several adjacent beams. No wall does that, nor a pane:
+it returns a beam or lets it pass to something farther away.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Scans, odometry -> the meetpoints that a robot drives past, whoever steers it.
+"""Detects the meetpoints that a robot drives past, whatever steers it.
 
-What the edge driver looks at, watched without driving: the graph of the same local map, by the same code. The driver
-homes to a node and looks until some graphs agree; a robot that only drives past has the graphs that were made on its
-way. So a node is followed from graph to graph while the robot is near, and told once the robot has left it, with what
-the graphs around the nearest point of the path agree on.
+It observes the graph of the same local map as the edge driver, without driving. The driver stops at a node and looks
+until some graphs agree; a robot that only drives past has the graphs that were made on its way. So a node is followed
+from graph to graph while the robot is near, and reported once the robot has left it, with the values on which the
+graphs around the nearest point of the path agree.
 
 Poses are local_from_base, see local_pose.py.
 """
@@ -83,7 +83,7 @@ class PassedNode:
 
 @dataclass(frozen=True)
 class WayPoint:
-    """Where the robot was on the graph."""
+    """A position of the robot on the graph."""
 
     stamp_ns: int
     local_m: np.ndarray  # (2,) the point of the graph nearest to the robot; the robot itself if none is near
@@ -113,7 +113,7 @@ class _Track:
         return self.looks[-1]
 
     def share(self) -> float:
-        """Of the graphs next to the nearest point of the path, those that have it."""
+        """Share of the graphs near the closest point of the path that have the node."""
         nearest = min(self.away_m, key=lambda number: self.away_m[number])
         beside = [number for number in self.away_m if abs(number - nearest) <= _AGREE // 2]
         return sum(look.number in beside for look in self.looks) / len(beside)

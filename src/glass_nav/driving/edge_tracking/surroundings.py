@@ -1,6 +1,6 @@
-"""Scans, odometry -> the map and the Voronoi graph around the robot, its pose in them, and what it may run into.
+"""The map and the Voronoi graph around the robot, its pose in them, and the obstacles nearby.
 
-All is in the frame local: odom without its drift, see local_pose.py.
+Everything is in the frame local: odom without its drift, see local_pose.py.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Surroundings:
 
     @property
     def coarse_m(self) -> float:
-        """By how much the cells of the last graph's map were larger than usual."""
+        """How much larger than usual the cells of the last graph's map were."""
         return self._map.coarse_m
 
     @property
@@ -77,7 +77,7 @@ class Surroundings:
         return self.graph
 
     def renew_walls(self) -> None:
-        """Only the walls: no graph is needed now."""
+        """Updates only the walls, when no graph is needed."""
         self._renewed_ns = self.stamp_ns
         self._map.fit(self.pose[:2])
         walls = self._map.walls()

@@ -1,4 +1,4 @@
-"""Cases and scan_surfaces against the truth from a simulator: confusion matrix, precision and recall.
+"""Scores cases and scan_surfaces against the ground truth of a simulator: confusion matrix, precision, recall.
 
 Cases 0..4 as in msg/BeamCases, B beams. Scores are counts, so that those of scans and of runs add up;
 figures are None where nothing was counted.
@@ -77,7 +77,7 @@ class SurfaceScores:
 
 
 def none_yet() -> CaseScores:
-    """To add to."""
+    """Empty scores, to add to."""
     return CaseScores(np.zeros((CASES, CASES), np.int64), np.zeros((CASES, CASES), np.int64))
 
 

@@ -66,7 +66,7 @@ BY_NAME = {figure.name: figure for figure in FIGURES}
 
 @dataclass(frozen=True)
 class Run:
-    """One contestant, once over one log."""
+    """One run of a contestant over a log."""
 
     contestant: str
     log: str
@@ -83,7 +83,7 @@ class Run:
 
     @property
     def sha256(self) -> str:
-        """Of every bit of the trajectory: equal runs have equal ones."""
+        """Hash of every bit of the trajectory: equal runs have equal hashes."""
         digest = hashlib.sha256(np.ascontiguousarray(self.stamps_ns, "<i8").tobytes())
         digest.update(np.ascontiguousarray(self.map_from_base, "<f8").tobytes())
         return digest.hexdigest()
@@ -275,7 +275,7 @@ def text(figure: Figure, interval: Optional[Interval], signed: bool = False) -> 
 
 
 def judged(figure: Figure, difference: Optional[Interval]) -> str:
-    """In words, of a difference to the first."""
+    """A difference to the first contestant in words."""
     if figure.better == 0 or difference is None or difference.half_width is None:
         return ""
     if difference == Interval(0.0, 0.0):

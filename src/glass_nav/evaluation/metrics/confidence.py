@@ -1,4 +1,4 @@
-"""How sure a mean is: Student's t over repeated runs, a weighted sum of groups by Welch and Satterthwaite.
+"""Confidence intervals of means: Student's t over repeated runs, groups combined by Welch and Satterthwaite.
 
 Student, The probable error of a mean, Biometrika 6 (1908); Welch, The generalization of "Student's" problem when
 several different population variances are involved, Biometrika 34 (1947).
@@ -31,7 +31,7 @@ class Interval:
 
 
 def of_sum(groups: "Sequence[Tuple[float, np.ndarray]]") -> Interval:
-    """Of the sum of weight times the group's mean, the groups independent of each other.
+    """The interval of a weighted sum of the means of independent groups.
 
     The variance is that of the groups' means, with Welch and Satterthwaite's degrees of freedom; groups are fixed
     strata: what differs between their means is no uncertainty.
@@ -51,7 +51,7 @@ def of_sum(groups: "Sequence[Tuple[float, np.ndarray]]") -> Interval:
 
 
 def of_strata(strata: Sequence[np.ndarray]) -> Interval:
-    """Of the mean over strata, each of the same weight: a log with many runs says no more about all logs."""
+    """The interval of the mean over strata with equal weights: a log with many runs counts as much as any other."""
     return of_sum([(1.0 / len(strata), values) for values in strata])
 
 

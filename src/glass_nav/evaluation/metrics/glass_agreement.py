@@ -1,4 +1,4 @@
-"""A glass map against another opinion on the same walls: precision and recall within a distance.
+"""Compares a glass map with a reference on the same walls: precision and recall within a distance.
 
 N, M places in the map.
 """

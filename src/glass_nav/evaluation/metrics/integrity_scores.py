@@ -1,4 +1,4 @@
-"""Does the filter know when it is wrong?  Claims about each pose against the truth.
+"""Scores integrity: the state and protection level of each pose against its true error.
 
 As in satellite navigation: a pose that is reported as LOCALIZED while its error exceeds the protection level is misleading
 information. S scans. A scan without a reference counts in no figure.
@@ -36,7 +36,7 @@ _Z_999 = 3.29  # deviations that a normal error stays below with 99.9 %
 
 @dataclass(frozen=True)
 class IntegrityTrace:
-    """What was claimed about each pose, and how far off it was."""
+    """State, covariance and protection level of each pose, with its true error."""
 
     stamps_ns: np.ndarray  # (S,) int64, ascending
     driven_m: np.ndarray  # (S,) distance since the first scan by odometry

@@ -1,4 +1,4 @@
-"""Nodes that a robot drove past: those of an atlas against those that it saw. Seen, missed, false positives.
+"""Compares the nodes of an atlas that a robot passed with those that it detected: seen, missed, false positives.
 
 Both by one rule: a node is passed if the robot came within `near(r)` of it, in sight. Passing it again, after the robot
 has been `linger_m` further away than that, counts again. What was seen belongs to a node of the atlas if it lies within
@@ -25,7 +25,7 @@ DOUBTFUL, UNSTEADY, NOTHING = "doubtful", "unsteady", "nothing"  # why missed: w
 
 
 class Passing(NamedTuple):
-    """What counts as passing a node."""
+    """When a node counts as passed."""
 
     near: Callable[[np.ndarray], np.ndarray]  # equidistances (...) -> how near (...) [m]
     linger_m: float
@@ -34,7 +34,7 @@ class Passing(NamedTuple):
 
 @dataclass(frozen=True)
 class KnownNodes:
-    """What is compared of an atlas, in the frame map."""
+    """The nodes of an atlas to compare with, in the frame map."""
 
     position_m: np.ndarray  # (N, 2)
     r_m: np.ndarray  # (N,)
@@ -92,7 +92,7 @@ class DrivenEdge:
 
 @dataclass(frozen=True)
 class TopologyScore:
-    """What a drive saw of an atlas."""
+    """The nodes of an atlas that a drive passed, and which it detected."""
 
     known: KnownNodes
     seen: List[SeenNode]
@@ -100,7 +100,7 @@ class TopologyScore:
     edges: List[DrivenEdge]
 
     def of_kind(self, verdict: str, dead_ends: Optional[bool] = None) -> List[Meeting]:
-        """Those of a verdict; of dead ends or of meetpoints only, by the atlas where it has them."""
+        """The nodes with a verdict; of dead ends or of meetpoints only, by the atlas where it has them."""
         return [
             each for each in self.meetings if each.verdict == verdict and dead_ends in (None, self._degree(each) == 1)
         ]
@@ -197,7 +197,7 @@ def visits(known: KnownNodes, stamps_ns: np.ndarray, map_from_base: np.ndarray, 
 
 
 def compare(known: KnownNodes, passed: Sequence[Visit], seen: Sequence[SeenNode], passing: Passing) -> List[Meeting]:
-    """Who belongs to whom, in the order of time.
+    """Assigns detections to nodes, in the order of time.
 
     Seen nodes at the edge of what is near, or beside a node of the atlas that is, are neither right nor wrong.
     """

@@ -1,4 +1,4 @@
-"""Estimated poses against a reference: errors of each scan, and what they come to.
+"""Errors of estimated poses against a reference, per scan and summarized.
 
 S scans. A scan without a reference (outside the time it covers) has NaN errors and counts in no figure.
 """

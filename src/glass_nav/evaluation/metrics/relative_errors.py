@@ -1,4 +1,4 @@
-"""How far relative motion is off: over a distance, over a time, and the absolute error after an alignment.
+"""Errors of relative motion over a distance and over a time, and the absolute error after alignment.
 
 The definitions are evo's (Grupp, evo, https://github.com/MichaelGrupp/evo): its relative pose error (RPE) over all pairs
 that are DISTANCE_M of the estimated path apart, to 10 %, or as many scans apart as TIME_S has; translation part and
@@ -85,7 +85,7 @@ def pairs_by_distance(estimates: np.ndarray, distance_m: float) -> Tuple[np.ndar
 
 
 def pairs_by_frames(count: int, frames: int) -> Tuple[np.ndarray, np.ndarray]:
-    """All pairs of `count` poses that are so many apart."""
+    """All pairs of `count` poses that are this number of scans apart."""
     begin = np.arange(max(count - frames, 0))
     return begin, begin + frames
 

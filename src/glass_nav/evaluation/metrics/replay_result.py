@@ -1,4 +1,4 @@
-"""What a replay gives: a row per scan, the cases of every beam, and the figures of the whole run.
+"""The result of a replay: a row per scan, the cases of every beam, and the figures of the whole run.
 
 S scans that the filter took, B beams of the widest of them.
 """
@@ -61,7 +61,7 @@ class KeptScan:
 
 @dataclass(frozen=True)
 class ReplayResult:
-    """One run of the filter over one log."""
+    """The result of one run of the filter over one log."""
 
     stamps_ns: np.ndarray  # (S,) int64
     map_from_base: np.ndarray  # (S, 3) estimates
@@ -98,7 +98,7 @@ class ReplayResult:
 
     @property
     def integrity(self) -> IntegrityTrace:
-        """What the filter claimed of every scan, against the reference."""
+        """State, covariance and protection level of every scan, against the reference."""
         return integrity_scores.trace(
             self.stamps_ns,
             self.map_from_base,

@@ -52,7 +52,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Story:
-    """What the first screen of a report says."""
+    """The first screen of a report."""
 
     grade: str  # GOOD, FAIR or BAD
     headline: str
@@ -118,7 +118,7 @@ def right(errors: PoseErrors) -> np.ndarray:
 
 @dataclass(frozen=True)
 class YawSpike:
-    """One scan, or two, whose heading error stands out from its neighbours'."""
+    """One or two scans whose heading error is much larger than that of their neighbours."""
 
     row: int
     yaw_rad: float
@@ -172,7 +172,7 @@ def scan_period_s(result: ReplayResult) -> Optional[float]:
 
 
 def explained_share(result: ReplayResult) -> Optional[float]:
-    """Of the answering beams, those that the map explains; mean over scans. None: no beam answered."""
+    """Share of the returned beams that the map explains, mean over scans. None: no beam returned."""
     known = result.used_share[np.isfinite(result.used_share)]
     return float(known.mean()) if len(known) else None
 
@@ -209,7 +209,7 @@ def _scope(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -> np
 
 
 def _wrong_share(result: ReplayResult, errors: PoseErrors) -> float:
-    """Of the scans said to be LOCALIZED, those that were somewhere else."""
+    """Share of the LOCALIZED scans with a wrong pose."""
     said = (np.array(result.states) == LocalizationState.LOCALIZED) & errors.matched
     return float(np.mean(~right(errors)[said])) if said.any() else 0.0
 

@@ -1,4 +1,4 @@
-"""A smoothed trajectory against the filter's and against the ground truth: a third opinion, where there is none."""
+"""Compares a smoothed trajectory with the filter and with the ground truth."""
 
 from __future__ import annotations
 

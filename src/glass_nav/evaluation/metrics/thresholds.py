@@ -1,4 +1,4 @@
-"""Limits on the figures of a run, as CI wants them: `position_p95_m>0.3` fails a run that is worse."""
+"""Limits on the figures of a run, for CI: `position_p95_m>0.3` fails a run that is worse."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def parse(text: str, known: Sequence[str] = KNOWN) -> Threshold:
     metric = match.group(1)
     if metric not in known:
         near = get_close_matches(metric, known, n=1)
-        hint = f"; did you mean {near[0]}?" if near else ""
+        hint = f"; did you mean {near[0]}?" if near else "."
         raise ValueError(f"--fail-if: unknown metric {metric!r}{hint} Known: {', '.join(known)}")
     return Threshold(metric, match.group(2), limit)
 

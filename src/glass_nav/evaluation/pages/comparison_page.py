@@ -33,7 +33,7 @@ def write(path: Path, compared: Comparison, drawn: Sequence[Picture], about: Map
 
 
 def headline(compared: Comparison) -> str:
-    """What the first figure says of each contestant against the first."""
+    """The first figure of each contestant, compared with the first one."""
     first, *others = compared.contestants
     figure = compared.figures[0]
     value = comparison.text(figure, compared.interval(first, figure))

@@ -25,7 +25,7 @@ NODE_NAMES = {1: "degree 1 (dead end)", 2: "degree 2 (ring)", 3: "degree 3", 4: 
 
 @dataclass(frozen=True)
 class AtlasDrawing:
-    """What is drawn of an atlas, in the frame map [m]. N nodes, E edges."""
+    """The parts of an atlas to draw, in the frame map [m]. N nodes, E edges."""
 
     position_m: np.ndarray  # (N, 2)
     r_m: np.ndarray  # (N,)

@@ -1,4 +1,4 @@
-"""The beams of one scan over a map: rays, an end mark for each case, and the legend that says which is which."""
+"""The beams of one scan over a map: rays, an end mark for each case, and a legend."""
 
 from __future__ import annotations
 

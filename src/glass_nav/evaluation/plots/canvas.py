@@ -1,4 +1,4 @@
-"""An empty picture without a display, the frame of a map, and the PNG file in the end."""
+"""An empty picture without a display, the frame of a map, and the PNG file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DPI = 110
 
 @dataclass(frozen=True)
 class Picture:
-    """One picture of a report."""
+    """A picture of a report."""
 
     path: Path
     title: str

@@ -40,12 +40,12 @@ def colour(compared: Comparison, contestant: str) -> str:
 
 
 def line(compared: Comparison, contestant: str) -> Any:
-    """Its line style, as matplotlib takes it."""
+    """The line style, for matplotlib."""
     return SERIES_LINES[compared.contestants.index(contestant) % len(SERIES_LINES)]
 
 
 def mark(compared: Comparison, contestant: str) -> str:
-    """Its marker, as matplotlib names it."""
+    """The marker, for matplotlib."""
     return SERIES_MARKS[compared.contestants.index(contestant) % len(SERIES_MARKS)]
 
 

@@ -1,4 +1,4 @@
-"""Short texts beside points of a map, none printed over another: one that finds no room is left out."""
+"""Places short texts beside points of a map without overlap; a text without space is left out."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ class Tags:
 
 @dataclass(frozen=True)
 class Panel:
-    """One state of the landmarks and what it gives."""
+    """A set of landmarks and the errors that it gives."""
 
     title: str
     tags: Tags

@@ -1,4 +1,4 @@
-"""What the marks in rviz mean, as a picture: rviz has no display for a legend, but one for images.
+"""The legend of the markers in rviz, as an image: rviz has a display for images, but none for legends.
 
 It is drawn at the size of the panel in rviz/*.rviz, so that rviz need not scale it. (H, W, 3) pixels.
 """

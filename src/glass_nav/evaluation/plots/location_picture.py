@@ -22,7 +22,7 @@ SEGMENT_COLOUR, ROBOT_COLOUR = SERIES_COLOURS[1], hex_colour(LEFT_OUT_RGB)
 
 @dataclass(frozen=True)
 class LocatedScan:
-    """What is drawn; B beams, S segments."""
+    """The contents of the picture; B beams, S segments."""
 
     points_m: np.ndarray  # (B, 2) end points in the robot's frame, NaN: no answer
     case: np.ndarray  # (B,) 0..4

@@ -1,4 +1,4 @@
-"""The map below everything else that a picture shows."""
+"""The map in the background of a picture."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ _WAY_COLOUR, _EDGE_COLOUR, _NODE_COLOUR = SERIES_COLOURS[0], "#b9b9b9", "#8a8a8a
 def draw(
     path: Path, grid: GridMap, lines_m: Sequence[np.ndarray], way_m: np.ndarray, score: TopologyScore, title: str
 ) -> None:
-    """One map.
+    """Draws one map.
 
     Args:
         path: of the PNG.

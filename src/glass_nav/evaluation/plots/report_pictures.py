@@ -1,4 +1,4 @@
-"""The pictures of a report, each a PNG file with a text for those who cannot see it: which there are, and their order."""
+"""The list of the pictures of a report, each a PNG file with an alternative text."""
 
 from __future__ import annotations
 

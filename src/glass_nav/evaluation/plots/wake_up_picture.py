@@ -37,7 +37,7 @@ class Depth:
 
 @dataclass(frozen=True)
 class WakeUpStory:
-    """What happened."""
+    """A wake-up, from the start to the end of the tour."""
 
     depths: List[Depth]
     search_m: np.ndarray  # (N, 2) true path until the place was known, or the end

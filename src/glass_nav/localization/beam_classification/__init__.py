@@ -1,1 +1,1 @@
-"""What did each beam meet?  SCAN -> EXPECTED RANGES -> CASES, and what the cases say about the walls."""
+"""Classifies the beams of a scan by what they met, and learns from the cases which walls are glass."""

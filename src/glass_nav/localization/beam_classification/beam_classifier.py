@@ -1,7 +1,7 @@
-"""SCAN -> EXPECTED RANGES -> CASES -> GLASS MAP: what did each beam of a scan meet?
+"""Classifies the beams of a scan: expected ranges -> cases -> glass map.
 
-The steps of the seed document glass_localization.txt in their order, with what is learnt while driving: where in the
-walls of this map beams end, and which of its walls are glass. B beams.
+The steps of the seed document glass_localization.txt in their order, with two things that are learnt while driving:
+where in the walls of this map beams end, and which of its walls are glass. B beams.
 """
 
 from __future__ import annotations
@@ -59,6 +59,7 @@ class BeamClassifier:
     def __init__(self, params: BeamClassifierParams, grid_map: GridMap) -> None:
         self._params = params
         self.caster = RayCaster(grid_map, params.raycast_backend, params.raycast_threads)
+        self.caster.walls_at(np.zeros(0, np.int32))  # works out all normals now: that takes longer than a scan may wait
         self.known_area = KnownArea(grid_map)
         self.thickness_m = wall_thickness.wall_thickness(grid_map)  # (H * W,)
         self._opaque = np.flatnonzero(free_standing.walls(grid_map, params.vote.glass_max_thickness_m))  # flat cells
@@ -67,7 +68,7 @@ class BeamClassifier:
         self._coatings = UNKNOWN_COATINGS
 
     def reconfigure(self, params: BeamClassifierParams) -> None:
-        """Other parameters from the next scan on; what was learnt stays."""
+        """Use other parameters from the next scan on; what was learnt stays."""
         if (params.raycast_backend, params.raycast_threads) != (
             self._params.raycast_backend,
             self._params.raycast_threads,
@@ -126,7 +127,7 @@ class BeamClassifier:
         return case_votes.as_seen_from(cases, scan.ranges_m, expected, self.residuals, self._params.vote)
 
     def learn(self, scan: Scan, expected: ExpectedRanges) -> None:
-        """Where beams end in walls, and which walls let them pass; `expected` is of a trusted pose."""
+        """Learn where beams end in walls, and which walls let them pass; `expected` is of a trusted pose."""
         with np.errstate(invalid="ignore"):
             across = (scan.ranges_m - expected.line_m[0]) * expected.cos_incidence[0, 0] + expected.face_m
         met = np.isfinite(across)
@@ -175,7 +176,7 @@ class BeamClassifier:
 
     @property
     def min_linearity(self) -> float:
-        """Of the cells around a surface; below it the surface has no normal."""
+        """Linearity of the cells around a surface below which the surface has no normal."""
         return self._params.vote.normal_min_linearity
 
     def _samples(self, for_weights: bool) -> PreliminarySamples:

@@ -1,8 +1,8 @@
-"""Scan, cases -> how much of the scan speaks for the pose, and how much against it?
+"""Which beams of a scan support the pose, and which contradict it.
 
-A beam that a case explains speaks for the pose. One that ended in front of everything mapped, or behind a surface that
-lets no beam pass, speaks against it. One that ended where the map knows nothing, in an unmapped room or outdoors,
-says nothing, unless it crossed a wall on its way; it crosses a pane freely. B beams.
+A beam supports the pose if a case explains it. It contradicts the pose if it ended in front of all mapped surfaces,
+or behind a surface that lets no beam pass. A beam that ended in unmapped space, in an unmapped room or outdoors, is
+no evidence, unless it crossed an opaque wall. B beams.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ class BeamEvidence:
 
     @property
     def inlier_ratio(self) -> float:
-        """Of the beams that say something, the share that the map explains; NaN without any."""
+        """Share of the beams that the map explains, of those that are evidence; NaN without any."""
         judged = self.explained + self.short + self.passed
         return self.explained / judged if judged > 0.0 else float("nan")
 
     def without_crowd(self) -> "BeamEvidence":
-        """With at most half of the beams short: what stands around the robot hides the map, it does not contradict it."""
+        """With at most half of the beams too short: people around the robot hide the map, but do not contradict it."""
         return BeamEvidence(self.answered, self.explained, min(self.short, self.explained + self.passed), self.passed)
 
     @property
     def judged_share(self) -> float:
-        """Of the beams that returned, the share that says something."""
+        """Share of the returned beams that are evidence."""
         return (self.explained + self.short + self.passed) / max(self.answered, 1.0)
 
 

@@ -20,7 +20,7 @@ _LINE_ALPHA = 0.6
 
 
 def beam_shapes(scan: Scan, cases: BeamCases, surface: SurfaceScan, height_m: float) -> List[Shape]:
-    """Of each case: lines from the first surface to the ends of its beams, squares there, and a figure around them.
+    """Shapes of each case: lines from the first surface to the ends of its beams, squares there, an outline.
 
     A case without beams has one line of zero length, so that rviz shows the checkbox of its namespace from the first
     scan on.

@@ -1,11 +1,11 @@
-"""Expected ranges -> which echo comes back from a pane: mirrored, from behind it, or from what no map shows?
+"""Which echo a lidar reports from a pane: the mirrored one, the one from behind the pane, or one from unmapped space.
 
-Echo powers as in the lidar equation for diffuse targets: T^2 / d^2 from a surface at the range d behind the pane,
-R^2 / d^2 along the path over the mirror, with R and T by Fresnel. The strongest echo is reported. Behind a pane the map
-often ends: outdoors, or in a room that the mapper did not enter. What stands there is unknown, but something mostly
-does, and its echo competes. One thing can be said of it: walls go on. The mirror image of a wall that is perpendicular
-to the pane lies where the same wall would go on behind it, so both give the same range. The formulation is ours. B
-beams; expected ranges are those of sample 0.
+Echo powers follow the lidar equation for diffuse targets: T^2 / d^2 from a surface at the range d behind the pane,
+R^2 / d^2 along the mirrored path, with R and T from Fresnel's equations. The strongest echo is reported. Behind a
+pane the map often ends: outdoors, or in a room that the mapper did not enter. What is there is unknown, but usually
+something returns an echo. One thing is likely: walls continue. The mirror image of a wall perpendicular to the pane
+lies where the same wall would continue behind it, so both give the same range. The formulation is ours. B beams;
+expected ranges are those of sample 0.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Coatings:
     def learn(
         self, measured_m: np.ndarray, expected: ExpectedRanges, sigma_m: float, gate_m: float, gain: float
     ) -> "Coatings":
-        """After one more scan at a trusted pose; arguments as for of().
+        """Learn from a scan at a trusted pose; arguments as of of().
 
         Args:
             gate_m: across a surface; where both echoes are expected farther apart, the range tells which it was.
@@ -74,7 +74,7 @@ UNKNOWN_COATINGS = Coatings(np.log(_FREQUENT))
 
 @dataclass(frozen=True)
 class PaneEchoes:
-    """What comes back of the beams that a pane does not return itself; (B,) each."""
+    """What returns of the beams that the pane itself does not return; (B,) each."""
 
     mirrored: np.ndarray  # probability that it is a mirrored echo; 0 where nothing mirrors
     unmapped: np.ndarray  # density [1/m] at the measured range of ends behind the pane at what no map shows

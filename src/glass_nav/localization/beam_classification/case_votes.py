@@ -1,11 +1,10 @@
-"""Scan, expected -> cases, by vote: what did each beam meet?
+"""Decides the case of each beam by a vote of the preliminary samples on their expected ranges.
 
-Seed document glass_localization.txt, sec. III.A, eq. (1) and steps 3 and 4: each preliminary sample
-votes for the reference nearest to the measured range, and the case with the highest vote wins. What the
-document leaves open (it breaks off at step 1) is ours: the gate, ties, and the soft vote, in which a
-sample votes with shares, and the more the better it explains the whole scan; in which the chance of each
-case before the beam is looked at follows from the probability of glass and the physics of a pane;
-and in which neighbouring beams pull each other. N samples, B beams.
+Seed document glass_localization.txt, sec. III.A, eq. (1) and steps 3 and 4: each preliminary sample votes for the
+expected range nearest to the measured one, and the case with the most votes wins. The document breaks off at step 1,
+so the rest is ours: the gate, the ties, and the soft vote. In the soft vote a sample divides its vote among the
+cases, and counts the more the better it explains the whole scan; prior probabilities follow from the glass map and
+the physics of a pane; and neighbouring beams draw each other towards the same case. N samples, B beams.
 """
 
 from __future__ import annotations
@@ -150,7 +149,7 @@ def as_seen_from(
 def learn_coatings(
     coatings: Coatings, measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote
 ) -> Coatings:
-    """What sample 0 of `expected`, a trusted pose, says of the panes' coatings."""
+    """Learn the coating of the panes from sample 0 of `expected`, a trusted pose."""
     at_pose = _inside_walls(_of_sample_0(expected), residuals)
     return coatings.learn(measured_m, at_pose, residuals.sigma_m, gate_m(residuals, vote), vote.mirror_gain)
 

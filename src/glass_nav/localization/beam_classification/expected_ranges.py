@@ -1,9 +1,10 @@
-"""Samples -> the four ranges that each beam may measure.
+"""The four ranges that each beam may measure, from each preliminary sample.
 
-Seed document glass_localization.txt, step 2 (cut off there; the formulation is ours): one ray cast
-that goes on behind the first surface gives what a beam would measure if it returned from it (case 1),
-was mirrored at it (case 2), or passed one or two panes (cases 3 and 4). The map does not mark glass. A corner or a post without a normal is drawn up to a cell too large, and beams that graze it on the
-map may miss it: half of the samples see past it. N samples, B beams; arrays by case have 4 rows, case k in row k - 1.
+Seed document glass_localization.txt, step 2 (cut off there; the formulation is ours). One ray cast that continues
+behind the first surface gives the range of a beam that returned from that surface (case 1), was mirrored there (case
+2), or passed one or two panes (cases 3 and 4). The map does not mark glass. A corner or a post without a normal is
+drawn up to a cell too large, and beams that graze it on the map may miss it: half of the samples see past it. N
+samples, B beams; arrays by case have 4 rows, case k in row k - 1.
 """
 
 from __future__ import annotations

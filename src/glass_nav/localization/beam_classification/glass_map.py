@@ -1,9 +1,9 @@
-"""Beams that passed or ended at walls -> probability of glass for each wall cell.
+"""Learns the probability of glass of each wall cell from beams that passed it or ended there.
 
-A wall seldom lets a beam through, a pane mostly does except at normal incidence, and where a mapped object is gone
-every beam passes. Every beam that crossed a mapped surface is evidence on two questions: can the surface be seen
-through, and is it still there? Each answer is kept as log odds per cell. The seed document glass_localization.txt has
-no such memory (it decides cases scan by scan); the formulation is ours. H rows, W columns, B beams.
+A wall seldom lets a beam pass, a pane mostly does except at normal incidence, and every beam passes where a mapped
+object is gone. Each beam that crossed a mapped surface is evidence on two questions: can the surface be seen through,
+and is it still there? Both are kept as log odds per cell. The seed document glass_localization.txt has no such memory
+(it decides cases scan by scan); the formulation is ours. H rows, W columns, B beams.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class GlassMap:
         self.weigh_by(evidence)
 
     def weigh_by(self, evidence: GlassEvidence) -> None:
-        """Other evidence per crossing from now on; what was learnt before stays."""
+        """Use other evidence per crossing from now on; what was learnt stays."""
         self._evidence = evidence
         self._prior = np.log([[evidence.glass_prior / (1.0 - evidence.glass_prior)], [_THERE / (1.0 - _THERE)]])
 
@@ -170,12 +170,12 @@ class GlassMap:
         return percent
 
     def arrays(self) -> Dict[str, np.ndarray]:
-        """What was learnt, by name, for restore()."""
+        """What was learnt, as named arrays for restore()."""
         learnt = self._crossed
         return {"glass_cell": self._wall[learnt].astype(np.int32), "glass_log_odds": self._log_odds[:, learnt]}
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """What arrays() of the same map gave.
+        """Restore the arrays() of the same map.
 
         Raises:
             ValueError: it is not that.
@@ -214,7 +214,7 @@ class GlassMap:
 
     @property
     def _cells(self) -> int:
-        """Of the map with its border."""
+        """Cells of the map with its border."""
         return (self._shape[0] + 4) * self._stride
 
     def _look_at(self, wall: np.ndarray) -> None:

@@ -1,4 +1,4 @@
-"""Glass return model: how often does a beam return from a pane instead of passing it?"""
+"""Glass return model: the probability that a beam returns from a pane instead of passing it."""
 
 from __future__ import annotations
 

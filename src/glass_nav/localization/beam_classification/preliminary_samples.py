@@ -1,8 +1,8 @@
-"""Predicted pose -> preliminary samples around it: the voters of the five cases.
+"""Preliminary samples: the poses around the predicted one that vote on the case of each beam.
 
-Seed document glass_localization.txt, step 1, eq. (5): poses at regular angular intervals around the
-predicted pose. The document breaks off before it says how far; radius and heading spread come from
-the filter's own covariance here, with a floor. N samples.
+Seed document glass_localization.txt, step 1, eq. (5): poses at regular angular intervals around the predicted pose.
+The document breaks off before it says how far from it. Here radius and heading spread follow from the covariance of
+the filter, with lower limits. N samples.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Where in a wall of the map do beams end, and how widely?
+"""Learns how measured ranges differ from ray casts at walls: offset and spread.
 
-A ray cast ends at the near boundary of the first occupied cell; a beam ends where the wall is: half a
-cell deeper on a thin wall, decimetres deeper where the mapping lidar was noisy. That depth, as a share of the drawn
-thickness, and the spread around it depend on map and lidar. They are learnt while driving, across the surface, and
-every model that compares a range with the map uses them.
+A ray cast ends at the near boundary of the first occupied cell. A beam ends at the wall: half a cell deeper on a thin
+wall, decimetres deeper where the mapping lidar was noisy. That depth, as a share of the drawn thickness, and its
+spread depend on map and lidar. They are learnt while driving, perpendicular to the surface, and used by every model
+that compares ranges with the map.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class RangeResiduals:
     def learn(
         self, across_m: np.ndarray, thickness_m: np.ndarray, min_sigma_m: float, max_sigma_m: float
     ) -> "RangeResiduals":
-        """After one more scan at a trusted pose.
+        """Learn from a scan at a trusted pose.
 
         Args:
             across_m: (B,) range residuals to the near boundary times cosine of incidence.

@@ -1,7 +1,7 @@
-"""Cases, first surfaces that stand -> the scan as a costmap should see it.
+"""The scan for a costmap: beams that passed a mapped surface, or were mirrored at it, end there.
 
-A beam that passed a pane, or was mirrored at it, is cut at the pane: what is drawn on the map is an obstacle, whatever
-the lidar sees behind. Where what is drawn is gone, the next surface behind it counts. B beams.
+Every surface on the map is an obstacle, whatever the lidar sees behind it. If the surface is gone, the next one
+behind it counts. B beams.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Scans at trusted poses -> panes that the map lacks, drawn into a second map beside it.
+"""Adds panes that the map lacks to a second map beside it, from scans at trusted poses.
 
-The finder is panes/pane_finder.py. A pane that is probable enough becomes a surface for the beam classifier; the map
-itself, on which everything else relies, never changes.
+They are found by panes/pane_finder.py. A pane that is probable enough becomes a surface for the beam classifier. The
+map itself, which everything else uses, never changes.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class UnmappedPanes:
         self._drawn: Tuple[Pane, ...] = tuple(pane for pane in known if pane.probability >= use.pane_min_probability)
 
     def reconfigure(self, use: PaneUse) -> None:
-        """Other limits from the next scan on; what was found stays."""
+        """Use other limits from the next scan on; what was found stays."""
         self._use = use
 
     @property
@@ -57,7 +57,7 @@ class UnmappedPanes:
 
     @property
     def candidates(self) -> Tuple[Pane, ...]:
-        """All panes that were found, the most probable first."""
+        """All panes found, most probable first."""
         return tuple(self._finder.panes())
 
     def grid_map(self) -> GridMap:

@@ -1,7 +1,6 @@
-"""The glass map as a display draws it: squares on the walls, in a namespace each for solid, undecided and glass, and
-lines where the map lacks a pane.
+"""The glass map for displays: squares on walls (solid, undecided, glass), lines where the map lacks a pane.
 
-rviz' Map display can show `~glass_map` too, but its unknown cells cover the map below.
+The Map display of rviz can show `~glass_map` too, but its unknown cells cover the map below.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ WALL_SLACK_CELLS = 3.0  # otherwise the cells of its own wall hide a tag
 
 @dataclass(frozen=True)
 class Suggestion:
-    """One more tag and its benefit, with the earlier ones in place."""
+    """An additional tag and its benefit, with the earlier ones in place."""
 
     position_m: np.ndarray  # (2,)
     facing_rad: float

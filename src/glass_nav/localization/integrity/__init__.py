@@ -1,1 +1,1 @@
-"""Is the pose right?  The kidnap detector, and the state with its reason."""
+"""Decides whether the pose is right: kidnap detector, covariance, protection levels, and the reported state."""

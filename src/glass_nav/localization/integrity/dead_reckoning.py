@@ -1,8 +1,8 @@
-"""Last sure pose, odometry -> where the robot can be without asking the scans.
+"""Dead reckoning from the last certain pose, as a prior over places.
 
-A prior over places: where two halls look alike, scans cannot say in which of them the robot is, but the distance driven
-since the pose was last sure can. The covariance grows by the noise of odometry, linearized as in Thrun, Burgard, Fox,
-Probabilistic Robotics (2005), sec. 7.4.2. K poses.
+Where two halls look alike, scans cannot tell in which of them the robot is, but the distance driven since the last
+certain pose can. The covariance grows by the noise of odometry, linearized as in Thrun, Burgard, Fox, Probabilistic
+Robotics (2005), sec. 7.4.2. K poses.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class DeadReckoning:
     distance_m: float = 0.0  # driven since the pose was sure
 
     def carried(self, step: np.ndarray, noise: OdometryNoise, noise_scale: np.ndarray = _AS_IT_IS) -> DeadReckoning:
-        """After a step of odometry. Its noise is per step: steps are those between two updates of the particles.
+        """After an odometry step. The noise is per step, so steps are those between two updates of the particles.
 
         Args:
             step: (3,) in the robot's frame before it.

@@ -1,14 +1,14 @@
-"""Scan at a pose -> what the scan says about that pose, and what it leaves free.
+"""The covariance of the fit of a scan to the map at one pose, and the directions that it does not constrain.
 
-The covariance of the least-squares fit of the beams to the walls they ended at. Beams that ended at the same wall have
-the same error: where a map has drawn it, and how the lidar sees it. It does not average out over them, nor over scans.
-So the variance is that of a fit with clustered errors (White, Econometrica 48, 1980; Liang and Zeger, Biometrika 73,
-1986), in two sizes: each piece of a wall errs by itself, and all walls that face the same way err in common. How large
-the two are is learnt from what is left between walls and scans after each fit.
+This is the covariance of the least-squares fit of the beams to the walls at which they ended. Beams that ended at one
+wall share an error: where the map has drawn it, and how the lidar sees it. That error averages out neither over beams
+nor over scans. So the variance is that of a fit with clustered errors (White, Econometrica 48, 1980; Liang and Zeger,
+Biometrika 73, 1986) at two levels: each piece of wall has its own error, and all walls that face the same way have a
+common one. The size of both is learnt from the residuals after each fit.
 
-A linearized fit knows nothing of other places where the scan would fit as well, such as further along a corridor with
-equal doors. So the loss is also evaluated along the direction that the walls constrain least. The sums over the beams are
-in the compiled module _integrity. B beams.
+A linearized fit does not know other places where the scan would fit as well, such as farther along a corridor with
+equal doors. So the loss is also evaluated along the direction that the walls constrain least. The sums over the beams
+are computed in the compiled module _integrity. B beams.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _EDGE_CELLS = 0.29  # deviation of an edge that is drawn in whole cells
 
 @dataclass(frozen=True)
 class FitInformation:
-    """Of one scan at one pose."""
+    """The information of one scan at one pose."""
 
     covariance: np.ndarray  # (3, 3) over x [m], y [m], yaw [rad], in map
     offset: (

@@ -1,8 +1,8 @@
-"""Scans, tracked poses -> a covariance that holds at every scan, and whether the scan still fits there.
+"""The covariance of the tracked pose at every scan, and whether the scan still fits there.
 
-Four things make a pose uncertain: the spread of the particles, what the scan leaves free and the disagreement of map and
-lidar (fit_information.py), what odometry brought since the last fit (pose_covariance.py), and a scan that says something
-else now: its fit is best beside the pose, or at a place that a second scan has to confirm.
+The covariance has four parts: the spread of the particles; the fit of the scan, with the disagreement of map and
+lidar (fit_information.py); odometry since the last fit (pose_covariance.py); and the distance to a better fit, if the
+scan fits best beside the pose, or at a place that a second scan has to confirm.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class IntegrityMonitor:
         self._at_update = {}
 
     def stop(self) -> None:
-        """There is no tracked pose."""
+        """Stop: there is no tracked pose."""
         self._covariance = None
 
     def fits(self, scan: Scan, map_from_base: np.ndarray, step: Optional[np.ndarray], noise: OdometryNoise) -> bool:

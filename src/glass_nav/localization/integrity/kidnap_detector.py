@@ -1,19 +1,18 @@
-"""Scans, tracked poses -> was the robot kidnapped?  Watches the tracked pose, and finds another if it is wrong.
+"""Watches the tracked pose, detects that the robot was kidnapped or given a wrong pose, and finds the right one.
 
-The filter of a robot that was kidnapped, or given a wrong pose, converges where the scan fits best nearby, and is
-confident there. What gives it away is that scans fit worse than they used to. Then a global search runs beside it, with
-the tracked pose as a candidate that starts ahead (hypotheses/global_search.py). If the robot is merely surrounded by
-people, the scans fit nowhere else, and the pose stays. If another place is better and stays so over some distance, the
-robot is there. The formulation is ours.
+The particles of a kidnapped robot converge where the scan fits best nearby, with a small covariance. The symptom is
+that scans fit worse than before. Then a global search (hypotheses/global_search.py) runs beside the filter, with the
+tracked pose as a candidate that has a head start. If the robot is merely surrounded by people, the scans fit nowhere
+else, and the pose stays. If another place fits better over some distance, the robot is there. The formulation is
+ours.
 
-Once the pose was sure, dead reckoning since then is a prior over places, with a heavy tail: the robot may have been
-carried away. Of two halls that look alike the one that odometry leads to is right, and a tracked pose that the scans
-dragged away from it has no advantage. But when the scans say that the robot was moved without driving
-(scan_continuity.py), neither odometry nor the tracked pose says anything about where it is: then the pose is contested
-until it is ahead of all other places.
+After the pose was certain once, dead reckoning since then is a prior over places, with a heavy tail in case the robot
+was carried away. Of two halls that look alike, odometry then decides, and a tracked pose that the scans have dragged
+away from it has no advantage. If scans show that the robot was moved without driving (scan_continuity.py), neither
+odometry nor the tracked pose is evidence, and the pose is contested until it leads over all other places.
 
-A pose that was given is a claim. Odometry continues it, and scans fit near it: neither proves it. So it is compared with all
-other places from the first scan on, until it is ahead of them or none has overtaken it over some distance.
+A given pose may be wrong as well, although odometry continues it and scans fit near it. So it is compared with all
+other places from the first scan on, until it leads over them, or none has overtaken it over some distance.
 """
 
 from __future__ import annotations
@@ -59,7 +58,7 @@ _CLOSE = -1.0  # log likelihood ratio of another place to the tracked pose from 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the scans say about the tracked pose."""
+    """The verdict of the scans on the tracked pose."""
 
     fit: float  # present fit at it, 0..1; NaN: no scan has been evidence yet
     usual: float  # what it has been so far
@@ -76,7 +75,7 @@ class Verdict:
 
     @property
     def fit_there(self) -> float:
-        """Of the best candidate, 0..1; NaN: no search runs."""
+        """Fit of the best candidate, 0..1; NaN: no search runs."""
         return float("nan") if self.candidates is None else self.candidates.fit
 
     @property
@@ -130,14 +129,14 @@ class KidnapDetector:
         self._verdict = Verdict(float("nan"), self._usual, -np.inf, False, None, None)
 
     def decide_by(self, params: SearchParams) -> None:
-        """Other limits from the next scan on."""
+        """Use other limits from the next scan on."""
         self._params = params
         if self._search is not None:
             self._search.decide_by(params)
 
     @property
     def _tolerance(self) -> float:
-        """That a fit may be below the usual one without being in doubt."""
+        """How far a fit may be below the usual one without doubt."""
         return max(_DOUBT[0], _DOUBT[1] * self._spread)
 
     @property
@@ -151,14 +150,16 @@ class KidnapDetector:
         odom_from_base: np.ndarray,
         map_from_base: np.ndarray,
         dead_reckoning: Optional[DeadReckoning] = None,
+        period_s: Optional[float] = None,
     ) -> Verdict:
-        """One more scan and the tracked pose after it; with too few returns the verdict stays.
+        """Process a scan and the tracked pose after it; with too few returns the verdict stays.
 
         Args:
             scan: one revolution of a lidar.
             odom_from_base: (3,) odometry at its stamp.
             map_from_base: (3,) the tracked pose.
             dead_reckoning: from the last sure pose to this scan; None: no pose was sure yet.
+            period_s: from one scan to the next; None: not known.
         """
         step_m = self._distance(odom_from_base)
         points = global_search.evidence_points(scan)
@@ -197,7 +198,7 @@ class KidnapDetector:
             self._search_fit_m += step_m * fit
             self._calm_m = 0.0 if doubted else self._calm_m + step_m
             prior = None if dead_reckoning is None else partial(dead_reckoning.log_likelihood, least=_CARRIED_AWAY)
-            candidates = self._search.update(scan, odom_from_base, log_prior=prior)
+            candidates = self._search.update(scan, odom_from_base, log_prior=prior, period_s=period_s)
             self._verdict = self._compare(candidates, points, map_from_base, doubted, dead_reckoning, kept)
             if self._search is not None:
                 self._search.correct(map_from_base)
@@ -273,7 +274,7 @@ class KidnapDetector:
         return usual or candidates.lead > _POOR_LEAD * self._params.search_margin
 
     def _fit_at(self, points: np.ndarray, map_from_base: np.ndarray) -> Optional[float]:
-        """Of the points (B, 2) that end where the map knows something, at a pose (3,); None: they are too few."""
+        """Fit of the points (B, 2) that end in mapped space, at a pose (3,); None: too few points."""
         known = points if self._area is None else points[self._area.ends(points, map_from_base[None])[0]]
         if len(known) < global_search.MIN_BEAMS:
             return None

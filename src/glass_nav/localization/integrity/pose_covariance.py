@@ -1,12 +1,13 @@
-"""Odometry, fits of scans -> a covariance of the tracked pose that holds.
+"""Propagates the covariance of the tracked pose over odometry steps and fits of scans.
 
-The spread of the particles is no such covariance: each scan is weighed as if its errors were new, but consecutive scans
-see the same walls, and err in the same way. So information is never added up over scans: in each direction, the pose is
-as good as the better of the two says, the carried pose or the present scan. This is the ellipsoidal intersection of Sijs
-et al., State fusion with unknown correlation, Proc. European Control Conf. (2010), without its mutual mean.
+The spread of the particles underestimates the error: each scan is weighted as if its errors were independent, but
+consecutive scans see the same walls with the same errors. So information is never added up over scans. In each
+direction, the better of the predicted pose and the present scan determines the covariance. This is the ellipsoidal
+intersection of Sijs et al., State fusion with unknown correlation, Proc. European Control Conf. (2010), without its
+mutual mean.
 
-Between two fits odometry carries the pose. Its noise is the filter's model of it, scaled by how large the corrections of
-the last updates were in that model. All covariances are over x [m], y [m], yaw [rad] in map.
+Between two fits the covariance grows by the odometry noise of the filter, scaled by the size of the last corrections
+relative to that noise. All covariances are over x [m], y [m], yaw [rad] in map.
 """
 
 from __future__ import annotations

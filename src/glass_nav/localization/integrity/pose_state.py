@@ -1,8 +1,8 @@
-"""Is it lost?  Inlier ratio, covariance, verdict of the kidnap detector -> a state, a reason in words, a confidence.
+"""The reported state, its reason and the confidence, from inlier ratio, covariance and the kidnap detector.
 
-Covariance alone cannot show it: a filter that converged in the wrong corridor has a small one. What shows it is how
-much of the scan the map explains at the pose, whether scans fit as well as they used to, and whether they fit better
-elsewhere (kidnap_detector.py).
+The covariance alone is not enough: in a wrong corridor it is small as well. What counts is how much of the scan the
+map explains at the pose, whether scans fit as well as before, and whether they fit better elsewhere
+(kidnap_detector.py).
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class QualityLimits:
 
 @dataclass(frozen=True)
 class Judgement:
-    """What to think of the pose."""
+    """The reported state, reason and confidence."""
 
     state: LocalizationState
     reason: str  # in one sentence
@@ -76,7 +76,7 @@ class PoseQuality:
         self._inlier_ratio = float("nan")
 
     def limit_by(self, limits: QualityLimits) -> None:
-        """Other limits from now on; what was seen stays."""
+        """Use other limits from now on; what was learnt stays."""
         self._limits = limits
 
     def observe(self, inlier_ratio: float, judged_share: float = 1.0) -> None:
@@ -95,7 +95,7 @@ class PoseQuality:
         self._candidates = candidates
 
     def doubt(self, verdict: Verdict) -> None:
-        """What the kidnap detector says about the tracked pose."""
+        """The doubt of the kidnap detector about the tracked pose."""
         self._verdict = verdict
 
     def judge(self, best: PoseEstimate, covariance: Optional[np.ndarray] = None) -> Judgement:
@@ -147,7 +147,7 @@ class PoseQuality:
         return Judgement(LocalizationState.LOCALIZED, f"{explained}; {spread}", confidence)
 
     def _least_confidence(self) -> float:
-        """Of a pose that is reported as LOCALIZED."""
+        """Smallest confidence of a pose that is reported as LOCALIZED."""
         verdict = self._verdict
         if verdict is not None and verdict.given:
             return min(_MIN_GIVEN, self._limits.localized_min_reliability)

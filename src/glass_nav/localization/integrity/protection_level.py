@@ -1,11 +1,12 @@
-"""Covariance -> protection levels: how far off the pose may be, with a stated probability.
+"""Protection levels: bounds of the pose error that hold with a stated probability, from a covariance.
 
 The term is that of satellite navigation (RTCA DO-229): the error exceeds its protection level with at most the stated
-risk. An error above the level of a pose that is reported as LOCALIZED is misleading information.
+risk. A pose that is reported as LOCALIZED while its error exceeds the level is misleading information.
 
 Errors of scan registration have heavier tails than a normal distribution, so the multiples of the standard deviation
-are those of Student's t. Its body is scaled to the same variance. A grid map says where a wall is to half a cell, and all
-walls of one direction may be drawn off to the same side: the level of 99.9 % is at least that, however many beams agree.
+are those of Student's t, scaled to the same variance. A grid map gives the position of a wall to half a cell, and all
+walls of one direction may be drawn off to the same side. So the 99.9 % level is at least half a cell, however many
+beams agree.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ PROBABILITIES = (0.95, 0.999)
 
 
 def _multiple(probability: float) -> float:
-    """Of the standard deviation: an error of either sign is below it with that probability."""
+    """Multiple of the standard deviation that an error of either sign exceeds with the remaining probability."""
     return float(special.stdtrit(_FREEDOM, 0.5 + 0.5 * probability) * np.sqrt((_FREEDOM - 2.0) / _FREEDOM))
 
 

@@ -1,12 +1,12 @@
-"""Scan, the scan before it, odometry between them -> was the robot moved without driving?
+"""Detects from two consecutive scans and odometry that the robot was moved without driving.
 
-A robot that is carried to a place that looks like the one it left cannot tell from the map: among doors that look alike
-scans fit as well as they did. But what it sees changes at once. Where the lidar looked through a moment ago there is a
-surface now, and the other way round. Surfaces are counted and not beams: a person who comes near has many beams, but all
-else stays as it was. A few contradict each other always, where people walk and at the edges of things, more in glass;
-how many is learnt. Odometry may have missed a part of the motion, so the scans are also compared with the motion of the
-tracked pose. A break counts if the next scan contradicts the one before it as well: a crowd before the lidar makes a
-single scan look like another place. The formulation is ours. P pieces of surfaces.
+A robot that is carried to a place that looks like the one it left cannot notice it by the map: among equal doors,
+scans fit as well as before. But what it sees changes at once: there are surfaces where the lidar looked through a
+moment ago, and the other way round. Surfaces are counted and not beams, since a person nearby covers many beams while
+everything else stays. Some surfaces always contradict each other: people, edges of objects, and more so glass; the
+usual number is learnt. Odometry may have missed a part of the motion, so the scans are also compared with the motion
+of the tracked pose. A break counts only if the next scan contradicts the one before it as well, because a crowd in
+front of the lidar makes a single scan look like another place. The formulation is ours. P pieces of surfaces.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class ScanContinuity:
 
     @property
     def _limit(self) -> float:
-        """Of the excess; none until it is known what is usual."""
+        """Limit of the excess; inf until the usual one is known."""
         return max(_BREAK[0], _BREAK[1] * self._deviation) if self._scans >= _MIN_SCANS else np.inf
 
     def _excess(self, before: _View, after: _View) -> float:

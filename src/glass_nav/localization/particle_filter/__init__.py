@@ -1,1 +1,1 @@
-"""MOTION -> PROPOSAL -> WEIGHTS -> RESAMPLING -> POSE: the Monte Carlo filter."""
+"""The particle filter: motion -> proposal -> weights -> resampling -> pose."""

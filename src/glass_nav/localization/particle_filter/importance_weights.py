@@ -1,13 +1,12 @@
-"""Cases -> weights: how well does each particle explain the scan, by the beams that are understood?
+"""Weights of the particles: how well each explains the scan, by the beams whose case is known.
 
-Two modes. "ranges" is the document's (seed glass_localization.txt; Thrun et al. (2005), sec. 6.3.1): the sum
-over beams with case c > 0 of log(z_hit exp(-r^2 / (2 s^2)) + z_rand), r the residual to the expected range of
-case c by a ray cast from the particle, measured across the surface. "field" takes for r how far the beam
-ends from the nearest wall, for the beams of cases that end at one (1, 3 and 4): no ray is
-cast, all beams of a scan can be used, and mirrored or uncertain beams attract nothing, which is what
-misleads a plain likelihood field among glass. P particles, B beams; weights are natural
-logarithms, not normalised. The errors of neighbouring beams are correlated, so that B of them weigh as
-laser_independent_beams.
+Two modes. "ranges" is the document's (seed glass_localization.txt; Thrun et al. (2005), sec. 6.3.1): the sum over
+beams with case c > 0 of log(z_hit exp(-r^2 / (2 s^2)) + z_rand), where r is the difference to the expected range of
+case c, cast from the particle and measured perpendicular to the surface. In "field", r is the distance of the beam's
+end point from the nearest wall, and only the cases that end at a wall count (1, 3 and 4). This needs no ray casts, so
+all beams can be used. Mirrored and uncertain beams, which mislead a plain likelihood field among glass, have no
+effect. Errors of neighbouring beams are correlated, so all beams together count as laser_independent_beams. P
+particles, B beams; weights are natural logarithms, not normalised.
 """
 
 from __future__ import annotations
@@ -125,7 +124,7 @@ def _log_density(across_m: np.ndarray, residuals: RangeResiduals, mixture: BeamM
 
 
 def independent_beams(residuals: RangeResiduals, mixture: BeamMixture) -> float:
-    """As how many independent beams the chosen ones count.
+    """Number of independent beams as which the chosen ones count.
 
     A spread wider than the lidar's comes from the map, whose error is the same along a whole wall.
     """

@@ -1,11 +1,11 @@
-"""What happens between two scans: odometry -> particles moved, each with its own noise.
+"""Motion models: moves the particles by odometry, each with its own noise.
 
-Thrun, Burgard, Fox, Probabilistic Robotics (2005), sec. 5.4, table 5.6, as AMCL has it: turning on the
-spot has no first rotation, and driving backwards is not a turn by 180 degrees. In the plain models
-"diff" and "omni" AMCL takes the variance for a standard deviation; its "-corrected" ones do not.
-"wheels" is the glass document's base (seed glass_localization.txt, equations 2 to 4): the increments of its left and right
-wheel, each with its own noise, whose variance grows with the distance that the wheel rolls (Chong, Kleeman, Accurate
-odometry and error modelling for a mobile robot, 1997). P particles.
+Thrun, Burgard, Fox, Probabilistic Robotics (2005), sec. 5.4, table 5.6, as in AMCL: a turn in place has no first
+rotation, and driving backwards is not a turn by 180 degrees. In the plain models "diff" and "omni" AMCL uses the
+variance as a standard deviation; its "-corrected" models do not. "wheels" is the base of the glass document (seed
+glass_localization.txt, equations 2 to 4): the increments of left and right wheel have independent noise, whose
+variance grows with the distance that the wheel rolls (Chong, Kleeman, Accurate odometry and error modelling for a
+mobile robot, 1997). P particles.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Where odometry led the pose -> how probable are poses nearby, before the scan is looked at.
+"""The prior probability of poses near the odometry prediction, before the scan is used.
 
-Scans with many returns that the map lacks may fit better beside the pose than at it: the walls of a building behind the
-panes, a cabinet beside a wall. So the pose that a scan is classified at is the one that fits best only if that is the more
-probable one. A wheel may have slipped: then a wider distribution holds, with a small weight. K poses.
+Scans with many returns that the map lacks, such as a building behind the panes or a cabinet beside a wall, may fit
+best at a wrong pose. So scans are classified at the pose where they fit best only if it is also the more probable
+one. If a wheel slipped, a wider distribution with a small weight applies. K poses.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _WIDER = 2.0  # than the covariance says: what is wrong in the map errs alike in
 
 @dataclass(frozen=True)
 class OdometryPrior:
-    """Over planar poses."""
+    """A prior over planar poses."""
 
     map_from_base: np.ndarray  # (3,) where odometry led
     covariance: np.ndarray  # (3, 3) of that over x [m], y [m], yaw [rad] in map

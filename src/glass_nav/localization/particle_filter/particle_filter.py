@@ -1,6 +1,7 @@
-"""MOTION -> REGISTRATION -> PROPOSAL -> WEIGHTS -> RESAMPLING -> POSE: the particles and what happens to them.
+"""The particle filter: motion -> registration -> proposal -> weights -> resampling -> pose.
 
-Thrun, Burgard, Fox, Probabilistic Robotics (2005), ch. 8, with a proposal that looks at the scan. P particles, B beams.
+Thrun, Burgard, Fox, Probabilistic Robotics (2005), ch. 8, with a proposal distribution that uses the scan. P
+particles, B beams.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ class ParticleFilterParams:
 
 @dataclass(frozen=True)
 class Registration:
-    """Where the scan is to be classified, and where particles are drawn."""
+    """The pose at which the scan is classified, and those around which particles are drawn."""
 
     map_from_base: np.ndarray  # (3,) pose around which the beams are classified
     covariance: np.ndarray  # (3, 3) of it
@@ -83,12 +84,12 @@ class ParticleFilter:
         self._updates = 0
 
     def set_field(self, field: DistanceField) -> None:
-        """That of another map; the particles stay where they are."""
+        """Use the field of another map; the particles stay where they are."""
         self._field = field
         self._registration = ScanRegistration(field)
 
     def reconfigure(self, params: ParticleFilterParams) -> None:
-        """Other parameters from the next scan on; the particles stay."""
+        """Use other parameters from the next scan on; the particles stay."""
         self._params = params
 
     # -- starts
@@ -279,7 +280,7 @@ class ParticleFilter:
         )
 
     def _beam_information(self, beams: int, residuals: RangeResiduals) -> float:
-        """Of one of so many beams, across the wall that it ended at [1/m2]."""
+        """Information of one of so many beams, perpendicular to its wall [1/m2]."""
         independent = importance_weights.independent_beams(residuals, self._params.mixture)
         return min(1.0, independent / beams) / residuals.sigma_m**2
 

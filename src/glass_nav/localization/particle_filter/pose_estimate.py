@@ -1,7 +1,6 @@
-"""Weights -> pose: mean and covariance of the best cluster of particles.
+"""The estimated pose: mean and covariance of the best cluster of particles.
 
-Other clusters are other hypotheses: they belong neither to the mean nor to the
-covariance. P particles.
+Other clusters are other hypotheses and are not included. P particles.
 """
 
 from __future__ import annotations

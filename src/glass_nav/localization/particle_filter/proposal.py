@@ -1,10 +1,9 @@
-"""Odometry and scan -> where to put the particles.
+"""Draws particles where odometry and scan suggest.
 
-A lidar measures the pose far more precisely than odometry does, so particles drawn from odometry alone
-mostly land where the scan rules them out. Some of them is therefore drawn around the poses at which the
-scan fits (the improved proposal of Grisetti, Stachniss, Burgard (2007), as a mixture as in Thrun et al.
-(2005), sec. 8.3.5), and every particle carries the ratio of target to proposal density, so that the
-posterior stays the filter's and not the aligner's. P particles, K alignments.
+A lidar measures the pose far more precisely than odometry, so most particles drawn from odometry alone are ruled out
+by the scan. Some are therefore drawn around the poses at which the scan fits (the improved proposal of Grisetti,
+Stachniss, Burgard (2007), as a mixture as in Thrun et al. (2005), sec. 8.3.5). Every particle is weighted by the
+ratio of target to proposal density, so that the posterior remains that of the filter. P particles, K alignments.
 """
 
 from __future__ import annotations

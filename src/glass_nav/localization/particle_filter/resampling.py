@@ -1,7 +1,7 @@
-"""Weights -> which particles are drawn, and how many are enough.
+"""Resampling, and the number of particles.
 
-Low-variance resampling: Thrun, Burgard, Fox, Probabilistic Robotics (2005), table 4.4. Number of
-particles: KLD sampling, Fox, Adapting the Sample Size in Particle Filters (2003). P particles.
+Low-variance resampling: Thrun, Burgard, Fox, Probabilistic Robotics (2005), table 4.4. Number of particles: KLD
+sampling, Fox, Adapting the Sample Size in Particle Filters (2003). P particles.
 """
 
 from __future__ import annotations

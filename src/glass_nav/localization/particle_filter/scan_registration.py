@@ -1,16 +1,16 @@
-"""Predicted particles, scan -> the poses nearby where the scan fits: where the cases are voted on.
+"""Registers the scan near the predicted particles: the poses at which the cases are voted on.
 
-The seed document assumes a good prediction (assumption i). Real odometry violates it: wheels slip, an old log steps a
-metre and 10 degrees between scans, a turn of 80 degrees goes unnoticed. So the scan is first aligned from preliminary
-samples over the predicted spread. If it fits much worse there than recent scans did, wider spreads are tried. A place
-that odometry did not lead to is accepted only if the next scan fits there too, and still not where odometry leads: a
-crowd around the robot may look like another room once.
+The seed document assumes a good prediction (assumption i). Real odometry violates it: wheels slip, an old log moves a
+metre and 10 degrees between scans, a turn of 80 degrees is missed. So the scan is first aligned from preliminary
+samples over the predicted spread. If it fits much worse there than recent scans did, wider spreads are tried. A pose
+that odometry does not lead to is accepted only if the next scan fits there too, and again not where odometry leads,
+since a crowd around the robot may look like another room for one scan.
 
-Where the scan leaves a direction free, as in a hall whose ends are out of sight, odometry is the evidence along it. That
-a wheel slipped is considered only if the scan says so: it does not fit where odometry leads, and does nearby.
+Along directions that the scan does not constrain, as in a hall whose ends are out of sight, odometry decides. Wheel
+slip is considered only if the scan does not fit at the predicted pose, but nearby.
 
-A scan that hardly fits at all, as where the map lacks what is around the robot, fits best at walls that have nothing to
-do with it: it is no evidence, until a scan fits about as well as scans have fitted on the whole.
+A scan that fits nowhere, because the map lacks what is around the robot, would be drawn to unrelated walls. It is
+ignored until scans fit about as well as they have on the whole.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class ScanRegistration:
         points_m: np.ndarray,
         scale_m: float,
     ) -> Alignment:
-        """At most 4 distinct poses, the best first.
+        """Find at most 4 distinct poses, best first.
 
         Args:
             mean, covariance: (3,), (3, 3) of the predicted cluster.

@@ -204,7 +204,7 @@ def judged(distance_m: np.ndarray, neighbourhood_m: float, outlier_m: float, fit
 
 @dataclass(frozen=True)
 class _Pull:
-    """Where each point pulls the pose."""
+    """The displacement by each point."""
 
     distance_m: np.ndarray  # (N,) from its segment
     normal_x: np.ndarray  # (N,) of its segment, in map

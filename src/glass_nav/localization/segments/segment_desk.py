@@ -1,4 +1,4 @@
-"""A scan, a rough pose, a map -> the answer of the service ~locate. The wall segments of a map are found once."""
+"""Answers the service ~locate. The wall segments of a map are extracted once."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class LocateAnswer:
 
     @property
     def text(self) -> str:
-        """One sentence for people."""
+        """The answer in one sentence."""
         return self.refusal or f"free: {segment_locator.free_in_words(self.correction)}"
 
 

@@ -1,4 +1,4 @@
-"""What the driver sees and does for rviz: native markers, one namespace for each thing to tick off.
+"""The markers of the driver for rviz, with a namespace for each kind.
 
 Namespaces: `local_edges` and `local_nodes`, the Voronoi graph around the robot; `meetpoint`, where the robot stands or
 which it left, with its edges; `way`, along which it drives; `route`, to a goal in the map; `state`, in words. Colours
@@ -38,7 +38,7 @@ def driver_markers(
     odom_frame: str,
     map_frame: str,
 ) -> MarkerArray:
-    """All of them; namespaces without anything are cleared.
+    """All markers; namespaces without content are cleared.
 
     Args:
         driver: with its graph, meetpoint and way, in a frame of its own.

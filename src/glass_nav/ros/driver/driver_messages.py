@@ -1,4 +1,4 @@
-"""What the driver reports, and is asked for <-> messages."""
+"""Conversions of the reports and tasks of the driver to and from messages."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SEARCH_STATES = {getattr(TopologyStatus, state.name): state for state in Search
 
 
 def meetpoint_msg(arrival: Arrival, frame: str) -> MeetpointMsg:
-    """Where the robot stands."""
+    """The message about the meetpoint where the robot stands."""
     seen = arrival.meetpoint
     odom_x, odom_y, odom_yaw = arrival.odom_from_base.tolist()
     return MeetpointMsg(
@@ -69,7 +69,7 @@ def visits_msg(report: VisitReport, frame: str) -> NodeVisits:
 
 
 def status_msg(status: DriveStatus, frame: str) -> DriverStatus:
-    """With the constant of its phase."""
+    """The status message, with the constant of the phase."""
     return DriverStatus(
         header=conversions.header(status.stamp_ns, frame),
         state=getattr(DriverStatus, status.phase.name),

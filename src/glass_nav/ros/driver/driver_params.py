@@ -15,7 +15,7 @@ INTERNAL, MOVE_BASE = "internal", "move_base"
 
 @dataclass(frozen=True)
 class DriverNodeParams:
-    """What the node itself needs. Units by REP 103."""
+    """Parameters of the node itself. Units by REP 103."""
 
     atlas: str = ""  # atlas.json, its folder, or the name of a shipped one: for goto_node
     backend: str = INTERNAL  # of goto_node; or move_base
@@ -35,7 +35,7 @@ class DriverNodeParams:
         self.of_scans("scan")  # checks the frames
 
     def of_scans(self, topic: str) -> LocalizationNodeParams:
-        """For the input of scans of one topic."""
+        """Parameters of the scan input for one topic."""
         return LocalizationNodeParams(
             odom_frame_id=self.odom_frame_id,
             base_frame_id=self.base_frame_id,
@@ -45,13 +45,13 @@ class DriverNodeParams:
         )
 
     def input_names(self, localization: str) -> InputNames:
-        """For people; with the name of the topic of the localization's status."""
+        """Names of the inputs for messages, given the topic of the localization's status."""
         return InputNames(self.odom_frame_id, self.base_frame_id, self.global_frame_id, localization)
 
 
 @dataclass(frozen=True)
 class DriverParams:
-    """Everything the node reads, one flat set of names."""
+    """All parameters of the node, one flat set of names."""
 
     node: DriverNodeParams = field(default_factory=DriverNodeParams)
     deskew: Deskew = field(default_factory=Deskew)

@@ -27,7 +27,7 @@ class MoveBase:
 
     @property
     def is_there(self) -> bool:
-        """Its action server is connected."""
+        """Whether the action server is connected."""
         return bool(self._client.wait_for_server(rospy.Duration(1e-3)))
 
     def was_heard(self) -> bool:

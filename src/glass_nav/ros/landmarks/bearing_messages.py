@@ -1,4 +1,4 @@
-"""LandmarkBearings <-> the types of the core."""
+"""Conversions of LandmarkBearings to and from the types of the core."""
 
 from __future__ import annotations
 

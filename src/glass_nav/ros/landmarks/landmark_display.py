@@ -19,7 +19,7 @@ ARROW_M, LINE_M, LETTER_M = 0.6, 0.03, 0.35
 
 
 def landmark_markers(landmarks: LandmarkMap, frame: str) -> MarkerArray:
-    """Their positions, directions and ids; namespaces landmarks and landmark_ids."""
+    """Positions, directions and ids of landmarks; namespaces landmarks and landmark_ids."""
     markers = []
     for number, name in enumerate(landmarks.ids):
         x, y = landmarks.positions_m[number]

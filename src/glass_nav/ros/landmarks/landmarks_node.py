@@ -72,7 +72,7 @@ class NodeParams:
 
 @dataclass(frozen=True)
 class LandmarksNodeParams:
-    """Everything the node reads, one flat set of names."""
+    """All parameters of the node, one flat set of names."""
 
     node: NodeParams = field(default_factory=NodeParams)
     fixes: FixParams = field(default_factory=FixParams)
@@ -169,7 +169,7 @@ class LandmarksNode:
         return ""
 
     def _take(self, msg: LandmarkBearingsMsg) -> None:
-        """One message whose transforms are available: a fix, or why there is none."""
+        """Processes a message whose transforms are available: a fix, or why there is none."""
         mounting = conversions.mounting_from_transform(
             self._tf.lookup_transform(
                 self._p.base_frame_id, conversions.frame_id(msg.header.frame_id), rospy.Time(0)

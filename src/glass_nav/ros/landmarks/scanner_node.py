@@ -25,7 +25,7 @@ from glass_nav.sensing.serial_emitter import EmitterError, SerialEmitter
 
 @dataclass(frozen=True)
 class PortParams:
-    """Where the device is."""
+    """The serial port of the device."""
 
     port: str = "/dev/ttyUSB0"
     baud: int = 9600
@@ -59,7 +59,7 @@ class ScannerNode:
         self._bearings = rospy.Publisher("landmark_bearings", LandmarkBearings, queue_size=10)
 
     def run(self, ending: threading.Event) -> None:
-        """Until ROS shuts down or ending is set. EmitterError if the device fails."""
+        """Searches until ROS shuts down or ending is set. EmitterError if the device fails."""
         way = 1
         with self._emitter as emitter:
             while not (rospy.is_shutdown() or ending.is_set()):

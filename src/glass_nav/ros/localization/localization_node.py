@@ -205,7 +205,7 @@ class LocalizationNode:
         return SetMapResponse(success=True)
 
     def _scan_and_map(self, request: LocateRequest) -> Tuple[Scan, GridMap]:
-        """Of the service ~locate."""
+        """Scan and map for the service ~locate."""
         scan, grid_map = self._session.scan, self._session.grid_map
         if request.scan.ranges:
             raw = conversions.raw_scan_from_msg(request.scan)
@@ -261,7 +261,7 @@ class LocalizationNode:
     # -- scans
 
     def _step(self, raw: RawScan) -> None:
-        """One scan through the filter."""
+        """Process one scan."""
         try:
             placed = self._scans.place(raw)
         except ScanError as err:
@@ -319,7 +319,7 @@ class LocalizationNode:
         self._session.restart(why, self._clock.now_s)
 
     def _report(self) -> None:
-        """Once a second: publish diagnostics, and log what is missing if no scan is being used."""
+        """Once a second: publish diagnostics, and log missing inputs while no scan is used."""
         if time.monotonic() < self._next_report_s:
             return
         self._next_report_s = time.monotonic() + 1.0
@@ -361,7 +361,7 @@ class LocalizationNode:
 
 
 def _keep_on_server(saved: SavedPose) -> None:
-    """As AMCL does, but with one request for all six; OSError without a parameter server."""
+    """Stores the pose as AMCL does, but with one request for all six; OSError without a parameter server."""
     requests = MultiCall(ServerProxy(rosgraph.get_master_uri()))
     pose = zip(("pose_x", "pose_y", "pose_a"), saved.map_from_base)
     covariance = zip(("cov_xx", "cov_yy", "cov_aa"), np.diag(saved.covariance))

@@ -1,4 +1,4 @@
-"""The private parameters of the localization node: the parameter server -> validated dataclasses.
+"""The private parameters of the localization node, from the parameter server to validated dataclasses.
 
 Names and defaults are AMCL's where AMCL has the parameter. Parameters of AMCL without a meaning for
 this filter are removed first, so that launch files written for amcl load. Other unknown names are rejected with the
@@ -91,7 +91,7 @@ class LocalizationNodeParams:
 
 @dataclass(frozen=True)
 class LocalizationParams:
-    """Everything the node reads: its own parameters and the filter's, one flat set of names."""
+    """All parameters of the node, its own and the filter's, one flat set of names."""
 
     node: LocalizationNodeParams = field(default_factory=LocalizationNodeParams)
     start: StartPose = field(default_factory=StartPose)
@@ -105,7 +105,7 @@ class LocalizationParams:
 
     @property
     def session(self) -> SessionParams:
-        """Those that the session begins with."""
+        """Parameters of the session."""
         return SessionParams(self.localizer, self.start, self.rules, self.pose_file, self.panes_file, self.method)
 
 

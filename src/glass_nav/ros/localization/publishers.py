@@ -1,4 +1,4 @@
-"""All that the localization node publishes, and when: tf, pose, particles, status, cases, surfaces, displays."""
+"""The publishers of the localization node: tf, pose, particles, status, cases, surfaces, displays."""
 
 from __future__ import annotations
 

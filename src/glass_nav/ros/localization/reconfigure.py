@@ -32,7 +32,7 @@ Apply = Callable[[Dict[str, Any]], None]
 
 
 class Explained(NamedTuple):
-    """What a parameter file of ours says of a parameter."""
+    """The explanation of a parameter in a file of config/."""
 
     section: str
     comment: str
@@ -97,7 +97,7 @@ class ReconfigureServer:
 
 
 def description_msg(values: Mapping[str, Any], explained: Mapping[str, Explained]) -> ConfigDescription:
-    """What can be changed, for the clients: types, limits, choices, groups."""
+    """The description for clients: types, limits, choices, groups."""
     limits, choices = params.limits(LocalizationParams), params.choices(LocalizationParams)
     bounds = {
         name: tuple(type(value)(limit) for limit in limits.get(name, _UNBOUNDED[type(value)]))
@@ -145,7 +145,7 @@ def _group(name: str, number: int) -> Dict[str, Any]:
 
 
 def _edit_method(name: str, choices: Sequence[str]) -> str:
-    """For rqt_reconfigure: the possible values, as the Python text that it evaluates."""
+    """The possible values for rqt_reconfigure, as Python text that it evaluates."""
     return str(
         {
             "enum": [{"name": choice, "value": choice, "type": "str", "description": ""} for choice in choices],

@@ -1,4 +1,4 @@
-"""tf -> a warning if two nodes send one of the transforms that the localization depends on."""
+"""Warns if two nodes send one of the transforms that the localization depends on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Encoder counts from their topics -> odometry, in place of tf's; sensing/wheel_odometry.py adds them up."""
+"""Odometry from topics with encoder counts, in place of tf; sensing/wheel_odometry.py integrates them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class WheelTransforms(TfTransforms):
             rospy.Subscriber(topic, rospy.AnyMsg, self._taker(number), queue_size=100, tcp_nodelay=True)
 
     def reconfigure(self, p: LocalizationParams) -> None:
-        """Another distance between the wheels from now on."""
+        """Use another distance between the wheels from now on."""
         with self._lock:
             self._odometry.wheel_base_m = p.localizer.odometry.wheel_base_m
 
@@ -46,7 +46,7 @@ class WheelTransforms(TfTransforms):
 
     @property
     def odometry_name(self) -> str:
-        """Of its topics, in words."""
+        """The names of the topics, for messages."""
         return " and ".join(rospy.resolve_name(topic) for topic in self._p.wheels.wheel_topics)
 
     def has_odometry(self) -> bool:

@@ -1,4 +1,4 @@
-"""A launch file that starts amcl -> the parameters of localization_node, each line explained. Needs no roscore.
+"""Reads the parameters of amcl from a launch file and translates them, with a comment on each. No roscore.
 
 roslaunch's own loader reads the file, so includes, args, groups, rosparam files and substitutions mean what they mean
 on the robot. Started by `glass_nav params` as a process of its own:
@@ -60,7 +60,7 @@ class LaunchError(ValueError):
 
 @dataclass(frozen=True)
 class AmclNode:
-    """One node of a launch file, as roslaunch would start it."""
+    """A node of a launch file, as roslaunch would start it."""
 
     name: str
     program: str  # package/type
@@ -94,7 +94,7 @@ class _Loader(roslaunch.xmlloader.XmlLoader):  # type: ignore[misc]
 
 
 def _reason(err: Exception) -> str:
-    """What an error of roslaunch says, in one line."""
+    """The text of a roslaunch error, in one line."""
     if isinstance(err, rospkg.ResourceNotFound):
         return f"$(find {err.args[0]}): there is no such package"
     if isinstance(err, KeyError):

@@ -68,7 +68,7 @@ def _play(arguments: List[str], ending: threading.Event) -> int:
 
 
 def _part(arguments: List[str]) -> Optional[PlayedPart]:
-    """What will be played; None if a bag cannot be read: rosbag play says why."""
+    """The part that will be played; None if a bag cannot be read (rosbag play says why)."""
     spans_s = []
     try:
         for path in play_progress.bags_of(arguments):

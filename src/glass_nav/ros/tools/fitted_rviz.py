@@ -1,4 +1,4 @@
-"""fitted_rviz: starts rviz with all of the map in sight.
+"""fitted_rviz: starts rviz with the whole map in view.
 
 Usage: fitted_rviz CONFIG.rviz, with the arguments of rviz after it. Waits for the topic map, sets scale and middle of the
 view of the configuration, which must be TopDownOrtho, and becomes rviz.

@@ -1,4 +1,4 @@
-"""The last scans, placed when they are asked for: by the stamp of a meetpoint, or the newest."""
+"""The last scans, placed on request: by the stamp of a meetpoint, or the newest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The atlas, the candidates and their forest for rviz: native markers, a namespace for each that can be hidden.
+"""The markers of the topology node for rviz, with a namespace for each kind.
 
 Namespaces: `atlas` (edges) and `nodes`; candidates as arrows in `searching`, `tentative`, `confirmed` or `ambiguous`,
 by the state of the search; `forest`, the paths of the candidates; `text`; and those of topology/search_scene.py:

@@ -1,4 +1,4 @@
-"""Messages of the topology node <-> observations and estimates."""
+"""Conversions of the messages of the topology node to and from observations and estimates."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def turn_choice_msg(turn: Turn, frame: str) -> TurnChoiceMsg:
 
 
 def status_msg(status: SearchStatus, frame: str) -> TopologyStatus:
-    """With an estimate also depth, candidates and turn; CONFIRMED also the relation of the frames."""
+    """The status message; with an estimate also depth, candidates and turn; CONFIRMED also the relation of frames."""
     msg = TopologyStatus(
         header=conversions.header(status.stamp_ns, frame),
         state=status.state.code,

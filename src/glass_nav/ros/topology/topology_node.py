@@ -148,7 +148,7 @@ class TopologyNode:
     # -- events
 
     def _look(self) -> None:
-        """At the newest scan."""
+        """Process the newest scan."""
         if self._scans is None or not self._session.is_looking:
             return
         placed = self._scans.newest(self._base_frame)
@@ -169,7 +169,7 @@ class TopologyNode:
         self._carry_out(self._session.meetpoint(self._with_scan(meetpoint, msg)))
 
     def _with_scan(self, meetpoint: observations.Meetpoint, msg: Meetpoint) -> observations.Meetpoint:
-        """With the scan of its stamp, if that can be used."""
+        """The meetpoint with the scan of its stamp, if that can be used."""
         if self._scans is None or not self._session.uses_scans or not meetpoint.stamp_ns:
             return meetpoint
         scan, why_not = self._scans.at(msg.header.stamp, msg.header.frame_id)

@@ -12,7 +12,7 @@ from glass_nav.topology.search_session import SessionParams
 
 @dataclass(frozen=True)
 class TopologyNodeParams:
-    """What the node itself needs."""
+    """Parameters of the node itself."""
 
     atlas: str = ""  # atlas.json, atlas.npz, the folder of one, the name of a shipped one, or map: made
     global_frame_id: str = "map"
@@ -33,7 +33,7 @@ class TopologyNodeParams:
 
 @dataclass(frozen=True)
 class TopologyParams:
-    """Everything the node reads, one flat set of names."""
+    """All parameters of the node, one flat set of names."""
 
     node: TopologyNodeParams = field(default_factory=TopologyNodeParams)
     session: SessionParams = field(default_factory=SessionParams)

@@ -45,14 +45,14 @@ class Ragged:
 
     @classmethod
     def of(cls, rows: Sequence[np.ndarray], width: int) -> "Ragged":
-        """From arrays (n_i, width)."""
+        """Concatenates arrays (n_i, width)."""
         offsets = np.concatenate([[0], np.cumsum([len(row) for row in rows], dtype=np.int64)]).astype(np.int64)
         values = [np.asarray(row, float).reshape(-1, width) for row in rows]
         return cls(np.concatenate(values) if values else np.zeros((0, width)), offsets)
 
     @classmethod
     def empty(cls, rows: int, width: int) -> "Ragged":
-        """That number of empty rows."""
+        """This number of empty rows."""
         return cls(np.zeros((0, width)), np.zeros(rows + 1, np.int64))
 
     def __len__(self) -> int:

@@ -1,4 +1,4 @@
-"""GridMap -> Atlas: the generalized Voronoi graph of a map, measured as a robot would.
+"""Builds an atlas from a map: its generalized Voronoi graph, measured as a robot would.
 
 Seed document: global_localization_procedure.txt, "Uniqueness in the Hierarchical Atlas". The standard deviations say
 how far the building may differ from its map: a node may be off by about a cell, by the spread of the meetpoints that
@@ -57,7 +57,7 @@ Watch = Callable[
 
 @contextmanager
 def unwatched(what: str, steps: int) -> Iterator[Callable[[], None]]:
-    """Nobody waits."""
+    """Ignores progress."""
     yield lambda: None
 
 

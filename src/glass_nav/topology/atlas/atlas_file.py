@@ -1,4 +1,4 @@
-"""Files -> Atlas and back: atlas/NAME/atlas.json for people and editors, atlas.npz for atlases of many nodes.
+"""Reads and writes atlases: atlas/NAME/atlas.json for people and editors, atlas.npz for many nodes.
 
 Each reader checks its format, and Atlas the rules that a format cannot express.
 """

@@ -1,4 +1,4 @@
-"""atlas.json: a row for each node and each edge, for people and editors.
+"""Reads and writes atlas.json: a row for each node and each edge, for people and editors.
 
 atlas/atlas.schema.json is its JSON Schema; the checks here are those of the schema. Lengths are kept to a tenth of a
 millimetre, angles to a hundredth of a milliradian.
@@ -32,7 +32,7 @@ Row = Dict[str, Any]
 
 
 def text_of(atlas: Atlas) -> str:
-    """One node or edge per line, so that two versions can be compared by eye."""
+    """The atlas as text, one node or edge per line, so that versions can be compared."""
     head = {
         "$schema": "../atlas.schema.json",
         "format": FORMAT,

@@ -1,4 +1,4 @@
-"""atlas.npz: the arrays of an atlas as they are, every bit."""
+"""Reads and writes atlas.npz: the arrays of an atlas, exact to the bit."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _NPZ_MISSED = "visits_node_missed"  # files of older versions lack it
 
 
 def arrays_of(atlas: Atlas) -> Dict[str, np.ndarray]:
-    """By the names in the file."""
+    """The arrays by their names in the file."""
     nodes, edges, darts, visits = atlas.nodes, atlas.edges, atlas.darts, atlas.visits
     return {
         **_free_space_arrays(atlas.source.free_space),

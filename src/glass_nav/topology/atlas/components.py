@@ -1,4 +1,4 @@
-"""Which nodes of a graph hang together."""
+"""The connected components of a graph."""
 
 from __future__ import annotations
 

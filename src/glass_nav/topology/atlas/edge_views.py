@@ -1,4 +1,4 @@
-"""GridMap, lines through it -> the line segments of walls that a robot sees along each line, in each direction.
+"""The wall segments that a robot sees along each edge, in each direction.
 
 These are the two directional feature maps per edge of the seed document global_localization_procedure.txt. A robot is
 put at equal distances along the line, looking along it; rays find the segments that are seen, and their visible parts.

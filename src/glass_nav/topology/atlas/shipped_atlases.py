@@ -1,4 +1,4 @@
-"""A name -> the file of an atlas: those in atlas/ of the package."""
+"""Finds the file of a shipped atlas in atlas/ by name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""GridMap -> the generalized Voronoi graph of its free space: meetpoints, and the edges between them.
+"""The generalized Voronoi graph of the free space of a map: meetpoints, and the edges between them.
 
 The graph is that of the cells that bound free space: Delaunay triangles of their centres, whose circumcentres are
 equidistant from three of them, joined where two triangles share a side. Ridges between neighbouring cells of one wall

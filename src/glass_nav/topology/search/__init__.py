@@ -1,1 +1,1 @@
-"""MEETPOINT -> FOREST -> VOTE -> TURN: which places of the atlas are still possible?"""
+"""The search for the robot in an atlas: meetpoint -> search forest -> vote -> turn."""

@@ -1,14 +1,14 @@
-"""Candidates -> proof that no turn can tell them apart, or the turns that do.
+"""Proves that no turns can tell candidates apart, or finds turns that do.
 
-Two darts are indistinguishable if robots that take the same turns from them see the same for ever. The search runs over
-pairs of darts. It begins with the pairs in question and follows every turn. If all pairs that it reaches are alike, the
-first ones are proved indistinguishable; the first pair that is not alike gives the shortest sequence of turns that
-tells them apart. Two darts are alike if a robot that measures without error would not rule out one at the other
-(Matcher.alike_along).
+Two darts are indistinguishable if robots that take the same turns from them always see the same. The search runs over
+pairs of darts, beginning with the candidates, and follows every turn. If all pairs that it reaches are alike, the
+first ones are proved indistinguishable. Otherwise the first pair that is not alike gives the shortest sequence of
+turns that tells them apart. Two darts are alike if a robot without measurement errors would not rule out one of them
+at the other (Matcher.alike_along).
 
-If a and b, and b and c are proved indistinguishable, so are a and c by assumption; if a and c differ after all, a turn
-splits the candidates and no proof is needed. So a symmetric floor of n darts costs about n pairs and not n^2.
-C candidates, P pairs.
+If a and b, and b and c are proved indistinguishable, so are a and c by assumption; if a and c differ after all, a
+turn splits the candidates and no proof is needed. So a symmetric floor of n darts costs about n pairs and not n^2. C
+candidates, P pairs.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MAX_PAIRS = 200_000  # of one search; a torus of 40,000 darts takes 40,000 pairs
 
 @dataclass(frozen=True)
 class Proof:
-    """What the search over pairs found."""
+    """The result of the search over pairs."""
 
     indistinguishable: bool  # all candidates are
     ranks: Optional[List[int]]  # turns that tell two of them apart; None: proved, or the search was stopped

@@ -1,10 +1,11 @@
-"""MEETPOINT -> FOREST -> VOTE -> TURN: where in the atlas is a robot that woke up somewhere?
+"""Localizes a robot in an atlas: meetpoint -> search forest -> vote -> turn.
 
-Seed document: global_localization_procedure.txt. `vote_mode: seed` with `confirm_edges: 0` and `use_scans: false` is its
-procedure: no edge angles, no detection errors, done at the first single candidate. Its rule alone claims a place for
-many robots that are not in the atlas at all; the default asks for edges that confirm it, proves ambiguity instead of
-driving for ever, and answers LOST rather than guess. Where there are scans and odometry, scans and forest share one
-belief (joint_belief.py), which finds most robots before their first edge; the forest goes on where places look alike.
+Seed document: global_localization_procedure.txt. `vote_mode: seed` with `confirm_edges: 0` and `use_scans: false` is
+its procedure: no edge angles, no detection errors, done at the first single candidate. This rule alone reports a
+place even for many robots that are not in the atlas. By default, edges must confirm the place, ambiguity is proved
+instead of driving for ever, and the result is LOST rather than a guess. With scans and odometry, scans and forest
+share one belief (joint_belief.py), which finds most robots before their first edge; the forest helps where places
+look alike.
 """
 
 from __future__ import annotations
@@ -90,11 +91,11 @@ class AtlasLocalizer:
 
     @property
     def belief(self) -> Optional[Belief]:
-        """Of scans and forest; None: no scan has been evidence yet."""
+        """The belief of scans and forest; None: no scan has been evidence yet."""
         return None if self._joint is None else self._joint.belief
 
     def begin(self) -> None:
-        """What was known is forgotten; scans may come before the first meetpoint."""
+        """Start a new search; scans may come before the first meetpoint."""
         self._estimate, self._edges_before = None, 0
         if self._joint is not None:
             self._joint.forget()
@@ -161,7 +162,7 @@ class AtlasLocalizer:
         return self.map_from_base(estimate.dart[:most])
 
     def node(self, estimate: SearchEstimate) -> Optional[int]:
-        """Of the first candidate; None without one, as where only scans found the place."""
+        """Node of the first candidate; None without one, as when only scans found the place."""
         return int(self._atlas.darts.node[estimate.dart[0]]) if len(estimate.dart) else None
 
     @property

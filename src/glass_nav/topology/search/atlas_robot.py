@@ -1,8 +1,7 @@
-"""A simulated robot that lives in an atlas: it reports meetpoints and edges, and drives as the search says.
+"""A simulated robot in an atlas, without coordinates: reports meetpoints and edges, and takes the chosen turns.
 
-It has no coordinates. It measures what its sensors would show of the atlas (lengths, chords, equidistances, angles) by
-dead reckoning, with normally distributed errors; a detector that fails joins and splits edges. For a robot outside the
-atlas, the parts of the atlas are shuffled.
+It measures what the atlas says (lengths, chords, equidistances, angles) by dead reckoning, with normally distributed
+errors. Detection errors join and split edges. For a robot outside the atlas, the parts of the atlas are shuffled.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ class TrialParams:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What can be measured; nodes, edges and darts as in the atlas."""
+    """The quantities that can be measured; nodes, edges and darts as in the atlas."""
 
     atlas: Atlas  # for its topology
     r_m: np.ndarray  # (N,)
@@ -58,7 +57,7 @@ class Surroundings:
 
     @classmethod
     def of(cls, atlas: Atlas) -> "Surroundings":
-        """Those of a robot in the atlas."""
+        """The surroundings of a robot in the atlas."""
         darts, position = atlas.darts, atlas.nodes.position_m
         there = twin(np.arange(len(darts)))
         step = position[darts.node[there]] - position[darts.node]
@@ -101,7 +100,7 @@ class AtlasRobot:
         self.detection_errors = 0  # so far
 
     def wake_up(self, dart: Optional[int] = None) -> Meetpoint:
-        """With a dart as the reference edge; without one, at any of the atlas."""
+        """Wake up with a dart as the reference edge; without one, at any dart of the atlas."""
         self.dart = int(self._rng.integers(len(self._world.chord_bearing_rad))) if dart is None else dart
         self.on_edge = 0.0
         return self._at_node()

@@ -1,4 +1,4 @@
-"""What is known of the robot's place: the poses that are possible, their shares, and what speaks for each."""
+"""The belief about the robot's place: possible poses, their probabilities, and the evidence for each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A place that a search claims, from its first single candidate on, and the edges that confirm it."""
+"""The candidate place of a search, from its first single candidate on, and the edges that confirm it."""
 
 from __future__ import annotations
 

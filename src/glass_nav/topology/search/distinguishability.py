@@ -1,7 +1,7 @@
-"""Which places of an atlas cannot be told apart, and how many edges a robot needs to find its place.
+"""Which places of an atlas are indistinguishable, and how many edges a robot needs to find its place.
 
-A robot without errors wakes up at every dart in turn and searches. If the search ends with several places, these are
-indistinguishable (ambiguity.py has the proof), and so are the places where such robots woke up.
+The search of a robot without measurement errors is simulated from every dart. If it ends with several places, these
+are indistinguishable (ambiguity.py has the proof), and so are the starts of such searches.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from glass_nav.vocabulary import SearchState
 
 @dataclass(frozen=True)
 class Distinguishability:
-    """Of the darts that robots woke up at."""
+    """The result for the darts at which robots woke up."""
 
     starts: np.ndarray  # (S,) darts
     edges: np.ndarray  # (S,) driven until the search ended; those that confirm included

@@ -1,15 +1,15 @@
-"""Wall segments seen along an edge, those of the atlas along a path -> do they contradict each other?
+"""Compares the wall segments seen along an edge with those of the atlas: how much do they contradict each other?
 
 The feature maps of the seed document global_localization_procedure.txt are one more test of a candidate. The document
-does not define how to compare them; the formulation is ours. In glass the maps need not be equal: where beams pass a
-pane, the pane is not seen, and the walls behind it are. But glass never shows a wall where the atlas has free space in
-front of its walls. So the segments seen are laid over those of the atlas. Each piece either lies on a wall, or it
-stands in free space if the line of sight continues beyond it to a wall of the atlas. The contradiction is the share of
-the latter; pieces beyond the walls of the atlas, or where it has none, do not count.
+does not define how to compare them; the formulation is ours. With glass the maps need not be equal: where beams pass
+a pane, the walls behind it are seen instead. But glass never shows a wall where the atlas has free space in front of
+its walls. So the segments seen are laid over those of the atlas. Each piece either lies on a wall, or is in free
+space, if the line of sight continues beyond it to a wall of the atlas. The contradiction is the share of pieces in
+free space; pieces beyond the walls of the atlas, or where it has none, do not count.
 
 The exact alignment is not known. The segments are aligned from several headings (as in the seed document
-segment_localization.txt, with a shrinking neighbourhood), within the tolerances, and the least contradiction of all
-alignments, and of none, counts. K alignments, P pieces, S segments of the atlas, W points of the path.
+segment_localization.txt, with a shrinking neighbourhood), within the tolerances. The smallest contradiction of all
+alignments, and of none, is used. K alignments, P pieces, S segments of the atlas, W points of the path.
 """
 
 from __future__ import annotations

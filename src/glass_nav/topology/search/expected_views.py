@@ -1,9 +1,9 @@
-"""Places, the map -> would the scan at a meetpoint tell a robot at one of them from one at another?
+"""Tells by simulated scans whether a scan at a meetpoint would distinguish two places.
 
-Places that the graph cannot tell apart may look different: a room of one wing is furnished otherwise. So a scan is
-simulated in the map from where the robot would stand, and looked at from where it would stand if it were at the other
-place: what the map does not explain there is evidence against that. Views are compared once, and only so many for each
-step of a search. P pairs of poses.
+Places that the graph cannot tell apart may look different, such as rooms with different furniture. So a scan is
+simulated in the map from one place, and compared with the map at the other; what the map does not explain there is
+evidence against it. Each pair of views is compared once, and only a limited number in each step of a search. P pairs
+of poses.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Pose = Tuple[int, ...]
 
 
 class ExpectedViews:
-    """Of one atlas and its map."""
+    """The expected views of one atlas and its map."""
 
     def __init__(self, atlas: Atlas, scans: MapScans) -> None:
         self._atlas, self._scans = atlas, scans
@@ -38,7 +38,7 @@ class ExpectedViews:
         self._left = _COMPARED
 
     def forget(self) -> None:
-        """Another search: nothing was seen."""
+        """Start over for another search."""
         self._seen.clear()
         self._aimed = np.zeros((0, 3))
 

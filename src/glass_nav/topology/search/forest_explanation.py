@@ -1,4 +1,4 @@
-"""The search forest as text: row by row, as the document draws it, with the reason why a search node is inactive.
+"""The search forest as text, row by row as in the document, with the reason why a search node is inactive.
 
 Seed document: global_localization_procedure.txt, "Building the search forest" to "Updating the Search Forest". A row
 holds a search node for every edge of every active search node of the row before.

@@ -1,4 +1,4 @@
-"""FOREST -> VOTE -> TURN: what the candidates of the search forest say, without the poses that scans follow."""
+"""State and turn from the candidates of the search forest alone, without scans."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class GraphVerdict:
         self._claim: Optional[Claim] = None
 
     def begin(self) -> None:
-        """Another search has begun: nothing is claimed."""
+        """Start over for another search."""
         self._claim = None
 
     def estimate(self) -> SearchEstimate:
@@ -80,7 +80,7 @@ class GraphVerdict:
         return self._searching(reason, dart, errors, proof.ranks[0])
 
     def _claimed(self, dart: np.ndarray, errors: np.ndarray) -> SearchEstimate:
-        """One candidate, or several that nothing tells apart: more edges must confirm it."""
+        """State for one candidate, or several indistinguishable ones: more edges must confirm it."""
         depth, count = self._forest.depth, len(dart)
         path, driven = self._forest.path(int(dart[0])), self._driven(dart)
         if self._claim is None or not self._claim.holds(path, count):

@@ -1,8 +1,8 @@
-"""Scans and meetpoints -> one belief.
+"""One belief from scans and meetpoints.
 
-Hypotheses are poses. The poses come from the scans (hypotheses/pose_belief.py: everywhere in the map where they may have
-been taken) and from the forest (darts), and both kinds of evidence add up for each: the walls that its scans showed,
-and the meetpoints where it was (node_evidence.py), each once however often the robot comes back to it.
+Hypotheses are poses. They come from the scans (hypotheses/pose_belief.py: everywhere in the map where the scans fit)
+and from the forest (darts). For each, both kinds of evidence add up: the walls seen by scans, and the meetpoints on
+its path (node_evidence.py), each of which counts once however often the robot comes back to it.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class JointBelief:
         self.forget()
 
     def forget(self) -> None:
-        """Nothing is known any more."""
+        """Start over."""
         self._poses.forget()
         self._nodes: List[_Arrival] = []
         self._odometry: Dict[int, np.ndarray] = {}  # at the last scans, by stamp [ns]

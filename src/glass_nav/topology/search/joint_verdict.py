@@ -1,8 +1,7 @@
-"""BELIEF -> VOTE -> TURN: what scans and forest say together.
+"""State and turn from the joint belief of scans and forest.
 
-One rule: the robot is where the probability of all other places, and of elsewhere, is less than the risk that is
-accepted. It is LOST if that of elsewhere is the one that is left, and AMBIGUOUS if nothing can tell the places apart
-that are.
+The robot is CONFIRMED at a place if the probability of all other places, and of elsewhere, is below the accepted
+risk. It is LOST if only elsewhere is left, and AMBIGUOUS if nothing can tell the remaining places apart.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ _MAX_SHOWN = 0.9995  # of a probability in words
 
 
 class JointVerdict:
-    """Of one search at a time."""
+    """The verdict of one search at a time."""
 
     def __init__(
         self,
@@ -72,7 +71,7 @@ class JointVerdict:
         return None
 
     def at_meetpoint(self, belief: Belief, depth: int) -> SearchEstimate:
-        """What follows from the last meetpoint of the forest."""
+        """The verdict after the last meetpoint of the forest."""
         final = self.final(belief, depth)
         if final is not None:
             return final
@@ -160,7 +159,7 @@ class JointVerdict:
         )
 
     def _on_path(self, dart: np.ndarray) -> np.ndarray:
-        """Those of the darts that the forest has a path to."""
+        """The darts to which the forest has a path."""
         return dart[np.isin(dart, self._forest.candidates()[0])] if self._forest.depth >= 0 else dart[:0]
 
     def _has_passed_all(self, here: Meetpoint) -> bool:

@@ -1,10 +1,11 @@
-"""Atlas and visits -> the atlas as robots have found it: corrected values and tolerances.
+"""Corrects the values and tolerances of an atlas by what robots measured.
 
-The value of the map is a measurement with its own standard deviation s0; n visits with mean m add one with s / sqrt(n):
-the best estimate weighs both by their inverse variances. s is the spread of the visits, at least the standard deviation
-that the robot's measurements are said to have: the atlas becomes sharper, never sharper than the robots are. A spread
-beyond that measurement error belongs to the place, and widens its tolerance. Seed document
-global_localization_procedure.txt says that what was driven "can be used to update the Atlas", not how: this is ours.
+The value of the map is a measurement with its own standard deviation s0; n visits with mean m add one with s /
+sqrt(n). The best estimate weights both by their inverse variances. s is the spread of the visits, but at least the
+stated measurement error of the robots, so that the atlas never claims to be more precise than they are. A spread
+beyond the measurement error belongs to the place, and widens its tolerance. Seed document
+global_localization_procedure.txt says only that what was driven "can be used to update the Atlas"; the formulation is
+ours.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
-"""Does a node or an edge of the atlas match what was seen?
+"""Tests whether a node or an edge of the atlas matches what was observed.
 
 Each test compares one number: the difference between atlas and observation with z times its standard deviation. z
-follows from a risk budget for a whole run, because a probability that is small for one test is not small for a hundred.
-C candidates; a candidate at a meetpoint is the dart that matches its reference edge.
+follows from a risk budget for a whole run, because a probability that is small for one test is not small for a
+hundred. C candidates; a candidate at a meetpoint is the dart that matches its reference edge.
 
-Seed document global_localization_procedure.txt, "Updating the Search Forest", which does not define when values match.
+Seed document global_localization_procedure.txt, "Updating the Search Forest", which does not define when values
+match.
 """
 
 from __future__ import annotations
@@ -174,7 +175,7 @@ class Matcher:
         return log_p
 
     def sigma_r_m(self, meetpoint: Optional[Meetpoint] = None) -> float:
-        """Of a measured equidistance, without the uncertainty of the atlas."""
+        """Standard deviation of a measured equidistance, without the uncertainty of the atlas."""
         return (meetpoint.sigma_r_m if meetpoint else 0.0) or self.tolerances.r_sigma_m
 
     def _r_fits(self, node: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
@@ -201,7 +202,7 @@ class Matcher:
         return traversal.sigma_length_m or float(self.tolerances.sigma_length_m(np.array(traversal.length_m)))
 
     def sigma_chord_m(self, traversal: Traversal) -> float:
-        """Of a measured chord, without the uncertainty of the atlas."""
+        """Standard deviation of a measured chord, without the uncertainty of the atlas."""
         return traversal.sigma_chord_m or float(self.tolerances.sigma_length_m(np.array(traversal.length_m)))
 
     def longest_m(self, traversal: Traversal, edges: int = 1) -> float:

@@ -1,4 +1,4 @@
-"""Why search nodes went: the first test that each failed, with the value of the atlas and the one that was seen.
+"""Why search nodes were ruled out: the first test that each failed, with the values of atlas and observation.
 
 The tests and their tolerances are those of matching.py. D darts.
 """
@@ -49,7 +49,7 @@ def of_last_row(matcher: Matcher, forest: SearchForest) -> List[RuledOut]:
 
 
 def words(gone: RuledOut) -> str:
-    """For people: "length 8.00 m, driven 11.20 m"."""
+    """The mismatch in words: "length 8.00 m, driven 11.20 m"."""
     if gone.test == "scan":
         return "the scan does not fit" if math.isnan(gone.seen) else f"explains {gone.seen:.0%} of the scan"
     verb = "driven" if gone.test in ("length", "chord", "turn") else "seen"

@@ -1,10 +1,10 @@
-"""A meetpoint, poses -> the log likelihood ratio of the meetpoint at each pose to a robot elsewhere.
+"""The log likelihood ratio of a meetpoint at each of many poses, relative to a robot elsewhere.
 
-A pose expects a meetpoint where the atlas has one, as the atlas describes it: degree, equidistance, angles between
-the edges, each with the tolerances of the matcher. Elsewhere a meetpoint is like any of the atlas: what many have in
-common speaks for none. The edge by which the robot came is evidence through the pose, which odometry carried along
-it, and through the forest, whose tests it passed (length, chord, directions, walls). That part is a state of the path and no
-measurement of this meetpoint: the path to the next one has the same errors. D darts, K poses.
+Where the atlas has a meetpoint, it is expected as the atlas describes it: degree, equidistance, angles between the
+edges, each with the tolerances of the matcher. Elsewhere a meetpoint is like any of the atlas, so properties that
+many have in common are no evidence. The edge along which the robot came counts through the pose, which odometry moved
+along it, and through the forest, whose tests it passed (length, chord, directions, walls). The latter belongs to the path
+and not to the meetpoint: the path to the next meetpoint has the same errors. D darts, K poses.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class SeenAt:
 
 @dataclass(frozen=True)
 class NodeEvidence:
-    """Of one meetpoint."""
+    """The evidence of one meetpoint."""
 
     odom_from_base: np.ndarray  # (3,) there
     centre_m: np.ndarray  # (2,) of the meetpoint in the frame of odometry
@@ -48,7 +48,7 @@ class NodeEvidence:
     def of(
         cls, matcher: Matcher, meetpoint: Meetpoint, odom_from_base: np.ndarray, path: np.ndarray, errors: np.ndarray
     ) -> NodeEvidence:
-        """Of a meetpoint where the robot stood at that odometry (3,).
+        """The evidence of a meetpoint where the robot stood at that odometry (3,).
 
         Args:
             matcher: of the atlas.

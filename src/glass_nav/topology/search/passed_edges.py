@@ -1,8 +1,8 @@
-"""Odometry at meetpoints -> how often the robot passed each of their edges, to get everywhere without an atlas.
+"""How often the robot passed each edge of its meetpoints, to explore without an atlas.
 
-A robot that always leaves by the edge that it passed least often covers every edge of any building: the rule of
-Tremaux for mazes (Lucas, Recreations mathematiques, 1882). Edges are recognized by where they leave and in which
-direction.
+A robot that always leaves by the edge that it passed least often covers every edge of any building: Tremaux's rule
+for mazes (Lucas, Recreations mathematiques, 1882). Edges are recognized by where they leave and in which direction,
+from odometry.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class PassedEdges:
         self._driven_m = 0.0
 
     def begin(self, meetpoint: Meetpoint) -> None:
-        """Nothing was passed yet."""
+        """Start over."""
         self._forget()
         self._last = meetpoint
 
@@ -68,7 +68,7 @@ class PassedEdges:
 
 
 def _in_odom(meetpoint: Meetpoint) -> "tuple[np.ndarray, np.ndarray]":
-    """Where it is (2,), and the directions (degree,) of its edges."""
+    """Position (2,) of the meetpoint in odom, and directions (degree,) of its edges."""
     assert meetpoint.odom_from_base is not None
     return (
         se2.transform_points(meetpoint.odom_from_base, meetpoint.centre_m),

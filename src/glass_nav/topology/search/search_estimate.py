@@ -1,4 +1,4 @@
-"""What is known after a meetpoint, and the turn to take there."""
+"""The result of the search after a meetpoint: state, candidates, and the turn to take."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from glass_nav.vocabulary import SEARCH_IS_OVER, SearchState
 
 @dataclass(frozen=True)
 class TurnChoice:
-    """By which edge to leave the meetpoint."""
+    """The edge by which to leave the meetpoint."""
 
     rank: int
     degree: int
@@ -25,7 +25,7 @@ class TurnChoice:
 
 @dataclass(frozen=True)
 class SearchEstimate:
-    """What is known after a meetpoint."""
+    """The result after a meetpoint."""
 
     state: SearchState
     reason: str  # why, in one sentence

@@ -111,12 +111,12 @@ class SearchForest:
 
     @property
     def meetpoints(self) -> Tuple[Meetpoint, ...]:
-        """Of each depth."""
+        """The meetpoint of each depth."""
         return tuple(self._meetpoints)
 
     @property
     def traversals(self) -> Tuple[Traversal, ...]:
-        """From each depth to the next."""
+        """The edge from each depth to the next."""
         return tuple(self._traversals)
 
     def begin(self, meetpoint: Meetpoint, among: Optional[np.ndarray] = None) -> None:

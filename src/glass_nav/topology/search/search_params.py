@@ -1,4 +1,4 @@
-"""How a search in the atlas is done."""
+"""Parameters of a search in the atlas."""
 
 from __future__ import annotations
 

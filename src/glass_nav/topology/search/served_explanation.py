@@ -1,4 +1,4 @@
-"""Explains scans by the map that is served: there may be none yet, and another one later."""
+"""Explains scans by the served map, which may be missing at first and may be replaced later."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from glass_nav.world.grid_map import GridMap
 
 
 class ServedExplanation:
-    """As ScanExplanation; without a map scans are no evidence."""
+    """A ScanExplanation of the served map; without a map scans are no evidence."""
 
     def __init__(self) -> None:
         self._explanation: Optional[ScanExplanation] = None

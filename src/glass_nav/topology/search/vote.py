@@ -1,11 +1,11 @@
-"""Candidates -> the turn to take.
+"""Chooses the turn by a vote of the candidates.
 
 Seed document global_localization_procedure.txt, "Traversing the match edge": the current candidates vote for right or
-left. The document does not say what a candidate votes for. Here (vote_mode seed) each votes for the side on which fewer
+left. The document does not say what a candidate votes for. In vote_mode seed each votes for the side on which fewer
 of the others expect the same as it does; the majority wins, and a tie goes right as in the document's example.
 
-The default (vote_mode best) is the turn with the fewest expected survivors: each candidate may be the truth, and a turn
-leaves those that expect what the truth shows. C candidates, R ranks.
+The default, vote_mode best, is the turn with the fewest expected survivors: each candidate may be the true one, and
+after a turn those remain that expect what the true one shows. C candidates, R ranks.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Trials without a building: simulated robots wake up somewhere in an atlas and are sent through the search."""
+"""Simulates searches of robots that wake up somewhere in an atlas, without a building."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def run(
     in_atlas: bool = True,
     dart: Optional[int] = None,
 ) -> Trial:
-    """One robot, from waking up (at a dart, or anywhere) to the end of its search."""
+    """Simulates one robot, from waking up (at a dart, or anywhere) to the end of its search."""
     robot = AtlasRobot(world, p, rng)
     step_ms: List[float] = []
     truth_lost_at: Optional[int] = None

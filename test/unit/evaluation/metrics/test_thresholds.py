@@ -75,6 +75,8 @@ def test_an_unknown_figure_is_refused_with_the_known_ones_on_one_line():
     line = str(caught.value)
     assert line.startswith("--fail-if: unknown metric 'position_p59_m'; did you mean position_p95_m? Known: position_")
     assert "\n" not in line
+    with pytest.raises(ValueError, match=r"^--fail-if: unknown metric 'x'\. Known: position_"):
+        thresholds.parse("x>1")
     assert all(name in line for name in thresholds.KNOWN)
 
 

@@ -34,7 +34,7 @@ def test_a_client_sees_every_parameter_with_its_type_and_value(described):
 def test_every_parameter_is_explained(described):
     assert not [name for name, each in described.items() if not each["description"]]
     assert described["transform_tolerance"]["description"] == (
-        "[s] map -> odom is stamped ahead of the scan by this time, and further while scans come later than that"
+        "[s] map -> odom is stamped ahead of the scan by this time; by more if the next scan comes later than that"
     )
 
 

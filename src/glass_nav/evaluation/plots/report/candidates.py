@@ -1,4 +1,4 @@
-"""Places that were possible while the pose was searched for."""
+"""The number of possible places during a global search."""
 
 from __future__ import annotations
 

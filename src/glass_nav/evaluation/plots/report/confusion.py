@@ -1,4 +1,4 @@
-"""Cases reported, against the truth."""
+"""Reported cases against true ones."""
 
 from __future__ import annotations
 

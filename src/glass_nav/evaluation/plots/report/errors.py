@@ -1,4 +1,4 @@
-"""Errors over time, and how many scans were below an error."""
+"""Errors over time, and their cumulative distribution."""
 
 from __future__ import annotations
 

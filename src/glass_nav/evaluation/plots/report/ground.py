@@ -1,4 +1,4 @@
-"""What is drawn below a run."""
+"""The background of a picture of a run."""
 
 from __future__ import annotations
 

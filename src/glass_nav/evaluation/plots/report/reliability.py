@@ -1,4 +1,4 @@
-"""The chance of being right that the filter reports, against the truth."""
+"""The reported probability of a right pose, against the ground truth."""
 
 from __future__ import annotations
 

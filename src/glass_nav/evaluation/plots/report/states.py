@@ -1,4 +1,4 @@
-"""States of the filter: their order and shares, and a thin ribbon of them over time."""
+"""The states of the filter: their order and shares, and a thin band of them over time."""
 
 from __future__ import annotations
 

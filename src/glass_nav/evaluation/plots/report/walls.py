@@ -1,4 +1,4 @@
-"""Glass or solid: what each wall proved to be."""
+"""The probability of glass of each wall."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One of the scans that went worst, as it lies on the map."""
+"""One of the worst scans, over the map."""
 
 from __future__ import annotations
 

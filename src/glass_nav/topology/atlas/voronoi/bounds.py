@@ -1,4 +1,4 @@
-"""GridMap -> the cells that bound its free space: walls, unknown space, and small things apart."""
+"""The cells that bound the free space of a map: walls, unknown space, and separately small objects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Meetpoints and lines in cells -> the graph in metres, in the frame of the map."""
+"""Converts meetpoints and lines from cells to metres in the frame of the map."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def _edge(ends: List[int], line: np.ndarray) -> Tuple[List[int], np.ndarray]:
 
 
 def _order(point: np.ndarray) -> Tuple[float, float]:
-    """By x, then y, to a hundredth of a cell: other versions of the mesh round differently."""
+    """Sorts by x, then y, to a hundredth of a cell: versions of the mesh library round differently."""
     return round(float(point[0]), 2), round(float(point[1]), 2)
 
 

@@ -1,4 +1,4 @@
-"""Chains -> meetpoints: those that no lidar can tell apart are merged, and small parts are left out."""
+"""Merges meetpoints that no lidar can tell apart, and leaves out small parts of the graph."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ridges -> chains of them without the twigs that end in corners."""
+"""Removes the branches of the Voronoi ridges that end in corners."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class Chains:
             self._at[end].remove(number)
 
     def _join(self, first: int, second: int, junction: int) -> int:
-        """One chain of two that meet where nothing else does."""
+        """Joins two chains that meet where nothing else does."""
         turned = self._ends[first][0] == junction, self._ends[second][1] == junction
         parts = [
             [(part, back != turn) for part, back in self._parts[number][:: -1 if turn else 1]]

@@ -1,4 +1,4 @@
-"""Bounds -> circumcentres of their Delaunay triangles, and the ridges between them."""
+"""The Voronoi ridges between bounds: circumcentres of their Delaunay triangles, joined."""
 
 from __future__ import annotations
 

@@ -92,9 +92,9 @@ def test_a_map_where_no_tag_can_hang_gets_no_suggestion(room, capsys):
 @pytest.mark.parametrize(
     "options, text",
     [
-        (["--add", "-1"], "glass_nav landmarks: --add must be >= 0, got -1"),
-        (["--step-deg", "0"], "glass_nav landmarks: --step-deg must be > 0 and <= 45 degrees, got 0.0"),
-        (["--spacing", "0"], "glass_nav landmarks: --spacing must be >= 0.05 m, got 0.0"),
+        (["--add", "-1"], "glass_nav landmarks: plan: --add must be >= 0, got -1"),
+        (["--step-deg", "0"], "glass_nav landmarks: plan: --step-deg must be > 0 and <= 45 degrees, got 0.0"),
+        (["--spacing", "0"], "glass_nav landmarks: plan: --spacing must be >= 0.05 m, got 0.0"),
     ],
 )
 def test_wrong_options_are_told_before_any_file_is_read(tmp_path, capsys, options, text):
