@@ -386,10 +386,11 @@ class _SearchedScan:
         self._left = self._left[_AT_ONCE:]
         if len(self._left):
             return None
-        poses, explained, known = (
-            np.concatenate([getattr(part, name) for part in self._judged]) for name in ("poses", "explained", "known")
+        poses, explained, known, contradicted = (
+            np.concatenate([getattr(part, name) for part in self._judged])
+            for name in ("poses", "explained", "known", "contradicted")
         )
-        return BeamsExplained(poses, beams.ends_m, explained, known)
+        return BeamsExplained(poses, beams.ends_m, explained, known, contradicted)
 
 
 def expected_nats(scans: MapScans, map_from_base: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -424,14 +425,15 @@ def _counted(beams: BeamsExplained, new: np.ndarray, likely: np.ndarray) -> np.n
 
 
 def _disputed(beams: BeamsExplained, likely: np.ndarray) -> np.ndarray:
-    """(B,) bool: beams that the map explains from one of the likely poses ((K,) bool) and not from another, if they are few.
+    """(B,) bool: beams that the map explains from one of the likely poses ((K,) bool) and contradicts from another, if they are
+    few.
 
     What tells copies of a room apart is a piece of furniture beside walls that were seen through the door long before.
     """
     if not 1 < np.count_nonzero(likely) <= _FEW:
         return np.zeros(len(beams.ends_m), bool)
     explained = beams.explained[likely]
-    return explained.any(axis=0) & (beams.known[likely] & ~explained).any(axis=0)
+    return explained.any(axis=0) & beams.contradicted[likely].any(axis=0)
 
 
 def _share(beams: BeamsExplained, pieces: np.ndarray) -> np.ndarray:
