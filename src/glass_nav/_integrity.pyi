@@ -13,7 +13,7 @@ class ScanFit:
         laser_m: np.ndarray,  # (2,) float64
         map_from_base: np.ndarray,  # (3,) float64
         beam_share: float,
-        matched: bool,
+        worth: float,
     ) -> tuple[np.ndarray, np.ndarray, float]: ...  # (3, 3), (3,) float64
 
 def better_of(first: np.ndarray, second: np.ndarray) -> np.ndarray: ...  # (3, 3) float64

@@ -52,7 +52,7 @@ _AS_GOOD = 0.1  # share that a new pose explains less than the best: not worth t
 _SEARCH_AGAIN_M, _SEARCH_SOON_M = 3.0, 1.0  # sooner where no pose is likely
 _HOPELESS = -5.0  # log likelihood ratio of the best pose to elsewhere
 _APART_M = 0.7  # places
-NEW = -2  # label of a pose that nobody has weighed
+NEW = -2  # label of a pose without a weight
 
 
 class Search(Protocol):
@@ -106,7 +106,7 @@ class Evidence:
     explained: np.ndarray  # (K,) pieces of wall that the map explains
     seen: np.ndarray  # (K,) pieces of wall that it should
     other_nats: np.ndarray  # (K,) log likelihood ratios by what is not a scan
-    label: np.ndarray  # (K,) int, of whoever weighs the poses; NEW: not weighed yet
+    label: np.ndarray  # (K,) int, given by the caller; NEW: not weighted yet
 
     @classmethod
     def none(cls, count: int) -> Evidence:

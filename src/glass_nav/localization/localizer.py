@@ -353,14 +353,14 @@ class Localizer:
     def _correct(self, scan: Scan, odom_from_base: np.ndarray, step: Optional[np.ndarray]) -> BeamCases:
         """The scan draws and weighs the particles, and the best cluster of them is the pose."""
         carried = self._integrity.carried(step, self._params.odometry)
-        registration = self._filter.register(scan, odom_from_base, self._classifier.residuals, carried)
+        registration = self._filter.register(scan, odom_from_base, self._classifier, carried)
         cases, expected = self._classifier.classify(scan, registration.map_from_base, registration.covariance)
         if registration.fits:
             self._classifier.learn(scan, expected)
         self._filter.weigh(scan, cases, registration, self._classifier)
         self._filter.estimate()
         self._filter.resample()
-        if not self._filter.has_evidence:
+        if not registration.worth:
             self._keep_to_odometry()
         suspect = self._filter.suspect
         self._integrity.update(
@@ -368,13 +368,13 @@ class Localizer:
             self._filter.best.map_from_base,
             step,
             self._params.odometry,
-            registration.fits,
+            registration.worth if registration.fits else 0.0,
             None if suspect is None else se2.compose(suspect, odom_from_base),
         )
         return cases
 
     def _keep_to_odometry(self) -> None:
-        """The scan says nothing about the place: where the scans before led the pose astray, odometry has it back."""
+        """The scan hardly fits: where such scans led the pose astray, odometry has it back."""
         reckoned = self._dead_reckoning
         if reckoned is not None and reckoned.mahalanobis(self._filter.best.map_from_base[None])[0] > _ASTRAY:
             self._filter.move_to(reckoned.map_from_base)
@@ -409,7 +409,7 @@ class Localizer:
             scan: the scan.
             map_from_base: (3,) the pose.
             step: (3,) of odometry since the last update; None: this scan was one.
-            seen: from the pose, at an update; None: nothing depends on the beams, they wait until somebody asks.
+            seen: from the pose, at an update; None: nothing depends on the beams, which wait until they are needed.
         """
         best, classifier = self._filter.best, self._classifier
         if seen is not None:

@@ -146,7 +146,7 @@ def test_without_walls_or_answers_there_is_nothing_to_correct(room, capsys):
     assert "no wall of the map is long enough for a segment" in capsys.readouterr().err
     (room / "blind.csv").write_text("0,nan\n0.1,inf\n")
     assert locate(room, TRUE, scan="blind.csv") == 3
-    assert "no beam of the scan answered" in capsys.readouterr().err
+    assert "no beam of the scan returned" in capsys.readouterr().err
     assert not (room / "out.png").exists()
 
 

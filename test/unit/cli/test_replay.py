@@ -365,7 +365,7 @@ def test_a_package_that_is_not_built_is_said_in_one_line(capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "glass_nav.localization.localizer", None)
     assert cli.main(["replay"]) == 3
     assert capsys.readouterr().err == (
-        "glass_nav: glass_nav.localization.localizer is not there: build the package and source its setup.bash\n"
+        "glass_nav: glass_nav.localization.localizer is missing: build the package and source its setup.bash\n"
     )
 
 

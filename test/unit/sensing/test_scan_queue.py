@@ -193,9 +193,7 @@ def test_a_scan_is_placed_or_rejected_when_it_is_ready():
         queue.place(raw_scan(range_max_m=0.0))
     assert queue.warnings == []
     queue.place(raw_scan(time_increment_s=0.5))
-    assert queue.warnings == [
-        "scans are taken as of one moment: time_increment 0.5 s times 5 beams is 2 s, allowed 1 s"
-    ]
+    assert queue.warnings == ["scans are not deskewed: time_increment 0.5 s times 5 beams is 2 s, allowed 1 s"]
 
 
 def test_other_parameters_hold_for_scans_that_wait_already():

@@ -42,7 +42,7 @@ py::array_t<double> array_of(const Matrix3& matrix) {
 }
 
 py::tuple fit_of(ScanFit& fit, const DistanceField& field, const Array& points_m, const Array& laser_m,
-                 const Array& map_from_base, double beam_share, bool matched) {
+                 const Array& map_from_base, double beam_share, double worth) {
   if (points_m.ndim() != 2 || points_m.shape(1) != 2 || points_m.shape(0) == 0) {
     throw std::invalid_argument("points must be (B, 2), B > 0");
   }
@@ -51,7 +51,7 @@ py::tuple fit_of(ScanFit& fit, const DistanceField& field, const Array& points_m
   FitInformation found;
   {
     py::gil_scoped_release unlocked;
-    found = fit.of(field, scan, beam_share, matched);
+    found = fit.of(field, scan, beam_share, worth);
   }
   return py::make_tuple(array_of(found.covariance), array_of(found.offset), found.share);
 }
@@ -64,7 +64,7 @@ PYBIND11_MODULE(_integrity, module) {
   py::class_<ScanFit>(module, "ScanFit")
       .def(py::init<double>(), py::arg("edge_m"))
       .def("of", &fit_of, py::arg("field"), py::arg("points_m"), py::arg("laser_m"), py::arg("map_from_base"),
-           py::arg("beam_share"), py::arg("matched"));
+           py::arg("beam_share"), py::arg("worth"));
   module.def(
       "better_of",
       [](const Array& first, const Array& second) { return array_of(better_of(matrix_of(first), matrix_of(second))); },

@@ -62,7 +62,8 @@ ScanFit::ScanFit(double edge_m) : edge_m_(edge_m), scale_m_(edge_m) {
   freedom_.fill(kPriorWeight);
 }
 
-FitInformation ScanFit::of(const DistanceField& field, const SeenScan& scan, double beam_share, bool matched) {
+FitInformation ScanFit::of(const DistanceField& field, const SeenScan& scan, double beam_share, double worth) {
+  const bool matched = worth > 0.0;
   const Vector3& pose = scan.map_from_base;
   const double cos = std::cos(pose[2]), sin = std::sin(pose[2]);
   const double laser_x = cos * scan.laser_m[0] - sin * scan.laser_m[1];
@@ -123,7 +124,11 @@ FitInformation ScanFit::of(const DistanceField& field, const SeenScan& scan, dou
   if (matched) learn(beams, pieces);
   const Matrix3 inverted = inverse(information + Matrix3::diagonal(kPriorBeams));
   Matrix3 covariance = inverted * spread_of(beams, pieces, beam_share) * inverted;
-  if (matched) widen(field, pose, beams, information, lever_m, pieces.size(), covariance);
+  if (matched) {
+    for (double& value : covariance.values) value /= worth;
+    const double pieces_per_beam = static_cast<double>(pieces.size()) / static_cast<double>(beams.size());
+    widen(field, pose, beams, information, lever_m, worth * pieces_per_beam, covariance);
+  }
   Vector3 offset = inverse(near_information) * pull;
   offset[2] /= lever_m;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -248,13 +253,13 @@ Matrix3 ScanFit::spread_of(const std::vector<Beam>& beams, const std::vector<Pie
 
 /// Adds to a covariance, in metres, what the loss along its longest axis adds to its linearization there.
 void ScanFit::widen(const DistanceField& field, const Vector3& pose, const std::vector<Beam>& beams,
-                    const Matrix3& information, double lever_m, std::size_t pieces, Matrix3& covariance) const {
+                    const Matrix3& information, double lever_m, double worth_of_beam, Matrix3& covariance) const {
   const Eigen3 found = eigen(covariance);
   const auto longest =
       static_cast<std::size_t>(std::max_element(found.values.begin(), found.values.end()) - found.values.begin());
   const Vector3 axis{found.axes(0, longest), found.axes(1, longest), found.axes(2, longest)};
   const double kernel = square(kKernelScales * scale_m_);
-  const double share = 0.5 * square(kKernelScales) * static_cast<double>(pieces) / static_cast<double>(beams.size());
+  const double share = 0.5 * square(kKernelScales) * worth_of_beam;
   const double curvature = share * dot(axis, information * axis) / kernel;
   std::array<double, 2 * kSteps + 1> loss{}, linearized{};
   for (int i = -kSteps; i <= kSteps; ++i) {

@@ -31,9 +31,9 @@ class ScanFit {
   /// edge_m: deviation of an edge that is drawn in whole cells.
   explicit ScanFit(double edge_m);
 
-  /// beam_share: of all beams that the pose was fitted to, how many these are. matched: the pose was fitted to this
-  /// scan.
-  FitInformation of(const DistanceField& field, const SeenScan& scan, double beam_share, bool matched);
+  /// beam_share: of all beams that the pose was fitted to, how many these are. worth: of the fit as evidence, up to 1;
+  /// 0: the pose was not fitted to this scan.
+  FitInformation of(const DistanceField& field, const SeenScan& scan, double beam_share, double worth);
 
  private:
   static constexpr int kSides = 8;  // directions that walls face
@@ -48,7 +48,7 @@ class ScanFit {
   void learn(const std::vector<Beam>& beams, const std::vector<Piece>& pieces);
   Matrix3 spread_of(const std::vector<Beam>& beams, const std::vector<Piece>& pieces, double beam_share) const;
   void widen(const DistanceField& field, const Vector3& map_from_base, const std::vector<Beam>& beams,
-             const Matrix3& information, double lever_m, std::size_t pieces, Matrix3& covariance) const;
+             const Matrix3& information, double lever_m, double worth_of_beam, Matrix3& covariance) const;
 
   double edge_m_, scale_m_;               // the scale is that of what is left between beams and walls
   std::array<double, kSizes> squares_{};  // what fits left, by the size of what errs together

@@ -37,6 +37,7 @@ from glass_nav.world.grid_map import GridMap
 from glass_nav.world.pane import Pane
 
 _DEPTH_SHARE = 0.5  # of a wall's drawn thickness at which beams end, until it is learnt
+_BEHIND_M = 0.15  # a surface: a beam that ends there passed it
 _FEWER_SAMPLES = 3  # times, where no particle is weighed by the cases
 
 
@@ -161,6 +162,19 @@ class BeamClassifier:
         seen_through = self.glass_map.chances(expected.cell[0, 0])[0]
         known_end = self._at_ends(self.known_area.contains, scan, map_from_base)
         return beam_evidence.of(scan.ranges_m, cases.case, expected, seen_through, known_end)
+
+    def left_through_surfaces(self, scan: Scan, beams: np.ndarray, map_from_base: np.ndarray) -> np.ndarray:
+        """Which beams (B,) of a scan at a pose (3,) end where the map knows nothing, behind one of its surfaces.
+
+        What stands there is not mapped. A beam that gets there through no surface contradicts the map.
+        """
+        left = ~self.known_area.ends(scan.points_in_base()[beams], map_from_base[None])[0]
+        chosen = beams[left]
+        if len(chosen):
+            laser = se2.compose(map_from_base, scan.base_from_laser)[None]
+            first_m = self.caster.cast(laser, scan.angles_rad[chosen], scan.range_max_m)[0]
+            left[left] = scan.ranges_m[chosen] > first_m + _BEHIND_M
+        return left
 
     @staticmethod
     def _at_ends(holds: Callable[[np.ndarray], np.ndarray], scan: Scan, map_from_base: np.ndarray) -> np.ndarray:

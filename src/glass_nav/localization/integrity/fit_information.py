@@ -48,7 +48,7 @@ class ScanFit:
         self._compiled = _integrity.ScanFit(_EDGE_CELLS * resolution_m)
 
     def of(
-        self, points_m: np.ndarray, laser_m: np.ndarray, map_from_base: np.ndarray, beam_share: float, matched: bool
+        self, points_m: np.ndarray, laser_m: np.ndarray, map_from_base: np.ndarray, beam_share: float, worth: float
     ) -> FitInformation:
         """How well a scan determines its pose.
 
@@ -57,8 +57,9 @@ class ScanFit:
             laser_m: (2,) the lidar in the robot's frame.
             map_from_base: (3,) pose to look at.
             beam_share: of all beams that the pose was fitted to, how many these are; the noise of one beam averages out.
-            matched: the pose was fitted to this scan: learn from what is left, and look at other places where it fits.
+            worth: of the fit as evidence, up to 1; then what is left is learnt from, and other places where the scan
+                fits are looked at. 0: the pose was not fitted to this scan.
         """
         return FitInformation(
-            *self._compiled.of(self._field.compiled, points_m, laser_m, map_from_base, beam_share, matched)
+            *self._compiled.of(self._field.compiled, points_m, laser_m, map_from_base, beam_share, worth)
         )

@@ -53,7 +53,7 @@ class IntegrityMonitor:
 
     def fits(self, scan: Scan, map_from_base: np.ndarray, step: Optional[np.ndarray], noise: OdometryNoise) -> bool:
         """Whether a scan still fits at the pose (3,) to which a step (3,) of odometry since the last update leads."""
-        self._now = None if self._covariance is None else self._look(scan, map_from_base, matched=False)
+        self._now = None if self._covariance is None else self._look(scan, map_from_base, 0.0)
         if self._covariance is None or self._now is None or scan.lidar not in self._at_update:
             return True
         beside_then, share_then = self._at_update[scan.lidar]
@@ -66,7 +66,7 @@ class IntegrityMonitor:
         map_from_base: np.ndarray,
         step: Optional[np.ndarray],
         noise: OdometryNoise,
-        believed: bool,
+        worth: float,
         suspect: Optional[np.ndarray],
     ) -> None:
         """A scan moved the particles.
@@ -76,13 +76,13 @@ class IntegrityMonitor:
             map_from_base: (3,) pose after it.
             step: (3,) of odometry since the last update, in the robot's frame then; None: there was none.
             noise: of odometry.
-            believed: the scan fits there as scans usually do.
+            worth: of its fit there as evidence, 0..1; 0: it does not fit as scans usually do.
             suspect: (3,) pose where it fits instead, and another scan has to confirm it; None: there is none.
         """
         if self._covariance is None:
             return
-        self._now = self._look(scan, map_from_base, matched=believed)
-        self._covariance.update(step, map_from_base, self._now if believed else None, noise)
+        self._now = self._look(scan, map_from_base, worth)
+        self._covariance.update(step, map_from_base, self._now if worth > 0.0 else None, noise, worth)
         if self._now is not None:
             beside = _beside(self._now, self._covariance.carried(None, noise))
             self._at_update[scan.lidar] = beside, self._now.share
@@ -111,7 +111,7 @@ class IntegrityMonitor:
         if self._covariance is None:
             return spread
         carried = self._covariance.carried(step, noise)
-        covariance = widened_by(carried, spread)
+        covariance = widened_by(carried, spread) + self._covariance.unproven
         if self._now is not None:
             beside = _beside(self._now, carried)
             excess = max(0.0, 1.0 - 4.0 / max(beside**2, 1e-9))  # that is not chance
@@ -120,12 +120,12 @@ class IntegrityMonitor:
             covariance = covariance + np.outer(self._other, self._other)
         return covariance
 
-    def _look(self, scan: Scan, map_from_base: np.ndarray, matched: bool) -> Optional[FitInformation]:
+    def _look(self, scan: Scan, map_from_base: np.ndarray, worth: float) -> Optional[FitInformation]:
         beams = spread_evenly(scan.answered, _BEAMS)
         if len(beams) < _MIN_BEAMS:
             return None
         share = len(beams) / max(int(np.count_nonzero(scan.answered)), 1)
-        return self._fit.of(scan.points_in_base()[beams], scan.base_from_laser[:2], map_from_base, share, matched)
+        return self._fit.of(scan.points_in_base()[beams], scan.base_from_laser[:2], map_from_base, share, worth)
 
 
 def _beside(fit: FitInformation, covariance: np.ndarray) -> float:

@@ -17,13 +17,14 @@ from typing import Optional
 import numpy as np
 
 from glass_nav import _integrity
-from glass_nav.geometry import angles
+from glass_nav.geometry import angles, se2
 from glass_nav.localization.integrity.dead_reckoning import DeadReckoning
 from glass_nav.localization.integrity.fit_information import FitInformation
 from glass_nav.localization.particle_filter.motion import OdometryNoise
 
 _MEMORY = 0.95  # weight of the past per update, of the scale of odometry's noise
 _MIN_SCALE = 0.01  # of the variances of the model of odometry
+_VIEW_M = 2.0  # after this distance the surroundings are seen anew
 _MAX_CORRECTION = 6.0  # deviations: a larger one is an event of its own
 
 
@@ -38,9 +39,15 @@ class PoseCovariance:
         self._at_update = np.array(covariance, float)
         self._last: Optional[np.ndarray] = None  # (3,) map_from_base at the last update
         self._noise_scale = np.ones(3)  # of the variances along, across and of the heading
+        self._unproven = np.zeros(2)  # corrections of odometry's position, in map, by scans that hardly fit
 
     def update(
-        self, step: Optional[np.ndarray], map_from_base: np.ndarray, fit: Optional[FitInformation], noise: OdometryNoise
+        self,
+        step: Optional[np.ndarray],
+        map_from_base: np.ndarray,
+        fit: Optional[FitInformation],
+        noise: OdometryNoise,
+        worth: float = 1.0,
     ) -> None:
         """The particles were moved.
 
@@ -49,18 +56,27 @@ class PoseCovariance:
             map_from_base: (3,) the pose after it.
             fit: of the scan there; None: the scan says nothing about the pose.
             noise: of odometry.
+            worth: of the fit as evidence about odometry, 0..1.
         """
         if step is not None and self._last is not None:
+            self._unproven = (self._unproven + self._correction(step, map_from_base)[:2]) * _doubt(worth, step)
             if fit is not None:
-                self._learn(step, map_from_base, noise)
+                self._learn(step, map_from_base, noise, 1.0 - worth * (1.0 - _MEMORY))
             self._at_update = self.carried(step, noise)
         if fit is not None:
             self._at_update = better_of(self._at_update, fit.covariance)
         self._last = np.array(map_from_base, float)
 
+    @property
+    def unproven(self) -> np.ndarray:
+        """(3, 3) of corrections that scans of little worth made: there are as good reasons to believe odometry."""
+        off = np.append(self._unproven, 0.0)  # a heading is right wherever the walls have the same directions
+        return np.outer(off, off)
+
     def narrow(self, covariance: np.ndarray) -> None:
         """Something else determines the pose at the last update, with that covariance (3, 3)."""
         self._at_update = better_of(self._at_update, covariance)
+        self._unproven = np.zeros(2)
 
     def carried(self, step: Optional[np.ndarray], noise: OdometryNoise) -> np.ndarray:
         """(3, 3) after a step (3,) of odometry since the last update, in the robot's frame then."""
@@ -68,18 +84,29 @@ class PoseCovariance:
             return self._at_update
         return DeadReckoning(self._last, self._at_update).carried(step, noise, self._noise_scale).covariance
 
-    def _learn(self, step: np.ndarray, map_from_base: np.ndarray, noise: OdometryNoise) -> None:
+    def _correction(self, step: np.ndarray, map_from_base: np.ndarray) -> np.ndarray:
+        """(3,) in map: how far a pose is off the one that a step of odometry led to."""
+        assert self._last is not None
+        off = map_from_base - se2.compose(self._last, step)
+        off[2] = angles.wrap(off[2])
+        return off
+
+    def _learn(self, step: np.ndarray, map_from_base: np.ndarray, noise: OdometryNoise, memory: float) -> None:
         """How large this correction is in the model of odometry."""
         assert self._last is not None
         predicted = DeadReckoning(self._last, np.zeros((3, 3))).carried(step, noise)
         turned = _turned(self._last[2])
-        off = map_from_base - predicted.map_from_base
-        off[2] = angles.wrap(off[2])
+        off = self._correction(step, map_from_base)
         variance = np.diag(turned.T @ predicted.covariance @ turned)
         known = variance > 1e-10
         squared = np.minimum((turned.T @ off)[known] ** 2 / variance[known], _MAX_CORRECTION**2)
-        scale = _MEMORY * self._noise_scale[known] + (1.0 - _MEMORY) * squared
+        scale = memory * self._noise_scale[known] + (1.0 - memory) * squared
         self._noise_scale[known] = np.maximum(scale, _MIN_SCALE)
+
+
+def _doubt(worth: float, step: np.ndarray) -> float:
+    """Share of a correction that is still in doubt after a step (3,): each view of the surroundings proves some of it."""
+    return float((1.0 - worth) ** (se2.travelled(step)[0] / _VIEW_M)) if worth < 1.0 else 0.0
 
 
 def better_of(first: np.ndarray, second: np.ndarray) -> np.ndarray:

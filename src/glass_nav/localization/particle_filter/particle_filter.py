@@ -18,7 +18,14 @@ from glass_nav.hypotheses.scan_alignment import Alignment
 from glass_nav.localization.beam_classification.beam_classifier import BeamClassifier
 from glass_nav.localization.beam_classification.case_votes import BeamCases
 from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
-from glass_nav.localization.particle_filter import importance_weights, motion, pose_estimate, proposal, resampling
+from glass_nav.localization.particle_filter import (
+    importance_weights,
+    motion,
+    pose_estimate,
+    proposal,
+    resampling,
+    scan_registration,
+)
 from glass_nav.localization.particle_filter.importance_weights import BeamMixture
 from glass_nav.localization.particle_filter.motion import OdometryNoise
 from glass_nav.localization.particle_filter.odometry_prior import OdometryPrior
@@ -34,6 +41,7 @@ from glass_nav.world.landmark_map import LandmarkMap
 
 ONE_PLACE = np.array([1.0, 1.0, 0.7])  # deviations [m, m, rad] that preliminary samples can cover
 _MIN_ENDS = 20  # beams of known case that a registration is refined by
+_MIN_TOLD = 10  # beams that tell whether a scan fits
 _BLOCK = 2**15  # beams of particles weighed at a time
 _SCALE_SIGMAS = 1.5  # of the kernel that aligns, in deviations of beams around walls
 _FULL_FIT = 20.0  # log likelihood ratio of a scan that fits everywhere to one that fits nowhere
@@ -63,6 +71,7 @@ class Registration:
     beams: int  # that were aligned
     fits: bool  # as scans usually do: what is seen from there may be learnt
     contradicts_odometry: bool = False  # a wheel may have slipped
+    worth: float = 0.0  # of the scan's fit there as evidence, 0..1; 0: it may be chance
 
 
 class ParticleFilter:
@@ -80,17 +89,21 @@ class ParticleFilter:
         self.particles = np.zeros((0, 3))  # (P, 3) poses in map
         self._weights = np.zeros(0)  # (P,) sum 1
         self.best: PoseEstimate  # cluster of the particles; once started
-        self._registration = ScanRegistration(field)
+        self._register_anew()
         self._updates = 0
 
     def set_field(self, field: DistanceField) -> None:
         """Use the field of another map; the particles stay where they are."""
         self._field = field
-        self._registration = ScanRegistration(field)
+        self._register_anew()
 
     def reconfigure(self, params: ParticleFilterParams) -> None:
         """Use other parameters from the next scan on; the particles stay."""
         self._params = params
+
+    def _register_anew(self) -> None:
+        self._registration = ScanRegistration(self._field)
+        self.fits = True  # the last scan that was registered, about as well as scans usually do
 
     # -- starts
 
@@ -121,12 +134,12 @@ class ParticleFilter:
         self.particles = particles
         self._weights = np.full(len(particles), 1.0 / len(particles))
         self.best = pose_estimate.of(particles, self._weights)
-        self._registration = ScanRegistration(self._field)
+        self._register_anew()
 
     def stand_for(
         self, poses: np.ndarray, weights: np.ndarray, here: np.ndarray, covariance: np.ndarray, most: int
     ) -> None:
-        """Be drawn from candidates that somebody else follows, the best first.
+        """Draw the particles from candidates of a global search, best first.
 
         Args:
             poses, weights: (K, 3) candidates in map, and (K,) weights that sum to 1.
@@ -140,11 +153,6 @@ class ParticleFilter:
         self.best = PoseEstimate(poses[0], covariance, float(weights[here].sum()), here[drawn])
 
     # -- one scan
-
-    @property
-    def fits(self) -> bool:
-        """The last scan that was registered fitted about as well as scans usually do."""
-        return self._registration.fits
 
     @property
     def has_evidence(self) -> bool:
@@ -172,16 +180,21 @@ class ParticleFilter:
         self._weights = resampling.tempered(np.log(self._weights) + log_w)
 
     def register(
-        self, scan: Scan, odom_from_base: np.ndarray, residuals: RangeResiduals, covariance: Optional[np.ndarray] = None
+        self,
+        scan: Scan,
+        odom_from_base: np.ndarray,
+        classifier: BeamClassifier,
+        covariance: Optional[np.ndarray] = None,
     ) -> Registration:
         """Align the scan from the best cluster; a cloud that is no single place is weighed by how the scan fits.
 
         Args:
             scan: one revolution of a lidar.
             odom_from_base: (3,) odometry at its stamp.
-            residuals: how widely beams end around walls.
+            classifier: of the map.
             covariance: (3, 3) of the pose that odometry led to; None: the spread of the particles.
         """
+        self.fits = False
         best = pose_estimate.of(self.particles, self._weights)
         beams = spread_evenly(scan.answered, self._params.proposal.proposal_max_beams)
         points = scan.points_in_base()[beams]
@@ -192,7 +205,7 @@ class ParticleFilter:
             self._weights = resampling.normalised(np.log(self._weights) + _FULL_FIT * fit)
             best = pose_estimate.of(self.particles, self._weights)
             return Registration(best.map_from_base, best.covariance, best, None, 0, False)
-        finder = self._registration
+        finder, residuals = self._registration, classifier.residuals
         scale_m = _SCALE_SIGMAS * residuals.sigma_m
         found = finder.find(best.map_from_base, best.covariance, odom_from_base, points, scale_m)
         if not finder.is_evidence:
@@ -200,8 +213,17 @@ class ParticleFilter:
         slip = self._params.proposal.odom_slip_probability if finder.contradicts_odometry else 0.0
         prior = OdometryPrior(best.map_from_base, best.covariance if covariance is None else covariance, slip)
         found = self._with_held(found, points, prior, residuals)
+        worth = self._worth(points, found.poses[0], classifier.left_through_surfaces(scan, beams, found.poses[0]))
+        self.fits = finder.fits and worth > 0.0
         return Registration(
-            found.poses[0], np.zeros((3, 3)), best, found, len(beams), finder.fits, finder.contradicts_odometry
+            found.poses[0],
+            np.zeros((3, 3)),
+            best,
+            found,
+            len(beams),
+            self.fits,
+            finder.contradicts_odometry,
+            worth,
         )
 
     def weigh(self, scan: Scan, cases: BeamCases, registration: Registration, classifier: BeamClassifier) -> None:
@@ -255,6 +277,13 @@ class ParticleFilter:
             np.all(np.sqrt(np.diag(best.covariance)) <= ONE_PLACE)
         )
 
+    def _worth(self, points_m: np.ndarray, map_from_base: np.ndarray, left: np.ndarray) -> float:
+        """Of the fit of points (B, 2) at a pose (3,); beams that left the map through its surfaces (B,) tell nothing."""
+        told = points_m[~left]
+        if len(told) < _MIN_TOLD:
+            return 0.0
+        return scan_registration.worth(float(scan_alignment.fit(self._field, told, map_from_base[None])[0]))
+
     def _with_held(
         self, found: Alignment, points_m: np.ndarray, prior: OdometryPrior, residuals: RangeResiduals
     ) -> Alignment:
@@ -269,6 +298,11 @@ class ParticleFilter:
             last_scale_m=scale_m,
         )
         held = scan_alignment.at(self._field, points_m, poses, scale_m)
+        near = max(float(held.fit[0]), float(scan_alignment.fit(self._field, points_m, prior.map_from_base[None])[0]))
+        kept = prior.reaches(found.poses) | (found.fit >= scan_registration.least_fit_elsewhere(near))
+        if not kept.any():
+            return held
+        found = Alignment(found.poses[kept], found.information[kept], found.fit[kept])
         both = np.concatenate([held.poses, found.poses[:1]])
         log_w = importance_weights.by_field(self._field, both, points_m, residuals, self._params.mixture)
         held_log_p, best_log_p = (log_w + prior.log_density(both)).tolist()

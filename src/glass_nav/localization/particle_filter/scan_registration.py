@@ -10,7 +10,9 @@ Along directions that the scan does not constrain, as in a hall whose ends are o
 slip is considered only if the scan does not fit at the predicted pose, but nearby.
 
 A scan that fits nowhere, because the map lacks what is around the robot, would be drawn to unrelated walls. It is
-ignored until scans fit about as well as they have on the whole.
+ignored until scans fit about as well as they have on the whole. A scan of which less than half fits can only be trusted
+within reach of odometry, since one half is the breakdown point of robust estimators (Rousseeuw, Least median of squares
+regression, Journal of the American Statistical Association 79, 1984).
 """
 
 from __future__ import annotations
@@ -45,9 +47,11 @@ _LEVELS = (  # limits of the starts' spread: as predicted, a bad step of odometr
     ),
 )
 _POOR_FIT = 0.75  # of the usual fit: odometry is not trusted
+_HALF, _MOST = 0.5, 0.9  # of a scan that fits: its fit may be chance; it is not
 _REACH = 3.0  # deviations
 _MIN_DEVIATION = np.array([0.01, 0.01, np.radians(0.2)])  # of odometry: m, m, rad
 _CONVINCING_FIT = 0.9  # of the usual fit: a place that odometry did not lead to
+_EXPLAINED = 0.5  # of what does not fit where odometry leads: a place elsewhere has to explain as much
 _NO_EVIDENCE_FIT = 0.4  # of the lasting fit: nothing can be said about the place
 _MEMORY, _LASTING_MEMORY = 0.9, 0.995  # weight of the past per scan
 
@@ -64,6 +68,7 @@ class ScanRegistration:
         self._lasting_fit, self._remembered = float("nan"), 0  # over many scans, and how many they were
         self._scale_m = float("nan")  # of the kernel in its last step
         self._suspect: Optional[np.ndarray] = None  # (3,) map_from_odom of a place that needs a second scan
+        self._fit_ahead = float("nan")  # of the last scan where odometry led
 
     @property
     def suspect(self) -> Optional[np.ndarray]:
@@ -89,6 +94,7 @@ class ScanRegistration:
         self._scale_m = scale_m
         found = self._align_around(mean, covariance, _LEVELS[0], points_m)
         suspect, self._suspect = self._suspect, None
+        self._fit_ahead = float(scan_alignment.fit(self._field, points_m, mean[None])[0])
         self.fits = not found.fit[0] < _POOR_FIT * self._usual_fit
         self.contradicts_odometry = self._contradicts(found, mean, covariance, points_m)
         self.is_evidence = not found.fit[0] < _NO_EVIDENCE_FIT * self._lasting_fit
@@ -109,12 +115,12 @@ class ScanRegistration:
         """The scan fits at an aligned pose as scans usually do, but at none that odometry explains."""
         near = found.poses[_within(found.poses, mean, np.sqrt(np.diag(covariance) + _MIN_DEVIATION**2))]
         fit_near = scan_alignment.fit(self._field, points_m, np.vstack([mean, near])).max()
-        return bool(fit_near < _POOR_FIT * self._usual_fit and found.fit[0] > self._convincing_fit)
+        return bool(fit_near < _POOR_FIT * self._usual_fit and self._is_convincing(found.fit[0], fit_near))
 
-    @property
-    def _convincing_fit(self) -> float:
+    def _is_convincing(self, fit: float, fit_near: float) -> bool:
         """Of a place that odometry did not lead to: what fits badly on the way there does not lower it much."""
-        return _CONVINCING_FIT * max(self._usual_fit, _POOR_FIT * self._lasting_fit)
+        usual = fit > _CONVINCING_FIT * max(self._usual_fit, _POOR_FIT * self._lasting_fit)
+        return bool(usual and fit >= least_fit_elsewhere(fit_near))
 
     def _confirmed(
         self, suspect: Optional[np.ndarray], odom_from_base: np.ndarray, points_m: np.ndarray
@@ -123,7 +129,7 @@ class ScanRegistration:
         if suspect is None:
             return None
         again = self._align_around(se2.compose(suspect, odom_from_base), np.zeros((3, 3)), _LEVELS[0], points_m)
-        return again if again.fit[0] > self._convincing_fit else None
+        return again if self._is_convincing(again.fit[0], self._fit_ahead) else None
 
     def _search(
         self, mean: np.ndarray, covariance: np.ndarray, odom_from_base: np.ndarray, points_m: np.ndarray
@@ -131,7 +137,7 @@ class ScanRegistration:
         """map_from_odom of a farther place where the scan fits as scans usually do."""
         for level in _LEVELS[1:]:
             farther = self._align_around(mean, covariance, level, points_m)
-            if farther.fit[0] > self._convincing_fit:
+            if self._is_convincing(farther.fit[0], self._fit_ahead):
                 return se2.compose(farther.poses[0], se2.inverse(odom_from_base))
         return None
 
@@ -152,6 +158,20 @@ class ScanRegistration:
             fit = scan_alignment.fit(self._field, points_m, starts)
             starts = starts[np.argsort(-fit)[:_ALIGNED_STARTS]]
         return scan_alignment.distinct(scan_alignment.align(self._field, points_m, starts, last_scale_m=self._scale_m))
+
+
+def worth(fit: float) -> float:
+    """Of a scan with that fit as evidence, 0..1: 0 if the map explains half of it or less, 1 from three quarters on."""
+    return float(np.clip((fit - _HALF) / (_MOST - _HALF), 0.0, 1.0)) ** 2
+
+
+def least_fit_elsewhere(fit_near: float) -> float:
+    """Fit that a place needs which odometry did not lead to: half of what does not fit where odometry leads fits there.
+
+    A robot that slipped sees all of it explained. What the map lacks, people and panes, stays unexplained anywhere: then a
+    place elsewhere that fits a little better does so by chance.
+    """
+    return fit_near + _EXPLAINED * (1.0 - fit_near)
 
 
 def _within(poses: np.ndarray, mean: np.ndarray, deviations: np.ndarray) -> np.ndarray:

@@ -66,7 +66,7 @@ class JointVerdict:
             reason = f"{self._place(belief)}; it explains {explained:.0%} of the walls seen"
             return self._estimate(SearchState.CONFIRMED, reason, depth, dart, None, belief.poses[0].copy())
         if 1.0 - belief.elsewhere < risk and belief.searches >= _LOST_SEARCHES and belief.driven_m >= _LOST_M:
-            reason = f"no place of the map explains what was seen: the best one {explained:.0%} of the walls"
+            reason = f"no place in the map explains what was seen: the best one {explained:.0%} of the walls"
             return self._estimate(SearchState.LOST, reason, depth, np.zeros(0, np.int64), None)
         return None
 
@@ -88,7 +88,7 @@ class JointVerdict:
         if len(left) < 2 or not len(dart):
             state = SearchState.TENTATIVE if len(left) == 1 else SearchState.SEARCHING
             choice = TurnChoice(self._least_passed(here), here.degree)
-            reason = f"{places}; next a new edge, as more walls are to confirm it"
+            reason = f"{places}; next a new edge, to see more walls"
             return self._estimate(state, reason, depth, dart, choice)
         poses, share = belief.poses[known], belief.share[known]
         if self._views is not None:
@@ -121,7 +121,7 @@ class JointVerdict:
             if self._views is not None and not self._views.is_exhausted and self._has_passed_all(here):
                 reason = f"{len(dart)} places match, and nothing that is left to see tells them apart"
                 return self._estimate(SearchState.AMBIGUOUS, reason, depth, dart, None)
-        reason = f"{places}; no turn is known to tell them apart, next a new edge"
+        reason = f"{places}; no turn is known to tell them apart; next a new edge"
         return self._estimate(
             SearchState.SEARCHING, reason, depth, dart, TurnChoice(self._least_passed(here), here.degree)
         )

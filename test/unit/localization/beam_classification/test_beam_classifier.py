@@ -12,6 +12,7 @@ from glass_nav.geometry import se2
 from glass_nav.localization.beam_classification.beam_classifier import BeamClassifier
 from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.vocabulary import BeamCase
+from glass_nav.world.grid_map import UNKNOWN
 
 PARAMS = LocalizerParams().classifier
 MAP = GLASS_ROOM.grid_map()
@@ -87,3 +88,20 @@ def test_beams_behind_the_pane_are_cut_at_it_when_the_pose_is_trusted(trusted):
     behind = case == BeamCase.FIRST_PENETRATION
     assert surfaces.cut[behind].mean() > 0.8 if trusted else not surfaces.cut.any()
     assert not surfaces.cut[~behind].any()
+
+
+@pytest.mark.parametrize("mapped", [pytest.param(True, id="a pane"), pytest.param(False, id="an opening")])
+def test_a_beam_leaves_the_map_through_a_surface_or_where_there_is_none(mapped):
+    """The room behind x = 6 m is not mapped."""
+    x_m = MAP.centres(*np.indices(MAP.occupancy.shape))[..., 0]
+    occupancy = MAP.occupancy.copy()
+    occupancy[x_m > 6.1] = UNKNOWN
+    if not mapped:
+        occupancy[(np.abs(x_m - 6.0) < 0.2) & MAP.occupied] = 0
+    scan, case = seen(passes=True)
+    beams = np.flatnonzero(scan.answered)
+    left = BeamClassifier(PARAMS, replace(MAP, occupancy=occupancy)).left_through_surfaces(scan, beams, POSE)
+    far = se2.transform_points(POSE, scan.points_in_base()[beams])[:, 0] > 7.0
+    assert far.any() and not far.all()
+    assert left[far].mean() > 0.95 if mapped else left[far].mean() < 0.2
+    assert not left[~far & (case[beams] == BeamCase.DIFFUSE)].any()

@@ -128,3 +128,40 @@ def test_the_compiled_covariances_agree_with_numpy(seed):
 def test_a_covariance_that_is_not_definite_is_refused():
     with pytest.raises(ValueError, match="not positive definite"):
         pose_covariance.better_of(-np.eye(3), np.eye(3))
+
+
+def corrected(worth, then=None, steps=10):
+    """Deviation along x of what is not proven after a correction of 0.2 m by a scan of such worth, and some scans more."""
+    pose = PoseCovariance(np.zeros((3, 3)))
+    pose.update(None, np.zeros(3), fit(0.02, 0.02, 0.005), NOISE)
+    at = STEP + [0.2, 0.0, 0.0]
+    pose.update(STEP, at, fit(0.02, 0.02, 0.005), NOISE, worth)
+    for _ in range(steps if then is not None else 0):
+        at = se2.compose(at, STEP)
+        pose.update(STEP, at, fit(0.02, 0.02, 0.005), NOISE, then)
+    return pose, np.sqrt(pose.unproven[0, 0])
+
+
+def test_a_correction_by_a_scan_that_hardly_fits_stays_in_doubt():
+    assert corrected(1.0)[1] == 0.0
+    assert 0.15 < corrected(0.3)[1] < corrected(0.0)[1] == pytest.approx(0.2)
+
+
+def test_scans_that_fit_better_prove_a_correction():
+    assert corrected(0.0, then=0.0)[1] == pytest.approx(0.2)
+    assert 0.0 < corrected(0.0, then=0.9)[1] < corrected(0.0, then=0.3)[1] < 0.2
+    assert corrected(0.0, then=1.0)[1] == 0.0
+
+
+def test_other_evidence_proves_a_correction():
+    pose, _ = corrected(0.0)
+    pose.narrow(np.diag(np.square([0.05, 0.05, 0.05])))
+    assert not pose.unproven.any()
+
+
+def test_odometry_is_judged_only_by_scans_that_fit():
+    def scale(worth):
+        pose, _ = corrected(worth)
+        return pose.carried(np.array([1.0, 0.0, 0.0]), NOISE)[0, 0]
+
+    assert scale(0.0) < scale(0.3) < scale(1.0)

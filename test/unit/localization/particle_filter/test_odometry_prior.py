@@ -35,3 +35,10 @@ def test_headings_are_compared_around_the_circle():
 
 def test_information_is_the_inverse_of_the_widened_covariance():
     np.testing.assert_allclose(OdometryPrior(HERE, COVARIANCE).information @ NEAR, np.eye(3), atol=1e-9)
+
+
+def test_what_odometry_reaches_are_poses_within_three_deviations():
+    deviations = np.sqrt(np.diag(NEAR))
+    alone = OdometryPrior(HERE, np.diag(np.diag(COVARIANCE)))
+    poses = [HERE + share * deviations * axis for share in (2.9, 3.1) for axis in np.eye(3)]
+    assert alone.reaches(np.array(poses)).tolist() == [True] * 3 + [False] * 3

@@ -31,7 +31,7 @@ def started(at=TRUE, spread=SPREAD, params=PARAMS, **changes):
 
 def updated(particles, scan, classifier=None):
     classifier = classifier or BeamClassifier(PARAMS.classifier, MAP)
-    registration = particles.register(scan, np.zeros(3), classifier.residuals)
+    registration = particles.register(scan, np.zeros(3), classifier)
     cases, _ = classifier.classify(scan, registration.map_from_base, registration.covariance)
     particles.weigh(scan, cases, registration, classifier)
     particles.estimate()
@@ -154,7 +154,36 @@ def test_a_cabinet_beside_the_robot_does_not_pull_a_pose_that_odometry_knows(beh
     scan = Building(outline, walls=[(1.0, behind_m, 7.0, behind_m)]).scan(true, rng=np.random.default_rng(0))
     particles = ParticleFilter(PARAMS.particle_filter, DistanceField(grid_map), np.random.default_rng(0))
     particles.start_around(true, np.array([0.02, 0.02, 0.01]))
-    residuals = BeamClassifier(PARAMS.classifier, grid_map).residuals
-    registration = particles.register(scan, np.zeros(3), residuals, np.diag([0.01, 0.01, 0.0025]) ** 2)
+    classifier = BeamClassifier(PARAMS.classifier, grid_map)
+    registration = particles.register(scan, np.zeros(3), classifier, np.diag([0.01, 0.01, 0.0025]) ** 2)
     way_m, turn_rad = off(registration.map_from_base, true)
     assert way_m < 0.03 and turn_rad < np.radians(0.5)
+
+
+@pytest.mark.parametrize(
+    ("share", "is_worth"),
+    [pytest.param(0.2, True, id="a few people"), pytest.param(0.7, False, id="most of what it sees")],
+)
+def test_a_scan_is_worth_nothing_where_the_map_lacks_most_of_what_it_sees(share, is_worth):
+    scan = L_ROOM.scan(TRUE, rng=np.random.default_rng(0))
+    shorter = np.random.default_rng(1).permutation(len(scan.ranges_m))[: int(share * len(scan.ranges_m))]
+    ranges_m = scan.ranges_m.copy()
+    ranges_m[shorter] *= np.linspace(0.3, 0.7, len(shorter))
+    particles = started(spread=np.array([0.01, 0.01, 0.005]))
+    registration = updated(particles, replace(scan, ranges_m=ranges_m))
+    assert (registration.worth > 0.0) == registration.fits == particles.fits == is_worth
+
+
+def test_a_pose_that_odometry_rules_out_and_the_scan_hardly_proves_is_not_taken():
+    """Of a scan that shows mostly what the map lacks, the rest fits 0.3 m farther along."""
+    scan = L_ROOM.scan(TRUE + [0.3, 0.0, 0.0], rng=np.random.default_rng(0))
+    shorter = np.random.default_rng(1).permutation(len(scan.ranges_m))[: int(0.7 * len(scan.ranges_m))]
+    ranges_m = scan.ranges_m.copy()
+    ranges_m[shorter] *= np.linspace(0.3, 0.7, len(shorter))
+    classifier, tight = BeamClassifier(PARAMS.classifier, MAP), np.diag([0.01, 0.01, 0.005]) ** 2
+    odd = started(spread=np.array([0.01, 0.01, 0.005])).register(
+        replace(scan, ranges_m=ranges_m), np.zeros(3), classifier, tight
+    )
+    clear = started(spread=np.array([0.01, 0.01, 0.005])).register(scan, np.zeros(3), classifier, tight)
+    assert off(odd.map_from_base, TRUE)[0] < 0.1
+    assert off(clear.map_from_base, TRUE)[0] > 0.25

@@ -7,6 +7,7 @@ import pytest
 from buildings import CORRIDOR, L_ROOM, Building, loop_drive, off
 
 from glass_nav.geometry import se2
+from glass_nav.localization.particle_filter import scan_registration
 from glass_nav.localization.particle_filter.scan_registration import ScanRegistration
 from glass_nav.sensing.distance_field import DistanceField
 
@@ -232,3 +233,23 @@ def test_scans_that_fit_ever_worse_do_not_make_a_bad_fit_convincing(l_room):
         points[elsewhere] = robot.rng.uniform(-8.0, 8.0, (elsewhere.sum(), 2))
         way_m, turn_rad = off(robot.find(odometry_at(true), points).poses[0], true)
         assert way_m < 0.05 and turn_rad < np.radians(2.0)
+
+
+@pytest.mark.parametrize(
+    ("fit", "near", "believed"),
+    [
+        pytest.param(0.95, 0.4, True, id="a robot that slipped"),
+        pytest.param(0.75, 0.3, True, id="a robot that slipped among some people"),
+        pytest.param(0.54, 0.3, False, id="most of the scan is not in the map, here as there"),
+        pytest.param(0.95, 0.92, False, id="it fits where odometry leads"),
+    ],
+)
+def test_a_place_elsewhere_has_to_explain_half_of_what_does_not_fit(fit, near, believed):
+    assert (fit >= scan_registration.least_fit_elsewhere(near)) == believed
+
+
+def test_a_scan_is_worth_the_more_the_more_of_it_fits():
+    worth = [scan_registration.worth(fit) for fit in (0.3, 0.5, 0.7, 0.8, 0.9, 1.0)]
+    assert worth[:2] == [0.0, 0.0]
+    assert worth[4:] == [1.0, 1.0]
+    assert 0.0 < worth[2] < worth[3] < 1.0

@@ -49,7 +49,7 @@ def test_a_scan_that_fits_nowhere_near_leaves_the_pose_as_it_was():
             L_ROOM.grid_map(),
             replace(SCAN, ranges_m=np.full(len(SCAN), np.inf)),
             HERE,
-            "no beam of the scan answered",
+            "no beam of the scan returned",
         ),
         (
             GridMap(np.zeros((40, 40), np.int8), 0.1, np.zeros(3)),

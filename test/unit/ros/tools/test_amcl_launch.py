@@ -59,7 +59,7 @@ def test_includes_args_groups_and_files_mean_what_they_mean_to_roslaunch(launch,
     lines = out.splitlines()
     assert lines[0] == f"# {launch}: node /r2/amcl (amcl/amcl)"
     assert (
-        "# laser_model_type: beam  # there is one sensor model here; vote_mode says how beams are told apart"
+        "# laser_model_type: beam  # there is one sensor model here; vote_mode selects how beams are classified"
     ) in lines
     assert "# unknown parameter ~odom_frame" in lines
     assert lines[-1] == "# remaps stay in the launch file: scan -> base_scan"
