@@ -62,6 +62,15 @@ class Scan:
         points_m.flags.writeable = False
         return points_m
 
+    @cached_property
+    def _one_of_each_piece(self) -> np.ndarray:
+        beams = np.flatnonzero(self.answered)
+        squares = np.floor(self.points_in_base()[beams] / _ONE_PIECE_M).astype(np.int64)
+        _, first = np.unique(squares @ [1, 2**31], return_index=True)
+        pieces = np.sort(beams[first])
+        pieces.flags.writeable = False
+        return pieces
+
     def as_measured(self, ranges_m: np.ndarray) -> np.ndarray:
         """(B,) ranges from where each beam began, of points on the beams with these ranges from the laser at the stamp.
 
@@ -181,9 +190,6 @@ def one_of_each_piece(scan: Scan) -> np.ndarray:
     """Indices of beams that returned, one for each square of the floor that any ended in.
 
     Neighbouring beams that end at one thing tell one thing. By angle, most beams end at what is close: a person beside the
-    robot would outvote all walls behind.
+    robot would outvote all walls behind. Not to be changed.
     """
-    beams = np.flatnonzero(scan.answered)
-    squares = np.floor(scan.points_in_base()[beams] / _ONE_PIECE_M).astype(np.int64)
-    _, first = np.unique(squares @ [1, 2**31], return_index=True)
-    return np.sort(beams[first])
+    return scan._one_of_each_piece

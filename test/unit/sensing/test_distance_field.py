@@ -140,3 +140,28 @@ def test_log_weights_are_those_of_the_distances():
     log_w = field.log_weights(points_m, poses, sigma_m, z_hit, z_rand)
     np.testing.assert_allclose(log_w, expected, atol=1e-5 * len(points_m))
     assert np.ptp(log_w) > 1.0
+
+
+@pytest.mark.parametrize("sigma_m", [0.02, 0.2])
+def test_log_weights_of_poses_close_together_are_those_of_each_alone(sigma_m):
+    """A cloud of particles in the map, at its border, and with one that is no pose."""
+    rng = np.random.default_rng(6)
+    field = DistanceField(scattered(6, TURNED))
+    points_m = rng.uniform(-0.8, 0.8, (40, 2))
+    for middle in ([1.5, 1.2, 0.1], [0.1, 1.2, 0.1], [1.5, 2.4, 0.1]):
+        poses = se2.compose(TURNED, np.array(middle) + rng.normal(0.0, [0.03, 0.03, 0.02], (70, 3)))
+        poses[5, 2] = np.nan
+        together = field.log_weights(points_m, poses, sigma_m, 0.9, 0.1)
+        alone = np.concatenate([field.log_weights(points_m, pose[None], sigma_m, 0.9, 0.1) for pose in poses])
+        np.testing.assert_allclose(np.delete(together, 5), np.delete(alone, 5), atol=1e-3)
+
+
+def test_in_blocks_points_are_as_one_by_one():
+    """In the map, outside of it, and what is no point."""
+    rng = np.random.default_rng(7)
+    field = DistanceField(scattered(7, TURNED))
+    x_m, y_m = rng.uniform(-3.0, 8.0, (2, 150))
+    x_m[70] = np.nan
+    together = np.array(field.at(x_m, y_m))
+    alone = np.array([field.at(x, y) for x, y in zip(x_m, y_m)]).T
+    np.testing.assert_array_equal(together, alone)

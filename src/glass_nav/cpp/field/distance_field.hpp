@@ -58,6 +58,8 @@ class DistanceField {
         row_[k] = field.row(pose[0], pose[1]);
         cos_[k] = std::cos(pose[2] - field.yaw_) * field.per_m_;
         sin_[k] = std::sin(pose[2] - field.yaw_) * field.per_m_;
+        moved_ = farther(moved_, std::hypot(column_[k] - column_[0], row_[k] - row_[0]));
+        turned_ = farther(turned_, std::hypot(cos_[k] - cos_[0], sin_[k] - sin_[0]));
       }
     }
 
@@ -67,7 +69,7 @@ class DistanceField {
         column[k] = column_[k] + cos_[k] * x_m - sin_[k] * y_m;
         row[k] = row_[k] + sin_[k] * x_m + cos_[k] * y_m;
       }
-      if (is_inside(column, field_.width_ + 0.999) && is_inside(row, field_.height_ + 0.999)) {
+      if (all_inside(column[0], row[0], moved_ + turned_ * std::hypot(x_m, y_m))) {
         distances_inside(column, row, distance_m);
         return;
       }
@@ -79,11 +81,15 @@ class DistanceField {
    private:
     using Values = std::array<double, kMost>;
 
-    /// Not if one is NaN.
-    bool is_inside(const Values& values, double most) const {
-      std::int64_t inside = 1;
-      for (std::size_t k = 0; k < count_; ++k) inside &= (values[k] > 0.0) & (values[k] < most);
-      return inside != 0;
+    /// NaN if one is.
+    static double farther(double one, double other) { return std::isnan(one) || one >= other ? one : other; }
+
+    /// Whether points that are at most so far from one lie in the grid. Not if one of these is NaN.
+    bool all_inside(double column, double row, double apart) const {
+      constexpr double kRounding = 1e-6;
+      const double margin = apart + kRounding;
+      return column > margin && column + margin < field_.width_ + 0.999 && row > margin &&
+             row + margin < field_.height_ + 0.999;
     }
 
     void distances_inside(const Values& column, const Values& row, float* distance_m) const {
@@ -114,6 +120,7 @@ class DistanceField {
     const DistanceField& field_;
     std::size_t count_;
     Values column_, row_, cos_, sin_;
+    double moved_ = 0.0, turned_ = 0.0;  // how far the frames are from the first [cells, cells / m]; NaN if one is
   };
 
   /// at() of several points, with the same bits: computed in loops that compilers turn into vector instructions, and

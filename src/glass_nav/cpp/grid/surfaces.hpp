@@ -227,7 +227,7 @@ class SurfaceFinder {
     double t_out = t_in;
     for (;;) {
       const bool occupied = cells_.occupied(walk.cell());
-      walk.leap(1);
+      walk.step();
       if (occupied) t_out = walk.t();
       if (t_out - t_in > max_length || t_out > walk.t_max()) return kInfinity;
       if (!walk.inside() || walk.t() - t_out >= min_gap) return t_out - t_in;

@@ -10,6 +10,7 @@ mobile robot, 1997). P particles.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import Tuple
@@ -94,9 +95,18 @@ def covariance(before_from_after: np.ndarray, noise: OdometryNoise) -> np.ndarra
 
     Args:
         before_from_after, noise: as for sample().
+
+    Returns:
+        Not to be changed.
     """
+    return _covariance(tuple(before_from_after.tolist()), noise)
+
+
+@functools.lru_cache(maxsize=16)  # several ask for it at each scan
+def _covariance(before_from_after: Tuple[float, float, float], noise: OdometryNoise) -> np.ndarray:
+    step = np.array(before_from_after)
     if noise.odom_model_type == WHEELS:
-        (left_m, right_m, turned), deviations = _wheels(before_from_after, noise)
+        (left_m, right_m, turned), deviations = _wheels(step, noise)
         forward_m, turn = 0.5 * (left_m + right_m), (right_m - left_m) / noise.wheel_base_m
         cos, sin = np.cos(turned + 0.5 * turn), np.sin(turned + 0.5 * turn)
         by_forward, by_turn = np.array([cos, sin, 0.0]), np.array([-0.5 * forward_m * sin, 0.5 * forward_m * cos, 1.0])
@@ -104,15 +114,17 @@ def covariance(before_from_after: np.ndarray, noise: OdometryNoise) -> np.ndarra
             [0.5 * by_forward - by_turn / noise.wheel_base_m, 0.5 * by_forward + by_turn / noise.wheel_base_m], axis=-1
         )
     elif noise.odom_model_type.startswith("omni"):
-        bearing, _, deviations = _omni(before_from_after, noise)
+        bearing, _, deviations = _omni(step, noise)
         cos, sin = np.cos(bearing), np.sin(bearing)
         by_error = np.array([[cos, 0.0, -sin], [sin, 0.0, cos], [0.0, 1.0, 0.0]])  # of distance, turn, sideways
     else:
-        (turn_1, distance, _), deviations = _diff(before_from_after, noise)
+        (turn_1, distance, _), deviations = _diff(step, noise)
         cos, sin = math.cos(turn_1), math.sin(turn_1)
         by_error = np.array([[-distance * sin, cos, 0.0], [distance * cos, sin, 0.0], [1.0, 0.0, 1.0]])
     scaled = by_error * deviations
-    return scaled @ scaled.T
+    found = scaled @ scaled.T
+    found.flags.writeable = False
+    return found
 
 
 def _wheels(step: np.ndarray, noise: OdometryNoise) -> Tuple[np.ndarray, np.ndarray]:

@@ -37,8 +37,8 @@ class Candidates:
     poses: np.ndarray  # (K, 3)
 
 
-class Heard:
-    """Filled by whoever listens, read by the demo."""
+class Reports:
+    """Filled by a listener, read by the demo."""
 
     def __init__(self) -> None:
         self.truth: Dict[int, np.ndarray] = {}  # (3,) poses by stamp
@@ -60,7 +60,7 @@ class Heard:
 
     @property
     def simulated_s(self) -> float:
-        """Time of the newest truth: the clock may come later than what is heard."""
+        """Time of the newest truth: the clock may be later than the reports."""
         return max(self.truth, default=0) * 1e-9
 
     @property

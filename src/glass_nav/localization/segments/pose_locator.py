@@ -29,7 +29,7 @@ class LocateAnswer:
         return self.refusal or f"free: {segment_locator.free_in_words(self.correction)}"
 
 
-class SegmentDesk:
+class PoseLocator:
     """Answers requests on the map that is in use. Safe to call from several threads."""
 
     def __init__(self) -> None:
@@ -46,7 +46,7 @@ class SegmentDesk:
         if rough.shape != (3,) or not np.all(np.isfinite(rough)):
             raise ValueError(f"the rough pose must be finite x, y, yaw, got {rough}")
         if not scan.answered.any():
-            raise ValueError("no beam of the scan answered")
+            raise ValueError("no beam of the scan returned")
         with self._lock:
             locator = self._locator(grid_map)
             if not len(locator.segments_m):
