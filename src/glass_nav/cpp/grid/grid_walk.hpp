@@ -42,6 +42,8 @@ class GridWalk {
   /// False once the ray has left the grid or is longer than t_max.
   bool inside() const { return t_ <= t_max_ && x_axis_.cell < x_axis_.size && y_axis_.cell < y_axis_.size; }
 
+  static constexpr bool is_doubtful() { return false; }  // as a FixedWalk may be
+
   /// Length of the ray where it entered the present cell.
   double t() const { return t_; }
 
