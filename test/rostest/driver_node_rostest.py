@@ -214,7 +214,7 @@ class Driver(unittest.TestCase):
         self.edges.send_goal(TraverseEdgeGoal(edge="LEFT"))
         result = self.await_end(self.edges)
         self.assertEqual(result.code, TraverseEdgeResult.NOT_AT_MEETPOINT)
-        self.assertEqual(result.reason, "the robot stands at no meetpoint: a goal without edge drives to one")
+        self.assertEqual(result.reason, "the robot is not at a meetpoint: a goal without edge drives to one")
         self.assertEqual(self.edges.get_state(), GoalStatus.ABORTED)
 
     def test_2_a_preempted_search_for_a_meetpoint_stands_at_once(self) -> None:

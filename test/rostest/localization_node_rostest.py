@@ -167,7 +167,7 @@ class LocalizationOnARealRobot(unittest.TestCase):
         self.lines.clear()
         self.player.set_clock()
         self.assertTrue(
-            wait_until(lambda: self.lines.having("time jumped back", "starts over"), 30.0),
+            wait_until(lambda: self.lines.having("time jumped back", "restarts"), 30.0),
             "nothing said about the jump within 10 s",
         )
         self.play()

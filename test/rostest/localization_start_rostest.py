@@ -197,7 +197,7 @@ class LocalizationStart(unittest.TestCase):
         with part("odometry begins anew"):
             self.robot.map_from_odom = here
             self.robot.make_steps(2)
-            np.testing.assert_allclose(self.start_again(path, "of the pose file", "began anew"), here, atol=0.3)
+            np.testing.assert_allclose(self.start_again(path, "of the pose file", "odometry restarted"), here, atol=0.3)
         for change, words in (
             ({"map": "0" * 16}, "it is of map 0000000000000000"),
             ({"stamp_ns": 10**9}, "~pose_file_max_age_s is 604800 s"),

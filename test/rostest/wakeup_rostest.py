@@ -130,7 +130,7 @@ class WakeUp(unittest.TestCase):
         self.await_(lambda: self.odometry.last.twist.twist.linear.x == 0.0, 20.0, "standstill without a driver")
         self.start(driver())
         self.await_(
-            lambda: self.lines.having("it came to this meetpoint along no edge: the search goes on by dead reckoning"),
+            lambda: self.lines.having("the robot did not come along one edge: the search continues by dead reckoning"),
             STEP_S,
             "meetpoint of the second driver",
         )

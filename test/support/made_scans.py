@@ -42,6 +42,7 @@ class MadeScans:
         """
         self.share, self.proposed = share, np.asarray(proposed, float)
         self.judged = 0  # poses
+        self.free: Callable[[np.ndarray], np.ndarray] = lambda points_m: np.ones(points_m.shape[:-1], bool)
 
     def search(self, scan: Scan, odom_from_base: np.ndarray) -> Optional[Places]:
         return Places(self.proposed) if scan.answered.any() else None
@@ -54,7 +55,10 @@ class MadeScans:
         ends_m = np.column_stack([np.arange(BEAMS) // 2 - 0.25 * BEAMS, 3.0 * side])
         order = (np.arange(BEAMS) * 7) % BEAMS  # what is explained is spread over the walls
         explained = order < np.rint(self.share(map_from_base) * BEAMS)[:, None]
-        return BeamsExplained(np.array(map_from_base), ends_m, explained, np.ones_like(explained))
+        return BeamsExplained(np.array(map_from_base), ends_m, explained, np.ones_like(explained), ~explained)
+
+    def is_free(self, points_m: np.ndarray) -> np.ndarray:
+        return self.free(points_m)
 
     def seen_from(self, map_from_base: np.ndarray) -> Scan:
         return scan()

@@ -256,7 +256,7 @@ def _opposite(with_map: bool, lidar: str, link: str) -> Finding:
         return Finding(
             "odometry-turns-opposite",
             f"{link} turns the other way than the scans, which fit the map as they are",
-            "the yaw of odometry has the wrong sign: swap left and right wheel, or turn the gyro's axis round",
+            "the yaw of odometry has the wrong sign: swap left and right wheel, or invert the axis of the gyro",
         )
     return Finding(
         "turns-opposite",

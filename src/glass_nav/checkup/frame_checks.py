@@ -23,7 +23,7 @@ _UNCOVERED = 0.02  # share of the scans that may have no odometry: before it sta
 
 
 def check_links(transforms: Sequence[HeardTransform]) -> Iterator[Finding]:
-    """Findings on what is wrong with links whoever uses them."""
+    """Findings on links that are wrong for any user."""
     slashed = sorted({name for each in transforms for name in (each.parent, each.child) if name.startswith("/")})
     if slashed:
         yield Finding(

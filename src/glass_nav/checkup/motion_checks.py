@@ -146,7 +146,7 @@ def check(moves: Moves, lidar: str, link: str, opposite: bool) -> Iterator[Findi
             yield Finding(
                 "odometry-stands",
                 f"{link} does not move, but the scans do",
-                "the wheels' encoders or their node are dead: rostopic echo the odometry while driving",
+                "the wheel encoders or their node do not work: rostopic echo the odometry while driving",
             )
         return
     ways, turns = way_ratio(moves), turn_ratio(moves)

@@ -122,7 +122,7 @@ def main(arguments: argparse.Namespace) -> bool:
     for each in failed:
         _say(f"{each.job}: {each.reason}")
     if failed and not made:
-        raise ValueError(f"none of {len(failed)} runs could be made; the first: {failed[0].reason}")
+        raise ValueError(f"none of {len(failed)} runs could be run; the first: {failed[0].reason}")
     names = [each.name for each in everyone if any(run.contestant == each.name for run in runs)]
     compared = comparison.of(runs, names, list(maps))
     for note in compared.notes:
@@ -131,9 +131,7 @@ def main(arguments: argparse.Namespace) -> bool:
     print("\n".join(comparison_table.lines(compared)))
     print(f"written to {page}")
     if failed:
-        raise ValueError(
-            f"{len(failed)} of {len(failed) + len(made)} runs could not be made, see above; the others are compared"
-        )
+        raise ValueError(f"{len(failed)} of {len(failed) + len(made)} runs failed, see above; the others are compared")
     missed = comparison.failures(compared, _limits(arguments))
     for line in missed:
         _say(line)

@@ -109,7 +109,7 @@ def main(arguments: argparse.Namespace) -> None:
     if not len(locator.segments_m):
         raise ValueError(f"{arguments.map}: no wall of the map is long enough for a segment")
     if not scan.answered.any():
-        raise ValueError(f"{arguments.scan}: no beam of the scan answered")
+        raise ValueError(f"{arguments.scan}: no beam of the scan returned")
     rough = np.array(arguments.pose)
     located = locator.locate(scan, rough)
     found = located.correction

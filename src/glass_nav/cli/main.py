@@ -32,9 +32,7 @@ def main(argv: Optional[List[str]] = None) -> int:
     except ImportError as err:
         if not str(err.name).startswith("glass_nav"):
             raise
-        print(
-            f"glass_nav: {err.name or err} is not there: build the package and source its setup.bash", file=sys.stderr
-        )
+        print(f"glass_nav: {err.name or err} is missing: build the package and source its setup.bash", file=sys.stderr)
         return BAD_INPUT
     modules: Dict[str, Any] = {
         "atlas": atlas,

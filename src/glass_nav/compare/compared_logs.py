@@ -48,7 +48,7 @@ def _items(listing: Path) -> List[Any]:
     try:
         items = yaml.safe_load(listing.read_text())
     except (UnicodeDecodeError, yaml.YAMLError) as err:
-        raise ValueError(f"{listing}: is no yaml: {' '.join(str(err).split())}") from err
+        raise ValueError(f"{listing}: is not yaml: {' '.join(str(err).split())}") from err
     if not isinstance(items, list) or not items:
         raise ValueError(f"{listing}: must be a list of log and map, a log each, got {type(items).__name__}")
     return items

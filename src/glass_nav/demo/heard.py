@@ -38,7 +38,7 @@ class Candidates:
 
 
 class Heard:
-    """Filled by whoever listens, read by the demo."""
+    """Filled by a listener, read by the demo."""
 
     def __init__(self) -> None:
         self.truth: Dict[int, np.ndarray] = {}  # (3,) poses by stamp

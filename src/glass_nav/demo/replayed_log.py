@@ -44,7 +44,7 @@ class MapAgreement:
             f" of {len(self.ours_m)} scans."
         )
         if reference_m > _DISAGREES * ours_m:
-            yield "So the ground truth does not agree with the map, and most of the error above is the ground truth's."
+            yield "So the ground truth does not agree with the map, and causes most of the error above."
             yield '"misleading" counts the scans in which the two differ by more than the protection level of glass_nav.'
 
 

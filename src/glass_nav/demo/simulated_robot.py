@@ -41,7 +41,7 @@ class SimulatedRobot:
             grid_map: that it is given.
             atlas: that it is given.
             seed: of the particle filter.
-            say: takes the lines for whoever watches.
+            say: prints a line for the user.
             search: how it is done.
         """
         self.heard = Heard()

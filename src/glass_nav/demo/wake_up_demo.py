@@ -68,7 +68,7 @@ class Arrival:
 
 
 class DemoRobot(Protocol):
-    """The robot and whoever watches."""
+    """The robot and the user."""
 
     def listen(self) -> None:
         """Wait a moment, then put what came into Heard."""
@@ -151,7 +151,7 @@ class WakeUpDemo:
             return False
         if not self._wait(lambda: self._state != SearchState.LOST, wall_s=RESTART_LIMIT_S):
             return False
-        self._robot.say("LOST: another search begins where the robot stands")
+        self._robot.say("LOST: a new search starts where the robot stands")
         return True
 
     def _is_right(self, found: SearchNews) -> bool:

@@ -54,10 +54,10 @@ class WiredRobot:
         self.initial_pose: Optional[np.ndarray] = None  # (3,) that the search found
         self.arrival: Optional[Arrival] = None  # reported last
         self.ends: List[decisions.GoalEnd] = []
-        self.failures: List[str] = []  # tasks that nobody waits for
+        self.failures: List[str] = []  # tasks without a client
         self.collisions = 0  # control steps in which the base stood at an obstacle
         self.on_status: Callable[[SearchStatus], None] = lambda status: None
-        self._localizer: Optional[Localizer] = None  # None: nobody localizes yet
+        self._localizer: Optional[Localizer] = None  # None: not localized yet
         self._map_from_odom: Optional[np.ndarray] = None
         self._scans: Dict[int, Scan] = {}  # by stamp
         self._command = np.zeros(3)

@@ -58,7 +58,7 @@ class DriveStatus:
 
 @dataclass(frozen=True)
 class Feedback:
-    """The status, for whoever waits for the task."""
+    """The status, for the client of the task."""
 
     action: Action
     status: DriveStatus

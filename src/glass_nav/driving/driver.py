@@ -60,7 +60,7 @@ class _Job:
 
     task: Task
     name: str  # in words
-    action: Optional[Action] = None  # None: nobody waits for a result
+    action: Optional[Action] = None  # None: no client waits for a result
     travelled_m: float = 0.0
     halted_since_s: float = math.nan
 
@@ -150,7 +150,7 @@ class Driver:
 
     def reset(self, why: str) -> List[Decision]:
         """Time jumped back: odometry and stamps begin anew, and so does the driver."""
-        self._log(f"{why}: the driver starts over", logging.WARNING)
+        self._log(f"{why}: the driver restarts", logging.WARNING)
         if self._job is not None:
             self._finish(self._job, Ending(Outcome.RESET, why))
         self._edge.reset()
@@ -178,7 +178,7 @@ class Driver:
     def search_reports(self, state: SearchState) -> List[Decision]:
         """The search in the atlas reports its state; the robot does not drive for a search without an atlas."""
         if state == SearchState.WAITING and self._search != SearchState.WAITING:
-            self._seeking.succeeds()  # somebody asks anew
+            self._seeking.succeeds()  # a new request
         began, self._search = state != self._search, state
         if began and self._search_is(SearchState.NO_ATLAS):
             why = "the search has no atlas of the map that is served"
@@ -238,7 +238,7 @@ class Driver:
             if edge.strip():
                 arrival = self._arrival
                 if arrival is None:
-                    why = "the robot stands at no meetpoint: a goal without edge drives to one"
+                    why = "the robot is not at a meetpoint: a goal without edge drives to one"
                     return self._refused(action, name, Ending(Outcome.NOT_AT_MEETPOINT, why))
                 rank = rank_from_words(edge, arrival.meetpoint.degree)
             task = self._edge_task(rank)
@@ -311,7 +311,7 @@ class Driver:
             return f"{self._job.name} is on"
         arrival = self._arrival
         if arrival is None:
-            return "the robot stands at no meetpoint"
+            return "the robot is not at a meetpoint"
         if stamp_ns in (0, arrival.stamp_ns):
             return None
         return (
@@ -364,7 +364,7 @@ class Driver:
         self._say(job.task.phase, job.task.reason, job.name)
 
     def _halt(self, job: _Job, ending: Ending) -> None:
-        """Stand until the trouble is over; somebody who waits gets a result when that takes too long."""
+        """Stand until the trouble is over; if that takes too long, the client gets a result."""
         job.task.hold()
         if job.task.steers:
             self._command(np.zeros(3))
@@ -377,7 +377,7 @@ class Driver:
             self._finish(job, Ending(ending.outcome, f"{ending.reason}, for {halted_s:.0f} s"))
 
     def _finish(self, job: _Job, ending: Ending) -> None:
-        """The task is over: the robot stands, whoever waits gets a result."""
+        """The task is over: the robot stops, and the client gets a result."""
         self._job = None
         arrival = job.task.arrival if isinstance(job.task, EdgeTask) else None
         if ending.outcome != Outcome.SUCCEEDED:
@@ -418,7 +418,7 @@ class Driver:
         if arrival.traversal is not None:
             self._decisions.append(TraversalReport(arrival))
         elif self._search_is(*IN_SEARCH):
-            self._log("it came to this meetpoint along no edge: the search goes on by dead reckoning", logging.WARNING)
+            self._log("the robot did not come along one edge: the search continues by dead reckoning", logging.WARNING)
             self._decisions.append(TraversalReport(replace(arrival, traversal=NOT_FOLLOWED)))
         self._report(arrival)
 

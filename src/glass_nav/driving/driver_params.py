@@ -16,7 +16,7 @@ class DriverRules:
 
     follow_turn_choice: bool = True  # drive as the topology node says
     seek_at_start: bool = True  # drive to a meetpoint at the start, and whenever a search waits for one
-    seek_attempts: int = 3  # failed attempts in a row before a search waits for somebody
+    seek_attempts: int = 3  # failed attempts in a row after which a search waits for a request
     report_visits: bool = True  # of nodes passed on the way to a goal, from which the atlas learns
     control_rate_hz: float = 20.0  # of cmd_vel
     scan_timeout_s: float = 0.6  # an older scan stops the robot

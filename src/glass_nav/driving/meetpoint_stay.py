@@ -35,7 +35,7 @@ class MeetpointStay:
         self.arrival, self._reported_s = None, -math.inf
 
     def was_left(self, odom_from_base: Optional[np.ndarray]) -> bool:
-        """Whether the robot is no longer where it arrived, though nobody told it to leave."""
+        """Whether the robot is no longer where it arrived, although no task moved it."""
         if self.arrival is None or odom_from_base is None:
             return False
         return float(np.hypot(*(odom_from_base - self._arrived_at)[:2])) > MOVED_M

@@ -33,7 +33,7 @@ class SeekPolicy:
         self._failures += 1
 
     def succeeds(self) -> None:
-        """The robot arrived, or somebody asked for a new search: earlier failures do not count."""
+        """The robot arrived, or a new search was requested: earlier failures do not count."""
         self._failures = 0
 
     def leave_to_others(self) -> None:
@@ -41,7 +41,7 @@ class SeekPolicy:
         self._failures = self._attempts
 
     def is_due(self, waits: bool, searching: bool) -> bool:
-        """Whether to seek now, while the robot stands at no meetpoint and nothing is on.
+        """Whether to seek now, while the robot is not at a meetpoint and nothing is on.
 
         Args:
             waits: a search waits for a meetpoint.

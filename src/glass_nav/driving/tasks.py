@@ -21,7 +21,7 @@ from glass_nav.driving.route_follower import RouteFollower, RouteFollowerParams
 from glass_nav.topology.observations import turn_name
 from glass_nav.vocabulary import DriverPhase, Outcome
 
-HELD = "the robot makes no progress, something that the lidar does not see may hold it"
+HELD = "the robot makes no progress; an obstacle that the lidar does not see may block it"
 BLOCKED_S = 3.0  # braked to a standstill for so long
 OFF_ROUTE_M = 0.6  # then there is another route
 STANDSTILL_M_S = 0.03
@@ -49,7 +49,7 @@ class Task(Protocol):
     """A task of the driver; it moves the robot only in step()."""
 
     needs_pose: bool  # in the map
-    steers: bool  # its commands go to the base; False: somebody else's do
+    steers: bool  # its commands go to the base; False: another driver's do
     ending: Optional[Ending]  # None: it goes on
 
     def step(self, now: Moment) -> np.ndarray:
@@ -269,7 +269,7 @@ class GoTask:
         if self._stopped_s > BLOCKED_S:
             self._stopped_s = 0.0
             self._recovery.begin(
-                f"something stands in the way, {self.remaining_m:.1f} m before the goal", now.odom_from_base
+                f"something is in the way, {self.remaining_m:.1f} m before the goal", now.odom_from_base
             )
             return self._recover(now, obstacles_m)
         command = velocity.limited(safe, now.last_command, self._limits, now.dt_s)

@@ -10,7 +10,8 @@ Evidence is a log likelihood ratio to `elsewhere`: the robot is at none of these
 a pose that was missed. There the map explains as much as it does by chance. How much that is depends on the scan (two
 parallel walls fit everywhere), so it is measured: it is what the tenth best of the distinct places of the map
 explains. The tenth and not the second, because places that look alike are no evidence for elsewhere. The ratio of one
-piece is bounded, since the pieces of one moved object are wrong together.
+piece is bounded, since the pieces of one moved object are wrong together. A pose whose path crosses walls loses, too
+(driven_path.py).
 
 The formulation is ours; the document (seed document global_localization_procedure.txt) has no scans. Multi-hypothesis
 tracking: Jensfelt, Kristensen, Active global localization for a mobile robot using multiple hypothesis tracking
@@ -26,6 +27,7 @@ import numpy as np
 
 from glass_nav.geometry import se2
 from glass_nav.hypotheses import new_walls, pose_tracker
+from glass_nav.hypotheses.driven_path import PIECE_M, DrivenPath
 from glass_nav.hypotheses.new_walls import NewWalls
 from glass_nav.hypotheses.scan_explanation import BeamsExplained
 from glass_nav.sensing.scan import Scan
@@ -34,7 +36,10 @@ _NATS = 0.5  # of a piece of wall that the map explains, to one that it does not
 _CHANCE, _MAX_CHANCE = 0.7, 0.9  # share that is explained elsewhere: at least, at most
 _UNCHOSEN = 0.05  # less is explained by chance in a scan that did not choose the pose
 _CHANCE_RANK = 10  # of the distinct places, by what the map explains: nobody expects so many copies of a place
+_BLOCKED_NATS = 1.0  # that a piece of the path takes from a pose where walls block it
+_TRACED_PIECES = int(3.0 / PIECE_M)  # of the path after a view, by which a new pose is judged: odometry drifts
 _MIN_NEW = 4.0  # pieces of wall that make a view
+_MIN_DISPUTED, _FEW = 2.0, 8  # ... that few likely poses do not agree about
 _MOVED_M, _TURNED_RAD = 0.5, 0.5  # then poses slide to where the scan fits, new walls or not
 _SLIDES_M, _SLIDES_RAD = 0.5, np.radians(15.0)  # a pose that is new
 _OFF_M, _OFF_SHARE, _OFF_RAD = 0.2, 0.04, np.radians(10.0)  # a pose carried by odometry: at most, and per metre
@@ -44,9 +49,10 @@ _MAX_POSES = 600
 _AT_ONCE, _JUDGED_FIRST = 400, 2000  # poses found that are judged while one scan comes: 60 ms; of the first search
 _TRACED = 40  # new poses that are traced back: up to 0.1 ms for each of the views
 _AS_GOOD = 0.1  # share that a new pose explains less than the best: not worth tracing
-_SEARCH_AGAIN_M = 3.0
+_SEARCH_AGAIN_M, _SEARCH_SOON_M = 3.0, 1.0  # sooner where no pose is likely
+_HOPELESS = -5.0  # log likelihood ratio of the best pose to elsewhere
 _APART_M = 0.7  # places
-NEW = -2  # label of a pose that nobody has weighed
+NEW = -2  # label of a pose without a weight
 
 
 class Search(Protocol):
@@ -71,6 +77,9 @@ class MapScans(Protocol):
     def seen_from(self, map_from_base: np.ndarray) -> Scan:
         """The scan that a robot at a pose (3,) would see if the map were right."""
 
+    def is_free(self, points_m: np.ndarray) -> np.ndarray:
+        """(...) bool: by the map a robot may stand at points (..., 2) [m]."""
+
 
 @dataclass(frozen=True)
 class _View:
@@ -92,12 +101,12 @@ class _View:
 class Evidence:
     """The evidence for K poses."""
 
-    nats: np.ndarray  # (K,) log likelihood ratios to elsewhere, by the scans
+    nats: np.ndarray  # (K,) log likelihood ratios to elsewhere, by the scans and the path
     checked_nats: np.ndarray  # (K,) the part of them by scans that did not choose the pose
     explained: np.ndarray  # (K,) pieces of wall that the map explains
     seen: np.ndarray  # (K,) pieces of wall that it should
     other_nats: np.ndarray  # (K,) log likelihood ratios by what is not a scan
-    label: np.ndarray  # (K,) int, of whoever weighs the poses; NEW: not weighed yet
+    label: np.ndarray  # (K,) int, given by the caller; NEW: not weighted yet
 
     @classmethod
     def none(cls, count: int) -> Evidence:
@@ -119,6 +128,11 @@ class Evidence:
             explained=self.explained + explained,
             seen=self.seen + seen,
         )
+
+    def with_path(self, blocked: np.ndarray) -> Evidence:
+        """Of which so many pieces (K,) are blocked."""
+        nats = _BLOCKED_NATS * blocked
+        return replace(self, nats=self.nats - nats, checked_nats=self.checked_nats - nats)
 
     @property
     def total(self) -> np.ndarray:
@@ -144,13 +158,14 @@ class PoseBelief:
         self.evidence = Evidence.none(0)
         self.driven_m = 0.0
         self.searches = 0  # of the whole map, complete
-        self._walls = NewWalls()
+        self._walls, self._disputed, self._path = NewWalls(), NewWalls(), DrivenPath()
+        self._pieces = 0  # of the path that poses were judged by
         self._views: List[_View] = []
         self._odom_from_base: Optional[np.ndarray] = None  # at the last scan
         self._judged_at: Optional[np.ndarray] = None  # odometry
         self._judged_m = self._searched_m = 0.0  # distance driven
         self._search: Optional[_SearchedScan] = None
-        self._chance = _CHANCE
+        self._chance = _CHANCE  # share that is explained elsewhere, of scans that did not choose the poses
 
     @property
     def poses(self) -> np.ndarray:
@@ -168,6 +183,7 @@ class PoseBelief:
         self._odom_from_base = np.array(odom_from_base, float)
         if step is not None:
             self.driven_m += float(se2.travelled(step)[0])
+        self._path.add(odom_from_base, self.driven_m)
 
     def see(self, scan: Scan, odom_from_base: np.ndarray) -> bool:
         """Process a scan.
@@ -227,11 +243,22 @@ class PoseBelief:
         if view is not None:
             self._views.append(view)
             self.evidence = self.evidence.with_view(*_of_view(beams, view))
+        self._judge_path()
         self._keep_distinct()
-        far = self.driven_m - self._searched_m >= _SEARCH_AGAIN_M or not len(self._tracker)
-        if far and self._search is None:
+        hopeless = self.evidence.total.max(initial=-np.inf) < _HOPELESS
+        far = self.driven_m - self._searched_m >= (_SEARCH_SOON_M if hopeless else _SEARCH_AGAIN_M)
+        if (far or not len(self._tracker)) and self._search is None:
             self._begin_search(scan)
         return True
+
+    def _judge_path(self) -> None:
+        assert self._odom_from_base is not None
+        first, self._pieces = self._pieces, self._path.complete
+        blocked = self._blocked(self._tracker.poses, self._odom_from_base, first, self._pieces)
+        self.evidence = self.evidence.with_path(blocked)
+
+    def _blocked(self, poses: np.ndarray, odom_from_base: np.ndarray, first: int, last: int) -> np.ndarray:
+        return self._path.blocked(self._scans.is_free, poses, odom_from_base, first, last)
 
     def _view(self, scan: Scan, beams: BeamsExplained) -> Optional[_View]:
         """None: too little of it is new."""
@@ -239,11 +266,21 @@ class PoseBelief:
         if not len(beams.poses):
             return None
         new = self._walls.of(beams.ends_m, self._odom_from_base, self.driven_m)
-        pieces = _counted(beams, new, int(self.evidence.total.argmax()))
-        if pieces.sum() < _MIN_NEW:
+        total = self.evidence.total
+        likely = total >= total.max() - _BY_SCANS
+        pieces = _counted(beams, new, likely)
+        at = np.flatnonzero(_disputed(beams, likely))
+        disputed = np.zeros(len(pieces))
+        disputed[at] = self._disputed.of(beams.ends_m[at], self._odom_from_base, self.driven_m)
+        if pieces.sum() < _MIN_NEW and disputed.sum() < _MIN_DISPUTED:
             return None
         self._walls.add(beams.ends_m, self._odom_from_base, self.driven_m)
-        return _View(scan, self._odom_from_base, self.driven_m, pieces, self._chance - _UNCHOSEN)
+        self._disputed.add(beams.ends_m[at], self._odom_from_base, self.driven_m)
+        pieces = np.maximum(pieces, disputed)
+        by_chance = _tenth(beams.poses, _share(beams, pieces))
+        if by_chance is not None:
+            self._chance = min(self._chance, max(by_chance, _CHANCE - _UNCHOSEN))
+        return _View(scan, self._odom_from_base, self.driven_m, pieces, self._chance)
 
     # -- a scan that is looked for everywhere
 
@@ -259,15 +296,17 @@ class PoseBelief:
         """The poses that a complete search found, at its scan."""
         assert self._odom_from_base is not None
         self._search, self.searches = None, self.searches + 1
-        share = _share(found)
+        share = _share(found, new_walls.pieces(found.ends_m))
         order = np.argsort(-share, kind="stable")
         poses, share = found.poses[order], share[order]
-        self._chance = _chance(poses, share)
+        by_chance = _tenth(poses, share)
+        chosen_by_chance = _CHANCE if by_chance is None else float(np.clip(by_chance, _CHANCE, _MAX_CHANCE))
+        self._chance = chosen_by_chance - _UNCHOSEN
         now = se2.compose(poses, se2.compose(se2.inverse(search.odom_from_base), self._odom_from_base))
         if self.searches == 1:
             new = new_walls.pieces(found.ends_m)
             self._walls.add(found.ends_m, search.odom_from_base, search.driven_m)
-            view = _View(search.scan, search.odom_from_base, search.driven_m, new, self._chance)
+            view = _View(search.scan, search.odom_from_base, search.driven_m, new, chosen_by_chance)
             self._views.append(view)
             self._judged_at, self._judged_m = search.odom_from_base, search.driven_m
             evidence = Evidence.none(len(now)).with_view(*(each[order] for each in _of_view(found, view)))
@@ -285,6 +324,7 @@ class PoseBelief:
         back, here, driven_m = poses, self._odom_from_base, self.driven_m
         least = self.evidence.nats.max(initial=0.0) - _MAX_BEHIND
         possible = sum(view.most for view in self._views)
+        pieces = self._pieces
         for view in reversed(self._views):
             back = se2.compose(back, se2.compose(se2.inverse(here), view.odom_from_base))
             off_m = _OFF_M + _OFF_SHARE * (driven_m - view.driven_m)
@@ -299,6 +339,10 @@ class PoseBelief:
                 whole[kept] = part
             evidence = evidence.with_view(*of_view)
             possible -= view.most
+            first = int(view.driven_m / PIECE_M)
+            blocked = np.zeros(len(poses))
+            blocked[kept] = self._blocked(back[kept], here, first, min(pieces, first + _TRACED_PIECES))
+            evidence, pieces = evidence.with_path(blocked), first
             kept = kept[evidence.nats[kept] > least - possible]
         return evidence, kept
 
@@ -342,10 +386,11 @@ class _SearchedScan:
         self._left = self._left[_AT_ONCE:]
         if len(self._left):
             return None
-        poses, explained, known = (
-            np.concatenate([getattr(part, name) for part in self._judged]) for name in ("poses", "explained", "known")
+        poses, explained, known, contradicted = (
+            np.concatenate([getattr(part, name) for part in self._judged])
+            for name in ("poses", "explained", "known", "contradicted")
         )
-        return BeamsExplained(poses, beams.ends_m, explained, known)
+        return BeamsExplained(poses, beams.ends_m, explained, known, contradicted)
 
 
 def expected_nats(scans: MapScans, map_from_base: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -367,28 +412,42 @@ def _of_view(beams: BeamsExplained, view: _View) -> Tuple[np.ndarray, np.ndarray
     return _NATS * (explained - view.chance * seen), explained, seen
 
 
-def _counted(beams: BeamsExplained, new: np.ndarray, best: int) -> np.ndarray:
+def _counted(beams: BeamsExplained, new: np.ndarray, likely: np.ndarray) -> np.ndarray:
     """(B,) pieces of wall that the beams are evidence of, of which they show (B,) for the first time.
 
-    The whole scan is evidence, by the part of the walls explained that is new. What is not explained would be the wrong
-    measure: beams that met a mirror or a person end somewhere else each time.
+    The whole scan is evidence, by the part of the walls explained that is new, at the likely pose ((K,) bool) that explains
+    most of them. What is not explained there would be the wrong measure: beams that met a mirror or a person end
+    somewhere else each time.
     """
     pieces = new_walls.pieces(beams.ends_m)
-    explained = beams.explained[best]
+    explained = beams.explained[int(np.where(likely, beams.explained @ pieces, -1.0).argmax())]
     return pieces * ((new @ explained) / max(float(pieces @ explained), 1.0))
 
 
-def _share(beams: BeamsExplained) -> np.ndarray:
-    """(K,) of the walls seen that the map explains; 0 where it knows none of them."""
-    pieces = new_walls.pieces(beams.ends_m)
+def _disputed(beams: BeamsExplained, likely: np.ndarray) -> np.ndarray:
+    """(B,) bool: beams that the map explains from one of the likely poses ((K,) bool) and contradicts from another, if they are
+    few.
+
+    What tells copies of a room apart is a piece of furniture beside walls that were seen through the door long before.
+    """
+    if not 1 < np.count_nonzero(likely) <= _FEW:
+        return np.zeros(len(beams.ends_m), bool)
+    explained = beams.explained[likely]
+    return explained.any(axis=0) & beams.contradicted[likely].any(axis=0)
+
+
+def _share(beams: BeamsExplained, pieces: np.ndarray) -> np.ndarray:
+    """(K,) of the pieces of wall (B,) seen that the map explains; 0 where it knows none of them."""
     return (beams.explained @ pieces) / np.maximum(beams.known @ pieces, 1e-9)
 
 
-def _chance(poses: np.ndarray, share: np.ndarray) -> float:
-    """Share that the map explains where the robot is not: of the tenth of the distinct places, shares descending."""
-    left = np.arange(len(poses))
+def _tenth(poses: np.ndarray, share: np.ndarray) -> Optional[float]:
+    """What the map explains where the robot is not: the share of the tenth best of the distinct places (K, 3); None: there
+    are fewer.
+    """
+    order = np.argsort(-share, kind="stable")
     for _ in range(_CHANCE_RANK - 1):
-        if not len(left):
-            return _CHANCE
-        left = left[np.hypot(*(poses[left, :2] - poses[left[0], :2]).T) > _APART_M]
-    return float(np.clip(share[left[0]], _CHANCE, _MAX_CHANCE)) if len(left) else _CHANCE
+        if not len(order):
+            return None
+        order = order[np.hypot(*(poses[order, :2] - poses[order[0], :2]).T) > _APART_M]
+    return float(share[order[0]]) if len(order) else None

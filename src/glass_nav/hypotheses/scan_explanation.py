@@ -28,6 +28,7 @@ from glass_nav.world.grid_map import GridMap
 _BEAMS = 120  # of a scan that are used
 _NEAR_CELLS = 3.0  # a beam that ends this close to an expected range is explained
 _MAX_THICK_M = 0.3  # a thicker wall is no glass
+_FAR_M = 0.3  # from a wall: not where it was drawn a little otherwise
 _BACK_M = 0.5  # from the back of a wall, which was not seen, to the face that was
 _SLIDES_M, _SLIDES_RAD = 0.5, np.radians(15.0)  # a pose that would slide further stays where it was given
 _AT_ONCE = 64  # poses
@@ -44,6 +45,7 @@ class BeamsExplained:
     ends_m: np.ndarray  # (B, 2) of the beams, in the robot's frame
     explained: np.ndarray  # (P, B) bool: the map explains the beam
     known: np.ndarray  # (P, B) bool: the beam is evidence; it did not end where the map knows nothing
+    contradicted: np.ndarray  # (P, B) bool: it is evidence, and ended far from all that the map has
 
 
 class ScanExplanation:
@@ -102,14 +104,15 @@ class ScanExplanation:
             return None
         points = scan.points_in_base()[used]
         poses = [np.zeros((0, 3))]
-        explained, known = [np.zeros((0, len(used)), bool)], [np.zeros((0, len(used)), bool)]
+        explained, known, contradicted = ([np.zeros((0, len(used)), bool)] for _ in range(3))
         for first in range(0, len(map_from_base), _AT_ONCE):
             slid = self._slid(points, map_from_base[first : first + _AT_ONCE], most_m, most_rad)
             poses.append(slid)
             of_pose = self._explained(scan, used, points, slid)
             explained.append(of_pose[0])
             known.append(of_pose[1])
-        return BeamsExplained(np.concatenate(poses), points, np.concatenate(explained), np.concatenate(known))
+            contradicted.append(of_pose[2])
+        return BeamsExplained(np.concatenate(poses), points, *map(np.concatenate, (explained, known, contradicted)))
 
     def search(self, scan: Scan, odom_from_base: np.ndarray) -> Optional[PlaceSearch]:
         """A search of the whole map for poses from which the scan may have been taken; None if hardly any beam
@@ -128,6 +131,10 @@ class ScanExplanation:
         first_m = self._caster.cast(map_from_base[None], directions, _SEES_M)[0]
         return Scan(0, first_m, directions, 0.0, _SEES_M, np.zeros(3))
 
+    def is_free(self, points_m: np.ndarray) -> np.ndarray:
+        """(...) bool: by the map a robot may stand at points (..., 2) [m]."""
+        return self._known_area.is_free(points_m)
+
     def _slid(self, points_m: np.ndarray, poses: np.ndarray, most_m: float, most_rad: float) -> np.ndarray:
         slid = scan_alignment.align(self._field, points_m, poses, last_scale_m=0.1).poses
         off = slid - poses
@@ -136,8 +143,8 @@ class ScanExplanation:
 
     def _explained(
         self, scan: Scan, beams: np.ndarray, points_m: np.ndarray, poses: np.ndarray
-    ) -> Tuple[np.ndarray, np.ndarray]:
-        """(P, B) bool: explained; known."""
+    ) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(P, B) bool: explained; known; contradicted."""
         hits = self._caster.cast_surfaces(
             se2.compose(poses, scan.base_from_laser),
             scan.angles_rad[beams],
@@ -153,7 +160,10 @@ class ScanExplanation:
         near = np.abs(ahead_m) < _BACK_M
         back = (near & (ahead_m > 0.0)).any(axis=0) & ~(near & (ahead_m <= 0.0)).any(axis=0)
         back &= self._known_area.is_unmapped(ends)
-        return explained, explained | stopped | (self._known_area.contains(ends) & ~back)
+        unseen = (hits.first_m > measured) & self._known_area.is_beside_unmapped(ends)
+        known = explained | stopped | (self._known_area.contains(ends) & ~back & ~unseen)
+        far = self._field.distance(ends[..., 0], ends[..., 1]) > _FAR_M
+        return explained, known, known & ~explained & far
 
 
 def _used_beams(scan: Scan) -> Optional[np.ndarray]:

@@ -55,7 +55,7 @@ class ScanMatcher:
         self._cell_m = self._per_cell * grid_map.resolution_m
         self._map_from_grid = grid_map.map_from_grid
         allowed = _any_in_blocks(free, self._per_cell)
-        self.cell_count = allowed.size  # of the positions that are tried, and of those where nobody can be
+        self.cell_count = allowed.size  # of the positions that are tried, and of those that are not free
         strips = range(0, allowed.shape[0], _STRIP_ROWS)  # those of a large map would not fit in the cache at once
         scores = np.concatenate(
             [

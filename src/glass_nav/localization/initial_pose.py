@@ -74,7 +74,7 @@ def refuse_outside(guess: PoseGuess, grid_map: GridMap) -> None:
 
 
 def checked(map_from_base: np.ndarray, covariance: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A pose that somebody gives, checked.
+    """A given pose, checked.
 
     Args:
         map_from_base: (3,) x [m], y [m], yaw [rad].

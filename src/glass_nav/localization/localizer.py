@@ -409,7 +409,7 @@ class Localizer:
             scan: the scan.
             map_from_base: (3,) the pose.
             step: (3,) of odometry since the last update; None: this scan was one.
-            seen: from the pose, at an update; None: nothing depends on the beams, they wait until somebody asks.
+            seen: from the pose, at an update; None: nothing depends on the beams, which wait until they are needed.
         """
         best, classifier = self._filter.best, self._classifier
         if seen is not None:

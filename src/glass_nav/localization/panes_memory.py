@@ -71,8 +71,8 @@ class PanesMemory:
             return None
         lacks = f"the map lacks {_length_m(localizer):.1f} m of glass ({count} pane{'' if count == 1 else 's'})"
         if self._path is None:
-            return f"{lacks}; glass_nav map panes BAG --map MAP.yaml --out DIR draws it in"
-        return f"{lacks}; call ~save_panes, then glass_nav map draw MAP.yaml --panes {self._path} --out DIR draws it in"
+            return f"{lacks}; glass_nav map panes BAG --map MAP.yaml --out DIR draws it into the map"
+        return f"{lacks}; call ~save_panes, then glass_nav map draw MAP.yaml --panes {self._path} --out DIR draws it into the map"
 
     def save(self, localizer: PoseFilter, grid_map: GridMap) -> str:
         """Write the file; what was written, in words.

@@ -19,7 +19,7 @@ import yaml
 from glass_nav.geometry import se2
 from glass_nav.vocabulary import LocalizationState
 
-_MIN_DEVIATION = np.array([0.1, 0.1, 0.05])  # [m, m, rad] of a start: somebody may have leant against the robot
+_MIN_DEVIATION = np.array([0.1, 0.1, 0.05])  # [m, m, rad] of a start: the robot may have been touched
 _DEVIATION_PER_M = np.array([0.1, 0.1, 0.05])  # of odometry while the node did not run
 _AT_ORIGIN_M, _AT_ORIGIN_RAD = 0.3, 0.3  # odometry that began anew and has hardly moved
 _SLACK_M = 0.1  # of odometry over any time
@@ -150,7 +150,7 @@ def resumed(
     moved = se2.compose(se2.inverse(saved.odom_from_base), odom_from_base)
     way_m = se2.travelled(moved)[0]
     if _is_new(odom_from_base) and not _is_new(saved.odom_from_base):
-        moved, why = odom_from_base, "odometry began anew, the robot is taken to stand where it stood"
+        moved, why = odom_from_base, "odometry restarted; the robot is assumed not to have moved"
     elif way_m <= limits.pose_file_max_speed_m_s * max(age_s, 0.0) + _SLACK_M:
         why = f"odometry says that it moved by {way_m:.2f} m since"
     else:

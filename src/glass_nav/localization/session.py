@@ -87,7 +87,7 @@ class LocalizationSession:
     def use_map(self, grid_map: GridMap, origin: str) -> bool:
         """Begin with the first map; a later one leaves the particles where they are. Whether it is another one."""
         if self.localizer is not None and self.grid_map is not None and grid_map.digest == self.grid_map.digest:
-            _log.info(f"the map from {origin} is the one that is in use: nothing changes")
+            _log.info(f"the map from {origin} is already in use: nothing changes")
             return False
         self.keep_panes()
         self.grid_map = grid_map
@@ -169,7 +169,7 @@ class LocalizationSession:
 
     @property
     def lacking_glass(self) -> Optional[str]:
-        """How much glass the map lacks, and the command that draws it in; None: none was found."""
+        """How much glass the map lacks, and the command that draws it into the map; None: none was found."""
         return None if self.localizer is None else self._panes.summary(self.localizer)
 
     def save_panes(self) -> str:
@@ -197,12 +197,12 @@ class LocalizationSession:
             self.waits_for_pose, self.localizer = True, None
             _log.warning(f"{why}: waiting for an initial pose again")
         elif self.grid_map is not None:
-            _log.warning(f"{why}: the filter starts over {self._begin()}")
+            _log.warning(f"{why}: the filter restarts {self._begin()}")
 
     def missing(self, inputs: Inputs) -> Optional[str]:
         """Why no scan is being used; None while all is well."""
         if inputs.now_s == 0.0:
-            return "time stands still: /use_sim_time is set and nothing publishes /clock"
+            return "no time: /use_sim_time is set, but nothing publishes /clock"
         if self.localizer is None:
             no_pose = "waiting for an initial pose" if self.grid_map is not None else "no map yet"
             return inputs.map_trouble or no_pose

@@ -10,7 +10,7 @@ def what_to_start(no_map: bool, no_scan_on: str, no_odometry: str) -> Optional[s
 
     Args:
         no_map: there is no map, and no service offers one.
-        no_scan_on: topics on which nobody publishes scans; "" if somebody does.
+        no_scan_on: topics without a publisher of scans; "" if there is one.
         no_odometry: the transform of the odometry that tf does not have, such as "odom <- base_link"; "" if it does.
     """
     missing = []

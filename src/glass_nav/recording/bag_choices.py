@@ -211,7 +211,7 @@ def _scan_notes(bag: Bag, scan_topic: str, options: LogOptions) -> List[str]:
 def _sweep_notes(scans: Sequence[RawScan], deskews: bool) -> List[str]:
     for raw in scans:
         if raw.timing_fault is not None:
-            return [f"scans are taken as of one moment: {raw.timing_fault}"]
+            return [f"scans are not deskewed: {raw.timing_fault}"]
         if raw.sweep_ns and deskews:
             return [f"a sweep of the lidar takes {raw.sweep_ns * 1e-6:.0f} ms: scans are deskewed by odometry"]
     return []

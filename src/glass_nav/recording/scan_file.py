@@ -47,7 +47,7 @@ def _from_message(path: Path, text: str, laser: np.ndarray) -> Scan:
     try:
         message: Any = next(iter(yaml.safe_load_all(text)), None)
     except yaml.YAMLError as err:
-        raise RecordingError(f"{path}: is no yaml: {' '.join(str(err).split())}") from err
+        raise RecordingError(f"{path}: is not yaml: {' '.join(str(err).split())}") from err
     if not isinstance(message, dict) or not isinstance(message.get("ranges"), list):
         raise RecordingError(f"{path}: must hold the fields of a LaserScan, with a list of ranges")
     fields = _numbers(path, message)

@@ -82,7 +82,7 @@ def read_mapping(path: Path) -> Dict[str, Any]:
         reason = err.strerror if isinstance(err, OSError) and err.strerror else str(err)
         raise ParamError(f"{path}: cannot be read: {reason}") from err
     except yaml.YAMLError as err:
-        raise ParamError(f"{path}: is no yaml: {' '.join(str(err).split())}") from err
+        raise ParamError(f"{path}: is not yaml: {' '.join(str(err).split())}") from err
     if mapping is None:
         mapping = {}
     if not isinstance(mapping, dict):

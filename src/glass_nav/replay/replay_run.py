@@ -129,7 +129,7 @@ class _WorstScans:
     def take(self, row: int, scan: Scan, estimate: Estimate) -> None:
         """Look at one scan."""
         errors = pose_errors.of(np.array([estimate.stamp_ns]), estimate.map_from_base[None], self._reference)
-        # Nobody relies on a pose that is still being looked for: such scans come last.
+        # Poses during a search are not relied on: such scans come last.
         bad = (
             estimate.state not in (LocalizationState.UNKNOWN, LocalizationState.GLOBAL_SEARCH),
             float(errors.position_m[0]) if errors.matched[0] else 1.0 - estimate.confidence,

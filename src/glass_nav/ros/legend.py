@@ -22,7 +22,7 @@ def publish(map_frame: str, *topics: str) -> List[rospy.Publisher]:
 
 
 class _Drawing(rospy.SubscribeListener):
-    """Draws the legend when somebody comes: most robots run without rviz, and drawing loads matplotlib."""
+    """Draws the legend for the first subscriber: most robots run without rviz, and drawing loads matplotlib."""
 
     def __init__(self, map_frame: str) -> None:
         self._map_frame, self._is_drawn = map_frame, False

@@ -14,7 +14,7 @@ class LoopClock:
 
     def __init__(self) -> None:
         self.now_s = rospy.get_time()
-        self.has_begun = False  # in this pass: before it, nobody published /clock
+        self.has_begun = False  # in this pass: before it, there was no /clock
 
     def tick(self) -> Optional[str]:
         """Read the time; returns in words by how much it jumped back, or None."""

@@ -62,7 +62,7 @@ class ScanInput(ScanQueue):
 
     @property
     def unpublished(self) -> str:
-        """The topics, if nobody publishes on any; else ""."""
+        """The topics, if none has a publisher; else ""."""
         if any(subscriber.get_num_connections() for subscriber in self._subscribers):
             return ""
         return ", ".join(rospy.resolve_name(topic) for topic in self._topics)

@@ -33,7 +33,7 @@ class LandmarkBearings:
     """Bearings to different landmarks, all relative to one pose of the robot: base at stamp_ns.
 
     A sensor that turns for a minute takes each bearing from another place. `base_from_sensor` holds these places as
-    odometry has them, so whoever uses the bearings need not know whether the robot moved.
+    odometry has them, so their user need not know whether the robot moved.
     """
 
     stamp_ns: int

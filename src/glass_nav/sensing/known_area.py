@@ -14,7 +14,7 @@ from glass_nav.geometry import se2
 from glass_nav.world.grid_map import UNKNOWN, GridMap
 
 _BESIDE_CELLS = 3  # next to an unknown cell: what is there may be drawn, or end, one or two cells off
-_KNOWN, _UNMAPPED = np.uint8(1), np.uint8(2)  # flags of a cell
+_KNOWN, _UNMAPPED, _FREE, _BESIDE = np.uint8(1), np.uint8(2), np.uint8(4), np.uint8(8)  # flags of a cell
 _NEAR_WALL_M = 0.5  # what is this close to a mapped wall is compared with it, also behind it
 
 
@@ -26,9 +26,11 @@ class KnownArea:
         near = int(round(_NEAR_WALL_M / grid_map.resolution_m))
         self._border = near + 1  # cells around the grid
         unknown = np.pad(grid_map.occupancy == UNKNOWN, self._border, constant_values=True)
-        known = ~_grown(unknown, _BESIDE_CELLS)
-        known |= _grown(np.pad(grid_map.occupied, self._border), near)
-        self._flags = (_KNOWN * known + _UNMAPPED * unknown).ravel()
+        beside = _grown(unknown, _BESIDE_CELLS)
+        known = ~beside | _grown(np.pad(grid_map.occupied, self._border), near)
+        self._flags = (
+            _KNOWN * known + _UNMAPPED * unknown + _FREE * np.pad(grid_map.free, self._border) + _BESIDE * beside
+        ).ravel()
         self._stride = unknown.shape[1]
         self._last = np.array(unknown.shape) - 1
 
@@ -47,6 +49,14 @@ class KnownArea:
     def is_unmapped(self, points_m: np.ndarray) -> np.ndarray:
         """(...) bool: the mapper did not see points (..., 2) [m]: unknown cells, and all outside of the grid."""
         return self._has(_UNMAPPED, points_m)
+
+    def is_beside_unmapped(self, points_m: np.ndarray) -> np.ndarray:
+        """(...) bool: points (..., 2) [m] are within 3 cells of what the mapper did not see."""
+        return self._has(_BESIDE, points_m)
+
+    def is_free(self, points_m: np.ndarray) -> np.ndarray:
+        """(...) bool: by the map a robot may stand at points (..., 2) [m]."""
+        return self._has(_FREE, points_m)
 
     def ends(self, points_m: np.ndarray, map_from_base: np.ndarray) -> np.ndarray:
         """Which beams of a scan end where the map knows something, seen from each pose.

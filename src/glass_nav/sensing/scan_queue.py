@@ -25,7 +25,7 @@ class ScanCounts:
     """Numbers of scans since the start; received is the sum of the others."""
 
     received: int = 0
-    used: int = 0  # counted by whoever uses them
+    used: int = 0  # counted by the caller
     refused: int = 0  # malformed, or a stamp that is not after the last one used
     superseded: int = 0  # a newer one was ready too: the lidar is faster than the node or tf
     dropped_no_transform: int = 0  # no transform at its stamp within the limit
@@ -130,7 +130,7 @@ class ScanQueue:
         """A scan that is ready, with its transforms. ScanError if it cannot be used: refuse() it."""
         fault = self._placement.timing_fault(raw)
         if fault is not None:
-            self._warn(f"scans are taken as of one moment: {fault}", _FAULT_PERIOD_S)
+            self._warn(f"scans are not deskewed: {fault}", _FAULT_PERIOD_S)
         no_limit = self._placement.range_fault(raw)
         if no_limit is not None:
             self._warn(no_limit, _ONCE_S)

@@ -52,7 +52,7 @@ class SerialEmitter:
             self._set_raw(BAUD_RATES[baud])
         except termios.error as err:
             os.close(self._file)
-            raise EmitterError(f"{port}: is no serial port: {err.args[-1]}") from err
+            raise EmitterError(f"{port}: is not a serial port: {err.args[-1]}") from err
 
     def __enter__(self) -> "SerialEmitter":
         return self

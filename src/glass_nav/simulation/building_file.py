@@ -77,7 +77,7 @@ def _document(path: Path) -> Item:
     try:
         document = yaml.safe_load(text)
     except yaml.YAMLError as err:
-        raise BuildingError(f"is no yaml: {' '.join(str(err).split())}") from err
+        raise BuildingError(f"is not yaml: {' '.join(str(err).split())}") from err
     if document is None:
         raise BuildingError("is empty; a building needs walls, and a path or a start")
     if not isinstance(document, dict):

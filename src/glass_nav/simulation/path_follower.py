@@ -162,7 +162,7 @@ def _yaml_rows(path: Path, text: str) -> "List[Tuple[int, Any]]":
     try:
         rows = yaml.safe_load(text)
     except yaml.YAMLError as err:
-        raise PathError(f"{path}: is no yaml: {' '.join(str(err).split())}") from err
+        raise PathError(f"{path}: is not yaml: {' '.join(str(err).split())}") from err
     if not isinstance(rows, list):
         raise PathError(f"{path}: must be a list of waypoints [x, y] in m, got {type(rows).__name__}")
     return list(enumerate(rows, 1))

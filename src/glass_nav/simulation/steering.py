@@ -27,7 +27,7 @@ class Audience:
 
 
 class Steering:
-    """A fresh command takes precedence over the path; a path begins once somebody listens."""
+    """A fresh command takes precedence over the path; a path begins once there is a subscriber."""
 
     def __init__(self, follower: Optional[PathFollower], repeat: bool, wait_for_answer: bool) -> None:
         """

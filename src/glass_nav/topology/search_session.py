@@ -2,7 +2,7 @@
 
 Without ROS and without a clock: each method is an event, and returns the decisions that follow from it, in the order
 in which they are to be carried out. A search begins at a meetpoint and ends CONFIRMED, AMBIGUOUS or LOST, or when its
-goal gives up. Before and after, the state is WAITING (the next meetpoint begins a search), IDLE, or NO_ATLAS without
+goal gives up. Before and after, the state is WAITING (the search starts at the next meetpoint), IDLE, or NO_ATLAS without
 an atlas of the map.
 """
 
@@ -63,7 +63,7 @@ class SessionParams:
 
 @dataclass(frozen=True)
 class Goal:
-    """A search that somebody asked for and waits for."""
+    """A requested search, whose client waits."""
 
     here: bool = False  # begin at the meetpoint that was reported last; else at the next one
     max_edges: int = 0  # give up after so many edges; 0: no limit
@@ -173,7 +173,7 @@ class SearchSession:
 
     @property
     def is_to_end(self) -> bool:
-        """Whether the node is to end: the atlas was refused, and nobody waits for its map."""
+        """Whether the node is to end: the atlas was refused, and no map is awaited."""
         return self._p.end_without_atlas and self._status.state == SearchState.NO_ATLAS and not self._makes_atlas
 
     @property
@@ -211,12 +211,12 @@ class SearchSession:
             ValueError, OSError: it cannot be used.
         """
         if self._read_atlas is None:
-            return [self._show(SearchState.NO_ATLAS, "an atlas is made as soon as a map is served")]
+            return [self._show(SearchState.NO_ATLAS, "an atlas is built as soon as a map is served")]
         loaded = self._load()
         if self._p.search_at_start:
             waiting = self._await_meetpoint("the node has started")
             return [loaded, waiting, LogLine(f"{waiting.state}: {waiting.reason}")]
-        return [loaded, self._show(SearchState.IDLE, "no search was asked for")]
+        return [loaded, self._show(SearchState.IDLE, "no search was requested")]
 
     def meetpoint(self, meetpoint: Meetpoint) -> List[Decision]:
         """The robot reports a meetpoint.
@@ -325,14 +325,14 @@ class SearchSession:
         if self._map is None or self._map[0] is not grid_map:
             return []  # another map was served since
         if isinstance(atlas, AtlasError):
-            status = self._show(SearchState.NO_ATLAS, f"no atlas can be made of {self._map[1]}: {atlas}")
+            status = self._show(SearchState.NO_ATLAS, f"no atlas can be built from {self._map[1]}: {atlas}")
             return [LogLine(status.reason, logging.ERROR), status, *self._end_goal(status.reason)]
         name = self._map[1]
-        self._read_atlas = lambda: (f"the atlas made of {name}", atlas)
+        self._read_atlas = lambda: (f"the atlas built from {name}", atlas)
         loaded = self._load()
         if self._p.search_at_start:
             return [loaded, self._await_meetpoint("the atlas is made")]
-        return [loaded, self._show(SearchState.IDLE, "no search was asked for")]
+        return [loaded, self._show(SearchState.IDLE, "no search was requested")]
 
     def goal(self, goal: Goal) -> List[Decision]:
         """Start the search of a new goal; the previous goal was preempted by it."""
@@ -340,10 +340,10 @@ class SearchSession:
         if self._localizer is None:
             return self._end_goal(self._status.reason)
         if not goal.here:
-            return [self._await_meetpoint("asked for by the action")]
+            return [self._await_meetpoint("requested by the action")]
         if self._last_meetpoint is None:
-            return self._end_goal("no meetpoint was reported yet, where a search could begin")
-        return [self._await_meetpoint("asked for by the action"), *self.meetpoint(self._last_meetpoint)]
+            return self._end_goal("no meetpoint has been reported yet at which a search could begin")
+        return [self._await_meetpoint("requested by the action"), *self.meetpoint(self._last_meetpoint)]
 
     def preempt(self) -> List[Decision]:
         """End the goal, because its client has cancelled it."""
@@ -396,7 +396,7 @@ class SearchSession:
         visits are of another atlas.
         """
         if self._read_atlas is None:
-            raise AtlasError("no atlas has been made yet")
+            raise AtlasError("no atlas has been built yet")
         found_at, atlas = self._read_atlas()
         atlas = self._with_visits(atlas)
         warning = ""
@@ -423,7 +423,7 @@ class SearchSession:
         return replace(atlas, visits=kept.visits)
 
     def _await_meetpoint(self, why: str) -> SearchStatus:
-        return self._show(SearchState.WAITING, f"the next meetpoint begins a search: {why}")
+        return self._show(SearchState.WAITING, f"the search starts at the next meetpoint: {why}")
 
     def _show(self, state: SearchState, reason: str, stamp_ns: int = 0) -> SearchStatus:
         """A state outside of searches: what was known is forgotten."""
@@ -475,7 +475,7 @@ class SearchSession:
         goal = self._goal
         gives_up = goal is not None and not estimate.done and 0 < goal.max_edges <= estimate.depth
         if gives_up:
-            estimate = replace(estimate, choice=None)  # nobody is to drive on
+            estimate = replace(estimate, choice=None)  # the robot is to stay
         poses = localizer.poses(estimate, self._p.listed_candidates)
         status = SearchStatus(estimate.state, estimate.reason, stamp_ns, estimate, poses, belief=localizer.belief)
         if status.map_from_base is not None:

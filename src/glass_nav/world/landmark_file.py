@@ -106,7 +106,7 @@ def _document(path: Path) -> Dict[str, Any]:
     try:
         document = yaml.safe_load(text)
     except yaml.YAMLError as err:
-        raise ValueError(f"is no yaml: {' '.join(str(err).split())}") from err
+        raise ValueError(f"is not yaml: {' '.join(str(err).split())}") from err
     if not isinstance(document, dict) or "landmarks" not in document:
         raise ValueError("is no landmark file: expected landmarks, a list of {id: ..., position: [x, y]}")
     return document

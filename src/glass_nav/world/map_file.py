@@ -123,7 +123,7 @@ def _fields(path: Path) -> Dict[str, Any]:
         # The first document, as map_server; and tabs between a name and its value, which yaml-cpp takes for spaces.
         fields = next(iter(yaml.load_all(text.replace("\t", " "), Loader=yaml.BaseLoader)), None)
     except (yaml.YAMLError, RecursionError) as err:
-        raise MapError(f"{path}: is no yaml: {' '.join(str(err).split())}") from err
+        raise MapError(f"{path}: is not yaml: {' '.join(str(err).split())}") from err
     if not isinstance(fields, dict):
         raise MapError(f"{path}: is no map: expected the keys {', '.join(REQUIRED)}")
     missing = [key for key in REQUIRED if key not in fields]

@@ -101,7 +101,7 @@ def _fields(path: Path) -> Dict[str, Any]:
     except (OSError, UnicodeDecodeError) as err:
         raise PanesFileError(f"{path}: cannot be read: {getattr(err, 'strerror', None) or 'is no text'}") from err
     except yaml.YAMLError as err:
-        raise PanesFileError(f"{path}: is no yaml: {' '.join(str(err).split())}") from err
+        raise PanesFileError(f"{path}: is not yaml: {' '.join(str(err).split())}") from err
     if not isinstance(fields, dict):
         raise PanesFileError(f"{path}: is no file of panes: expected the keys map and panes")
     return fields

@@ -123,13 +123,13 @@ def test_what_another_localization_left_in_the_bag_is_measured_as_ours_is(run, r
 
 
 @pytest.mark.long_run
-def test_a_log_that_has_no_recorded_pose_in_time_is_told(run, room_bag, room_map, tmp_path):
+def test_a_log_that_has_no_recorded_pose_in_time_is_reported(run, room_bag, room_map, tmp_path):
     path = room_bag(amcl_error_m=0.1).write()
     options = ("compare", "topic:/amcl_pose", "--log", f"{path}={room_map}", "--out", tmp_path / "out")
     code, _, err = run(*options, "--max-scans", 4)
     assert (code, err.splitlines()[-1]) == (
         3,
-        "glass_nav compare: none of 1 runs could be made; the first: room.bag: topic:/amcl_pose has no pose before "
+        "glass_nav compare: none of 1 runs could be run; the first: room.bag: topic:/amcl_pose has no pose before "
         "the last scan",
     )
     assert run(*options, "--start", 60)[2].endswith("the first: room.bag: none of its scans can be used\n")
@@ -239,7 +239,7 @@ def test_a_run_that_fails_is_named_and_the_others_are_compared(run, room_bag, ro
     assert code == 3
     assert "glass_nav compare: amcl over room.bag: room.bag: no topic /amcl_pose; it has " in err
     assert "glass_nav compare: elsewhere over room.bag, seed 0: room.bag: no transform wheels <- base_link" in err
-    assert err.endswith("glass_nav compare: 2 of 3 runs could not be made, see above; the others are compared\n")
+    assert err.endswith("glass_nav compare: 2 of 3 runs failed, see above; the others are compared\n")
     assert [row["contestant"] for row in rows(tmp_path / "out")] == ["default"]
     assert out.startswith("1 run over 1 log, 6 scans compared")
 
@@ -279,6 +279,6 @@ def test_what_cannot_be_compared_is_refused_in_one_line(run, room_bag, room_map,
     code, _, err = run("compare", "topic:/amcl_pose", *log, *out)
     assert code == 3
     assert err.splitlines()[-1].startswith(
-        "glass_nav compare: none of 1 runs could be made; the first: room.bag: no topic /amcl_pose"
+        "glass_nav compare: none of 1 runs could be run; the first: room.bag: no topic /amcl_pose"
     )
     assert not (tmp_path / "out").exists()

@@ -146,7 +146,7 @@ def test_without_walls_or_answers_there_is_nothing_to_correct(room, capsys):
     assert "no wall of the map is long enough for a segment" in capsys.readouterr().err
     (room / "blind.csv").write_text("0,nan\n0.1,inf\n")
     assert locate(room, TRUE, scan="blind.csv") == 3
-    assert "no beam of the scan answered" in capsys.readouterr().err
+    assert "no beam of the scan returned" in capsys.readouterr().err
     assert not (room / "out.png").exists()
 
 
@@ -172,7 +172,7 @@ def test_wrong_options_are_told_before_any_file_is_opened(room, capsys, options,
     assert line in capsys.readouterr().err
 
 
-def test_files_that_are_not_there_are_told(room, capsys):
+def test_files_that_are_not_there_are_reported(room, capsys):
     assert locate(room, TRUE, scan="none.csv") == 3
     assert "none.csv" in capsys.readouterr().err
     assert locate(room, TRUE, grid="none.yaml") == 3

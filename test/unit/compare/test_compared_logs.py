@@ -55,7 +55,7 @@ def test_a_list_of_another_form_is_refused(tmp_path, text, line):
 
 def test_a_list_that_is_no_yaml_and_a_log_named_twice_are_refused(tmp_path):
     (tmp_path / "logs.yaml").write_text("[a")
-    with pytest.raises(ValueError, match="logs.yaml: is no yaml: "):
+    with pytest.raises(ValueError, match="logs.yaml: is not yaml: "):
         compared_logs.parse([], tmp_path / "logs.yaml")
     with pytest.raises(ValueError, match="^a log is named twice: a.bag$"):
         compared_logs.parse(["a.bag=m.yaml", "a.bag=n.yaml"], None)

@@ -194,7 +194,7 @@ def test_a_lost_robot_searches_again() -> None:
     ]
     assert run(robot)
     assert robot.restarts == 1
-    assert "LOST: another search begins where the robot stands" in robot.lines
+    assert "LOST: a new search starts where the robot stands" in robot.lines
 
 
 def test_it_searches_no_more_often_than_allowed() -> None:

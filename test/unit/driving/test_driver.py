@@ -209,7 +209,7 @@ def test_after_a_task_it_commands_zeros_for_a_moment_and_then_nothing():
     assert robot.phase == DriverPhase.ARRIVED
 
 
-def test_without_seek_at_start_it_waits_for_somebody():
+def test_without_seek_at_start_it_waits_for_a_request():
     robot = Robot(WAITS)
     robot.sees = False
     robot.scan()
@@ -244,7 +244,7 @@ def test_a_search_hears_of_a_meetpoint_to_which_the_robot_came_along_no_edge():
     (edge,), (meetpoint,) = robot.all(TraversalReport), robot.all(MeetpointReport)
     assert edge.arrival.traversal is not None and not edge.arrival.traversal.was_followed
     assert edge.arrival.stamp_ns == meetpoint.arrival.stamp_ns
-    assert "it came to this meetpoint along no edge: the search goes on by dead reckoning" in lines(robot.decided)
+    assert "the robot did not come along one edge: the search continues by dead reckoning" in lines(robot.decided)
 
 
 def test_without_an_atlas_to_search_in_it_says_so_and_stands_until_a_search_waits():
@@ -280,7 +280,7 @@ def test_moved_away_from_its_meetpoint_it_stands_at_none_and_seeks_one_only_for_
     robot.run_for(0.2)
     assert robot.driver.status.reason == "the robot was moved away from its meetpoint"
     assert robot.phase == DriverPhase.IDLE
-    assert "not used: the robot stands at no meetpoint" in lines(robot.do(robot.driver.turn_choice(1, "LEFT", 0)))[0]
+    assert "not used: the robot is not at a meetpoint" in lines(robot.do(robot.driver.turn_choice(1, "LEFT", 0)))[0]
     robot.driver.search_reports(SearchState.CONFIRMED)
     robot.run_for(0.2)
     assert robot.phase == DriverPhase.IDLE
@@ -330,7 +330,7 @@ def test_a_turn_that_answers_its_meetpoint_is_driven_and_the_edge_reported_befor
         (9, "", 0, "turn_choice 9 refused: turn of rank 9: the meetpoint it left has degree 3, allowed 0 to 2"),
     ],
 )
-def test_a_turn_that_it_cannot_take_is_told(rank, name, stamp, text):
+def test_a_turn_that_it_cannot_take_is_reported(rank, name, stamp, text):
     robot = standing()
     (line,) = robot.do(robot.driver.turn_choice(rank, name, stamp))
     assert line.text.startswith(text) and line.level == logging.WARNING and line.often
@@ -355,7 +355,7 @@ def test_a_goal_along_an_edge_is_refused_where_there_is_none():
     (end,) = only(robot.do(robot.driver.traverse_edge("LEFT")), GoalEnd)
     assert end.action == Action.TRAVERSE_EDGE and end.arrival is None and end.travelled_m == 0.0
     assert end.ending == Ending(
-        Outcome.NOT_AT_MEETPOINT, "the robot stands at no meetpoint: a goal without edge drives to one"
+        Outcome.NOT_AT_MEETPOINT, "the robot is not at a meetpoint: a goal without edge drives to one"
     )
     robot = standing()
     for words, text in (("AHEAD", "edge must be LEFT, "), ("RANK_9", "turn of rank 9: the meetpoint it left has")):
@@ -587,18 +587,18 @@ def test_when_time_jumps_back_it_starts_over():
     robot.do(robot.driver.traverse_edge(""))
     robot.run_for(1.0)
     told = robot.do(robot.driver.reset("time jumped back by 3.000 s"))
-    assert lines(told)[0] == "time jumped back by 3.000 s: the driver starts over"
+    assert lines(told)[0] == "time jumped back by 3.000 s: the driver restarts"
     assert only(told, GoalEnd)[0].ending == Ending(Outcome.RESET, "time jumped back by 3.000 s")
     assert robot.phase == DriverPhase.FAILED and robot.driver.health.values["localization"] == ""
     assert robot.driver.odom_from_base is None and robot.driver.edge_driver.local_graph is None
     assert robot.driver.see(robot.simulation.look().scan, np.zeros(3))  # whatever its stamp
     robot = standing()
-    assert lines(robot.do(robot.driver.reset("why"))) == ["why: the driver starts over"]
+    assert lines(robot.do(robot.driver.reset("why"))) == ["why: the driver restarts"]
     robot.run_for(0.2)
     assert robot.phase == DriverPhase.SEEKING  # as at the start
 
 
-def test_decisions_are_told_once():
+def test_decisions_are_reported_once():
     robot = started()
     robot.do(robot.driver.traverse_edge("LEFT"))
     assert robot.driver.preempt(Action.TRAVERSE_EDGE) == []

@@ -119,6 +119,31 @@ def test_what_is_no_scan_drops_no_pose_that_scans_hold() -> None:
     assert len(belief.poses) == 2
 
 
+def test_copies_of_a_room_are_told_apart_by_what_stands_beside_walls_seen_before() -> None:
+    scans = world(truth=0.9, wrong=0.9)
+    belief = begun(scans)
+    assert not seen(belief, 0.3)  # 80 pieces, all seen
+    scans.share = lambda poses: np.where(near(poses, TRUTH[0]), 0.9, 0.85)  # from here four of them differ
+    assert belief.evidence.nats[0] == belief.evidence.nats[1]
+    assert seen(belief, 0.6)
+    lead = belief.evidence.nats[0] - belief.evidence.nats[1]
+    assert lead == pytest.approx(0.5 * 4.0)
+    seen(belief, 0.9)
+    seen(belief, 0.6)
+    assert belief.evidence.nats[0] - belief.evidence.nats[1] == pytest.approx(lead)  # once
+
+
+def test_who_would_have_driven_through_walls_is_hardly_there() -> None:
+    scans = world(wrong=0.9)
+    scans.free = lambda points_m: np.abs(points_m[..., 0] - WRONG[0] - 2.0) > 1.0  # a wall in the way of the wrong one
+    plain, belief = begun(world(wrong=0.9)), begun(scans)
+    for x in np.arange(0.25, 4.1, 0.25):
+        seen(plain, x)
+        seen(belief, x)
+    lost = plain.evidence.nats - belief.evidence.nats
+    assert lost[0] == 0.0 and 4.0 <= lost[1] < 5.1  # 2 m, in pieces of 0.5 m
+
+
 def test_a_scan_without_returns_moves_the_poses_and_tells_nothing() -> None:
     nothing = Scan(0, np.full(3, np.inf), np.zeros(3), 0.1, 10.0, np.zeros(3))
     belief = PoseBelief(world())

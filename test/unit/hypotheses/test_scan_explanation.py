@@ -113,6 +113,20 @@ def test_where_the_map_knows_nothing_beams_are_no_evidence_but_through_a_wall_th
 
 
 @pytest.mark.long_run
+def test_a_beam_that_ends_where_the_mapper_saw_nothing_and_no_wall_before_is_no_evidence():
+    cells = np.zeros((60, 60), np.int8)
+    cells[:, 40:] = UNKNOWN  # from x = 2 m on
+    cells[:20, 44] = 100  # a wall at x = 2.2 m, as it is seen from below
+    explanation = ScanExplanation(GridMap(cells, 0.05, np.zeros(3)))
+    pose, ranges_m = np.array([[1.0, 0.9, 0.0]]), np.full(40, 1.0)
+    ahead = scan_from_fields(0, ranges_m, -0.2, 0.01, 0.1, 10.0, np.zeros(3))  # at the edge of what was seen
+    beams = explanation.beams(ahead, pose, 0.0, 0.0)
+    assert beams is not None and not beams.explained.any() and not beams.known.any()
+    short = scan_from_fields(0, 0.5 * ranges_m, -0.2, 0.01, 0.1, 10.0, np.zeros(3))  # in the midst of free cells
+    beams = explanation.beams(short, pose, 0.0, 0.0)
+    assert beams is not None and not beams.explained.any() and beams.known.all()
+
+
 def test_where_nothing_is_known_the_truth_is_among_the_places_proposed_and_explains_most():
     building, explanation = office()
     for number, truth in enumerate(PLACES):

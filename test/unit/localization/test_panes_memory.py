@@ -42,7 +42,7 @@ def memory(file="") -> PanesMemory:
     return PanesMemory(PanesFilePath(panes_file=str(file)))
 
 
-def test_glass_is_told_once_and_again_when_there_is_much_more(caplog):
+def test_glass_is_reported_once_and_again_when_there_is_much_more(caplog):
     told = memory()
     for lengths_m in ((), (0.6,), (3.0,), (3.0,), (3.0, 1.2), (3.0, 3.0)):
         told.tell(FakeLocalizer(*lengths_m))
@@ -50,7 +50,7 @@ def test_glass_is_told_once_and_again_when_there_is_much_more(caplog):
         "the map lacks 3.0 m of glass (1 pane)",
         "the map lacks 6.0 m of glass (2 panes)",
     ]
-    assert "; glass_nav map panes BAG --map MAP.yaml --out DIR draws it in" in caplog.records[0].message
+    assert "; glass_nav map panes BAG --map MAP.yaml --out DIR draws it into the map" in caplog.records[0].message
 
 
 def test_what_was_written_is_read_by_the_next_run(file, caplog):

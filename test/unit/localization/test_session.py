@@ -266,7 +266,7 @@ def test_a_given_pose_is_where_a_bag_starts_over(lines):
     bench.scan()
     bench.session.restart("time jumped back by 3 s", 5.0)
     assert bench.told == [("pose", 5.0, 5.0, 0.0)]
-    assert "the filter starts over at the last pose it was given, x 5.000 m" in lines.text
+    assert "the filter restarts at the last pose it was given, x 5.000 m" in lines.text
 
 
 def test_a_bag_that_starts_over_waits_for_a_pose_again_if_it_did():
@@ -324,7 +324,7 @@ def test_what_is_missing_is_said_in_its_order():
     inputs = Inputs(
         0.0, 10.0, "no scan on /scan for 4 s", "no scan used yet", "no map: there is no service /static_map"
     )
-    assert bench.session.missing(inputs) == "time stands still: /use_sim_time is set and nothing publishes /clock"
+    assert bench.session.missing(inputs) == "no time: /use_sim_time is set, but nothing publishes /clock"
     inputs = replace(inputs, now_s=11.0)
     assert bench.session.missing(inputs) == "no map: there is no service /static_map"
     inputs = replace(inputs, map_trouble=None)

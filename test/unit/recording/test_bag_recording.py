@@ -78,9 +78,7 @@ def test_a_scan_that_takes_a_while_is_deskewed_by_odometry(room_bag, odometry):
 
 def test_a_time_that_no_lidar_takes_is_said_and_not_used(room_bag):
     recording = open_log(room_bag(scan_fields=turning(1.0)).write())
-    assert (
-        "scans are taken as of one moment: time_increment 1 s times 60 beams is 59 s, allowed 0.15 s"
-    ) in recording.notes
+    assert ("scans are not deskewed: time_increment 1 s times 60 beams is 59 s, allowed 0.15 s") in recording.notes
     assert all(step.scan.origins_m is None for step in steps(recording))
 
 

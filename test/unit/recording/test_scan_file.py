@@ -56,7 +56,7 @@ def test_a_table_of_angles_and_ranges_is_a_scan(tmp_path, head):
 @pytest.mark.parametrize(
     "name, text, line",
     [
-        ("a.yaml", "[1, 2", "is no yaml"),
+        ("a.yaml", "[1, 2", "is not yaml"),
         ("a.yaml", "angle_min: 1", "must hold the fields of a LaserScan, with a list of ranges"),
         ("a.yaml", "ranges: [1.0]", "lacks angle_min, angle_increment, range_min, range_max"),
         ("a.yaml", MESSAGE.replace("2.5", "far"), "range 3 must be a number, got 'far'"),

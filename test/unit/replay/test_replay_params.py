@@ -14,7 +14,7 @@ REPO = Path(__file__).resolve().parents[3]
     "text, reason",
     [
         ("- 1\n", "must hold names and values, got list"),
-        ("a: [\n", "is no yaml: "),
+        ("a: [\n", "is not yaml: "),
         ("max_particles: many\n", "~max_particles must be int, got 'many'"),
     ],
 )

@@ -90,7 +90,7 @@ def test_what_is_no_serial_port_is_refused(tmp_path):
         SerialEmitter("/dev/nothing_here")
     file = tmp_path / "file"
     file.touch()
-    with pytest.raises(EmitterError, match="is no serial port"):
+    with pytest.raises(EmitterError, match="is not a serial port"):
         SerialEmitter(str(file))
     with pytest.raises(ValueError, match="~baud must be one of 9600, 19200, 57600, 115200, got 300"):
         SerialEmitter("/dev/null", 300)

@@ -44,6 +44,22 @@ def test_a_place_is_known_where_the_mapper_saw_it_or_a_wall_near_it(x_m, y_m, kn
     assert KnownArea(half_mapped()).contains(place) == known
 
 
+@pytest.mark.parametrize(
+    "x_m, y_m, free, beside",
+    [
+        pytest.param(1.5, 3.0, True, False, id="free"),
+        pytest.param(1.02, 1.0, False, False, id="a wall"),
+        pytest.param(3.5, 1.0, False, True, id="unknown"),
+        pytest.param(2.88, 3.0, True, True, id="beside what is unknown"),
+        pytest.param(2.78, 3.0, True, False, id="four cells away from it"),
+        pytest.param(-0.3, 3.0, False, True, id="outside of the grid"),
+    ],
+)
+def test_a_robot_may_stand_where_the_mapper_saw_no_wall(x_m, y_m, free, beside):
+    area, place = KnownArea(half_mapped()), se2.transform_points(PLACED, np.array([x_m, y_m]))
+    assert (area.is_free(place), area.is_beside_unmapped(place)) == (free, beside)
+
+
 def test_the_ends_of_a_scan_are_judged_from_every_pose():
     area = KnownArea(half_mapped())
     points_m = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 0.0]])

@@ -70,7 +70,7 @@ def test_a_scan_without_transforms_is_dropped_after_the_limit_even_if_others_flo
     assert queue.warnings == ["scan dropped after 1 s: no transform odom <- base"]
 
 
-def test_a_transform_that_comes_after_the_limit_is_said():
+def test_a_transform_that_comes_after_the_limit_is_reported():
     queue = Queue()
     queue.come(10, 20)
     queue.add(raw_scan(STAMP_NS + 30), 5.0)
@@ -193,9 +193,7 @@ def test_a_scan_is_placed_or_rejected_when_it_is_ready():
         queue.place(raw_scan(range_max_m=0.0))
     assert queue.warnings == []
     queue.place(raw_scan(time_increment_s=0.5))
-    assert queue.warnings == [
-        "scans are taken as of one moment: time_increment 0.5 s times 5 beams is 2 s, allowed 1 s"
-    ]
+    assert queue.warnings == ["scans are not deskewed: time_increment 0.5 s times 5 beams is 2 s, allowed 1 s"]
 
 
 def test_other_parameters_hold_for_scans_that_wait_already():

@@ -255,7 +255,7 @@ def test_what_cannot_be_meant_is_refused_in_one_line(error, text, line):
 
 
 def test_a_file_that_is_no_yaml_or_is_not_there_is_refused(error, load, tmp_path):
-    assert error("walls: [\n").startswith("is no yaml: ")
+    assert error("walls: [\n").startswith("is not yaml: ")
     (tmp_path / "lab" / "building.yaml").write_bytes(b"\xff\xfe")
     with pytest.raises(BuildingError, match="building.yaml: cannot be read: 'utf-8' codec"):
         building_file.load(tmp_path / "lab")

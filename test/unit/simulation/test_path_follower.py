@@ -168,7 +168,7 @@ def test_the_way_back_is_the_same_path():
         ("p.csv", "0,1\n2,inf\n", "waypoint 2 of the path is not finite: [2.0, inf]"),
         ("p.yaml", "path: 1\n", "must be a list of waypoints [x, y] in m, got dict"),
         ("p.yaml", "[[0, 1], 7]", "waypoint 2 must be x and y in m, got 7"),
-        ("p.yaml", "[[0, 1", "is no yaml: "),
+        ("p.yaml", "[[0, 1", "is not yaml: "),
     ],
 )
 def test_a_file_that_holds_no_path_is_refused(tmp_path, name, text, reason):
@@ -179,7 +179,7 @@ def test_a_file_that_holds_no_path_is_refused(tmp_path, name, text, reason):
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_that_cannot_be_read_is_said(tmp_path):
+def test_a_file_that_cannot_be_read_is_reported(tmp_path):
     with pytest.raises(PathError, match="no.csv: cannot be read: No such file or directory$"):
         path_follower.load(tmp_path / "no.csv")
     (tmp_path / "p.csv").write_bytes(b"\xff\xfe")

@@ -108,10 +108,10 @@ def test_the_first_meetpoint_begins_a_search() -> None:
     session = made()
     assert session.status.state == SearchState.NO_ATLAS
     line, status, said = session.start()
-    assert said.text == "WAITING: the next meetpoint begins a search: the node has started"
+    assert said.text == "WAITING: the search starts at the next meetpoint: the node has started"
     assert isinstance(line, LogLine) and line.text.endswith("atlas.json: 4 nodes, 4 edges")
     assert (status, session.status.state) == (session.status, SearchState.WAITING)
-    assert session.status.reason == "the next meetpoint begins a search: the node has started"
+    assert session.status.reason == "the search starts at the next meetpoint: the node has started"
     decisions = session.meetpoint(meetpoint())
     assert kinds(decisions) == [SearchStatus, LogLine, Turn]
     status = session.status
@@ -130,7 +130,7 @@ def test_the_first_meetpoint_begins_a_search() -> None:
 def test_a_session_can_wait_until_it_is_asked() -> None:
     session = made(search_at_start=False)
     assert states(session.start()) == [SearchState.IDLE]
-    assert session.status.reason == "no search was asked for"
+    assert session.status.reason == "no search was requested"
     (line,) = session.meetpoint(meetpoint())
     assert line == LogLine("meetpoint not used: the search is IDLE", often=True)
     assert session.choice is None
@@ -356,7 +356,7 @@ def test_no_more_candidates_are_listed_than_allowed() -> None:
 def test_a_goal_hears_of_progress_and_succeeds_when_the_place_is_confirmed() -> None:
     session = started(search_at_start=False)
     assert states(session.goal(Goal())) == [SearchState.WAITING]
-    assert session.status.reason == "the next meetpoint begins a search: asked for by the action"
+    assert session.status.reason == "the search starts at the next meetpoint: requested by the action"
     decisions = session.meetpoint(meetpoint())
     assert kinds(decisions) == [SearchStatus, LogLine, Progress, Turn]
     assert only(decisions, Progress).status is session.status
@@ -405,7 +405,7 @@ def test_a_goal_may_begin_at_the_last_meetpoint() -> None:
     (end,) = session.goal(Goal(here=True))
     assert (end.outcome, end.reason) == (
         GoalOutcome.ABORTED,
-        "no meetpoint was reported yet, where a search could begin",
+        "no meetpoint has been reported yet at which a search could begin",
     )
     session.meetpoint(meetpoint())  # not used, but known
     decisions = session.goal(Goal(here=True))
@@ -437,7 +437,7 @@ def test_a_search_that_is_forgotten_begins_anew_with_the_next_meetpoint() -> Non
         session.meetpoint(meetpoint())
         session.meetpoint(meetpoint(T_0 + S))  # waits for its edge, in vain
         assert states(begin()) == [SearchState.WAITING]
-        assert session.status.reason == f"the next meetpoint begins a search: {why}"
+        assert session.status.reason == f"the search starts at the next meetpoint: {why}"
         assert session.edge_traversal(Traversal(0, 8.0, 8.0), T_0 + S) != []
 
 
@@ -481,7 +481,7 @@ def test_an_atlas_of_another_map_is_refused_until_its_map_comes() -> None:
 
     decisions = session.map_served(served("glass_office"), "that of topic /map")
     assert kinds(decisions) == [LogLine, SearchStatus]
-    assert session.status.reason == "the next meetpoint begins a search: there is another map"
+    assert session.status.reason == "the search starts at the next meetpoint: there is another map"
     assert session.map_served(served("glass_office"), "that of topic /map") == []
     assert states(session.reload_atlas()) == [SearchState.WAITING]
 
@@ -599,7 +599,7 @@ def without_atlas(**fields: Any) -> SearchSession:
 def test_without_an_atlas_one_is_made_of_the_map_and_the_search_begins() -> None:
     session = without_atlas(end_without_atlas=True)
     assert states(session.start()) == [SearchState.NO_ATLAS] and not session.is_to_end
-    with pytest.raises(AtlasError, match="no atlas has been made yet"):
+    with pytest.raises(AtlasError, match="no atlas has been built yet"):
         session.reload_atlas()
     office, atlas = served("glass_office"), glass_office()[1]
     decisions = session.map_served(office, "that of topic /map")
@@ -608,7 +608,7 @@ def test_without_an_atlas_one_is_made_of_the_map_and_the_search_begins() -> None
     assert session.atlas_made(served("glass_atrium"), atlas) == []  # of a map before
     decisions = session.atlas_made(office, atlas)
     assert states(decisions) == [SearchState.WAITING] and session.localizer is not None
-    assert texts(decisions)[0].startswith("the atlas made of that of topic /map: ")
+    assert texts(decisions)[0].startswith("the atlas built from that of topic /map: ")
     assert session.map_served(office, "that of topic /map") == []  # it is served again
     assert states(session.reload_atlas()) == [SearchState.WAITING]
     decisions = session.map_served(served("glass_atrium"), "that of topic /map")
@@ -619,6 +619,6 @@ def test_a_map_that_no_atlas_can_be_made_of_is_said_and_a_search_may_wait_to_be_
     session, office = without_atlas(search_at_start=False), served("glass_office")
     session.map_served(office, "that of topic /map")
     decisions = session.atlas_made(office, AtlasError("no path of 1 m in this map"))
-    assert texts(decisions) == ["no atlas can be made of that of topic /map: no path of 1 m in this map"]
+    assert texts(decisions) == ["no atlas can be built from that of topic /map: no path of 1 m in this map"]
     assert session.status.state == SearchState.NO_ATLAS
     assert states(session.atlas_made(office, glass_office()[1])) == [SearchState.IDLE]

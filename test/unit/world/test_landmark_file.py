@@ -67,7 +67,7 @@ def test_what_is_saved_is_read_again(tmp_path):
     "text, message",
     [
         ("", "is no landmark file: expected landmarks, a list of {id: ..., position: [x, y]}"),
-        ("[", "is no yaml: "),
+        ("[", "is not yaml: "),
         ("image: a.png", "is no landmark file: expected landmarks"),
         ("landmarks: 3", "landmarks must be a list, got 3"),
         ("landmarks: []\nsigmaa: 1", "unknown key 'sigmaa'; did you mean sigma?"),

@@ -218,7 +218,7 @@ def test_every_field_is_read_as_yaml_cpp_reads_it(write, fields):
     "written", ["1_000", "0x1", "1:30", "+.inf", ".inf", "1e400", "0,05", "0.05 m", "true", "", "~", "[0.05]", "- 1"]
 )
 def test_what_yaml_cpp_reads_as_no_number_is_none(write, written):
-    assert error(write([0], resolution=written)).startswith(("map.yaml: resolution must be", "map.yaml: is no yaml"))
+    assert error(write([0], resolution=written)).startswith(("map.yaml: resolution must be", "map.yaml: is not yaml"))
 
 
 def test_windows_lines_a_byte_order_mark_and_a_second_document_do_no_harm(write):
@@ -265,7 +265,7 @@ def test_files_that_are_no_maps_are_refused(tmp_path):
         (tmp_path / name).write_text(content)
         assert error(tmp_path / name).startswith(text)
     (tmp_path / "map.yaml").write_text("a: [1\nb: }")
-    assert error(tmp_path / "map.yaml").startswith("map.yaml: is no yaml: ")
+    assert error(tmp_path / "map.yaml").startswith("map.yaml: is not yaml: ")
     assert error(tmp_path / "absent.yaml") == "absent.yaml: cannot be read: No such file or directory"
     assert error(tmp_path / "absent.gridmap.gz") == "absent.gridmap.gz: does not exist"
     (tmp_path / "map.yaml").write_bytes(b"\xff\xfe")

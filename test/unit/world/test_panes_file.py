@@ -103,7 +103,7 @@ def test_a_bad_file_is_refused_in_one_line(changes: "dict[str, Any]", message: s
 
 
 @pytest.mark.parametrize(
-    "content, message", [(b"[1, 2", "is no yaml"), (b"\xff\xfe\x00", "cannot be read"), (b"4", "is no file of panes")]
+    "content, message", [(b"[1, 2", "is not yaml"), (b"\xff\xfe\x00", "cannot be read"), (b"4", "is no file of panes")]
 )
 def test_what_is_no_file_of_panes_is_refused(content: bytes, message: str, tmp_path: Path) -> None:
     (tmp_path / "panes.yaml").write_bytes(content)

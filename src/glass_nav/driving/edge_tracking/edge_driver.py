@@ -39,7 +39,7 @@ _TURN_FIRST_RAD = 0.7  # a point further to the side is turned to on the spot
 _AT_END_M = 0.02
 _MIN_SCANS = 3  # before the first graph
 _AT_NODE_M = 0.08  # the robot stands at a node
-_ALMOST_M = 0.45  # ... or as near as it gets, if something stands in the way
+_ALMOST_M = 0.45  # ... or as near as it gets, if something is in the way
 _BLOCKED_S = 4.0
 
 
@@ -104,7 +104,7 @@ class EdgeDriver:
         """
         node = self._leg.start
         if node is None or self._leg.phase != DriverPhase.ARRIVED:
-            raise ValueError(f"it stands at no meetpoint that it could leave: it is {self._leg.phase}")
+            raise ValueError(f"the robot is not at a meetpoint that it could leave: the driver is {self._leg.phase}")
         refuse_rank(rank, node.degree)
         self._leg = self._new_leg(DriverPhase.FOLLOWING, f"along edge {rank} of {node.degree}", node)
         self._leg.follow(node, rank)
@@ -117,7 +117,7 @@ class EdgeDriver:
         """
         leg, here = self._leg, self._near.pose[:2]
         if leg.start is None or leg.trace is None:
-            raise ValueError("it left no meetpoint that it could return to")
+            raise ValueError("the robot has left no meetpoint to which it could return")
         leg.trace.cut_back(here)
         way = np.concatenate([here[None], leg.trace.way_m[::-1]])
         self._leg = self._new_leg(DriverPhase.RETURNING, "back to the meetpoint that it left", leg.start)
@@ -135,7 +135,7 @@ class EdgeDriver:
         """
         halted = self._halted
         if self._leg.phase not in (DriverPhase.IDLE, DriverPhase.FAILED) or halted is None:
-            raise ValueError(f"nothing was stopped that it could go on with: it is {self._leg.phase}")
+            raise ValueError(f"nothing was stopped that could be continued: the driver is {self._leg.phase}")
         phase = DriverPhase.SEEKING if halted.trace is None else DriverPhase.FOLLOWING
         self._leg = self._new_leg(phase, "going on", self._leg.start)
         self._leg.trace, self._leg.rank, self._leg.way = halted.trace, halted.rank, halted.way
@@ -258,7 +258,7 @@ class EdgeDriver:
             else:
                 self._fail(
                     Outcome.BLOCKED,
-                    f"something stands in the way, {remaining_m:.1f} m before the end of what is seen of the edge",
+                    f"something is in the way, {remaining_m:.1f} m before the end of what is seen of the edge",
                 )
 
     # -- phases

@@ -26,7 +26,7 @@ def follow(leg: Leg, near: Surroundings, graph: LocalGraph) -> Optional[str]:
         return (
             None
             if _join_graph(leg, near, graph)
-            else _without_line(leg, near, "no edge is near that can be reached straight on")
+            else _without_line(leg, near, "no edge nearby can be reached in a straight line")
         )
     if leg.way.nearest(here) < leg.join_m - LOOKAHEAD_M:
         return None
@@ -74,7 +74,7 @@ def _without_line(leg: Leg, near: Surroundings, why: str) -> Optional[str]:
         leg.lost_since_ns = near.stamp_ns
     elif near.stamp_ns - leg.lost_since_ns > _LOST_LINE_S * 1e9:
         if leg.swept:
-            return f"{why}, also after looking around"
+            return f"{why}, even after looking around"
         leg.swept, leg.lost_since_ns = True, 0
         leg.look_around()
         if leg.phase == DriverPhase.SEEKING:  # any other edge will do

@@ -40,7 +40,7 @@ def begin(leg: Leg, near: Surroundings, target_m: np.ndarray, way_m: np.ndarray)
 def begin_looking(leg: Leg) -> None:
     """The robot is there: brake, and look."""
     leg.looking, leg.looks, leg.nodes, leg.scans = True, 0, [], []
-    leg.reason = "looking whether this is a meetpoint"
+    leg.reason = "checking whether this is a meetpoint"
 
 
 def correct_target(leg: Leg, near: Surroundings, graph: LocalGraph) -> None:
@@ -85,7 +85,7 @@ def look_again(leg: Leg, near: Surroundings, graph: LocalGraph) -> Optional[Node
 
 
 def _something_moves_at(leg: Leg, near: Surroundings, node: Node) -> bool:
-    """Whether one of the obstacles that make the node was seen to move, or to leave: somebody walks there."""
+    """Whether one of the obstacles that make the node was seen to move, or to leave: a person."""
     moved = se2.transform_points(near.pose, moving_things.moved_m(leg.scans)) - node.position_m
     reach_m = node.r_m + _OBSTACLE_M
     if (np.hypot(*moved.T) < reach_m).any():
@@ -115,7 +115,7 @@ def _turn_back_to_end(leg: Leg, near: Surroundings, graph: LocalGraph) -> bool:
 def _dismiss(leg: Leg) -> None:
     leg.dismissed_m.append(leg.target_m)
     leg.phase = DriverPhase.FOLLOWING if leg.trace is not None else DriverPhase.SEEKING
-    leg.looking, leg.reason = False, "what looked like a meetpoint is none"
+    leg.looking, leg.reason = False, "the apparent meetpoint is none"
 
 
 def _node_of(leg: Leg, near: Surroundings, graph: LocalGraph, node: int) -> Node:

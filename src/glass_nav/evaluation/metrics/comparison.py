@@ -1,6 +1,6 @@
 """Several contestants, each run over the same logs with several seeds: figures side by side, with confidence.
 
-A contestant is a set of parameters, or poses that somebody else's localization left in the log. S scans of a run.
+A contestant is a set of parameters, or poses of another localizer in the log. S scans of a run.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Run:
     cpu_ms: Optional[np.ndarray]  # (S,)
     wall_s: float
     reference: Optional[Trajectory] = None  # map_from_base
-    integrity: Optional[IntegrityTrace] = None  # of the S scans; None: it claims nothing
+    integrity: Optional[IntegrityTrace] = None  # of the S scans; None: none reported
 
     @property
     def sha256(self) -> str:
@@ -243,7 +243,7 @@ def _values(run: Run, stamps_ns: np.ndarray, first: Sequence[Run]) -> Dict[str, 
 
 
 def _integrity(run: Run, used: np.ndarray) -> Dict[str, float]:
-    """Figures of the claims about those scans; infinite: what was waited for did not happen."""
+    """Integrity figures of those scans; infinite: the awaited event did not happen."""
     if run.integrity is None:
         return dict.fromkeys(integrity_scores.METRICS, math.nan)
     claims = run.integrity.part(used)
@@ -280,7 +280,7 @@ def judged(figure: Figure, difference: Optional[Interval]) -> str:
         return ""
     if difference == Interval(0.0, 0.0):
         return "equal"
-    return {0: "not told apart", figure.better: "better", -figure.better: "worse"}[difference.sign]
+    return {0: "not significantly different", figure.better: "better", -figure.better: "worse"}[difference.sign]
 
 
 def difference_text(comparison: Comparison, contestant: str, figure: Figure, log: Optional[str] = None) -> str:

@@ -95,12 +95,12 @@ def trace(
     level_999: np.ndarray,
     reference: Optional[Trajectory],
 ) -> IntegrityTrace:
-    """Claims of a run against a reference.
+    """Reported values of a run against a reference.
 
     Args:
         stamps_ns, map_from_base, odom_from_base, states: (S,), (S, 3), (S, 3), S of the scans.
-        covariance: (S, 3, 3) claimed, over x, y and yaw in map.
-        level_95, level_999: (S, 3) claimed, along, across, heading.
+        covariance: (S, 3, 3) reported, over x, y and yaw in map.
+        level_95, level_999: (S, 3) reported, along, across, heading.
         reference: map_from_base; None: there is none.
     """
     yaw = map_from_base[:, 2]
@@ -202,7 +202,7 @@ def _level_ratio(level: np.ndarray, size: np.ndarray) -> Optional[float]:
 
 
 def _nees(error: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """(S,), NaN where the error or the covariance is not known, infinite where the covariance claims certainty."""
+    """(S,), NaN where the error or the covariance is not known, infinite where the covariance is zero."""
     found = np.full(len(error), np.nan)
     finite = np.isfinite(error).all(axis=1)
     known = ~np.isnan(error).any(axis=1) & np.isfinite(covariance).all(axis=(1, 2))

@@ -66,7 +66,7 @@ class ReplayResult:
     stamps_ns: np.ndarray  # (S,) int64
     map_from_base: np.ndarray  # (S, 3) estimates
     odom_from_base: np.ndarray  # (S, 3) what the odometry said
-    covariance: np.ndarray  # (S, 3, 3) that the filter claims, over x [m], y [m], yaw [rad]
+    covariance: np.ndarray  # (S, 3, 3) reported by the filter, over x [m], y [m], yaw [rad]
     level_95: np.ndarray  # (S, 3) protection levels along the heading [m], across it [m], of the heading [rad]
     level_999: np.ndarray  # (S, 3)
     states: List[str]  # S of them
@@ -93,7 +93,7 @@ class ReplayResult:
 
     @property
     def deviation(self) -> np.ndarray:
-        """(S, 3) standard deviations the filter claims: x [m], y [m], yaw [rad]."""
+        """(S, 3) standard deviations reported by the filter: x [m], y [m], yaw [rad]."""
         return np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=1, axis2=2), 0.0))
 
     @property

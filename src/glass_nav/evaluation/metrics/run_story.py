@@ -262,7 +262,9 @@ def _beginning(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -
 
 def _accuracy(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -> List[str]:
     if not errors.matched.any():
-        return ["There is no ground truth, so the errors are unknown. What is shown is what the filter claims."]
+        return [
+            "There is no ground truth, so the errors are unknown. Shown are the uncertainties that the filter reports."
+        ]
     off = errors.position_m[_scope(result, errors, found)]
     yaw_deg = np.degrees(errors.yaw_rad[_scope(result, errors, found)])
     lost = np.mean(off > LOST_M)
@@ -322,7 +324,7 @@ def _figures(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -> 
             Figure(
                 "Position error",
                 "unknown",
-                f"no ground truth; the filter claims {metres(float(np.median(claimed)))}, median",
+                f"no ground truth; the filter reports {metres(float(np.median(claimed)))}, median",
             )
         ]
     share = float(np.mean(np.array(result.states) == LocalizationState.LOCALIZED))

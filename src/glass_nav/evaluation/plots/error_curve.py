@@ -28,7 +28,7 @@ def draw_errors(axes: Any, result: ReplayResult) -> None:
         position, yaw, what = errors.position_m, np.degrees(errors.yaw_rad), "error"
     else:
         position = np.hypot(result.deviation[:, 0], result.deviation[:, 1])
-        yaw, what = np.degrees(result.deviation[:, 2]), "claimed deviation"
+        yaw, what = np.degrees(result.deviation[:, 2]), "reported deviation"
     finite = position[np.isfinite(position)]
     top = 1.1 * max(SCALE_FLOOR_M, float(finite.max()) if len(finite) else SCALE_FLOOR_M)
     turned = axes.twinx()

@@ -24,7 +24,7 @@ ERROR_COLOURS = ("#1b3a8a", "#8a2d9c", "#e0264f", "#ff8c00")  # small to large, 
 def draw_trajectory(path: Path, grid: GridMap, result: ReplayResult, title: str) -> None:
     """Above: map, reference and estimate, coloured by its error. Below: errors and states over time.
 
-    Without a reference the estimate has one colour and the curve shows what the filter claims.
+    Without a reference the estimate has one colour and the curve shows the reported deviation.
     """
     low, high = _bounds(result)
     width, height = high - low

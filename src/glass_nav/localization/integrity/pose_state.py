@@ -141,7 +141,7 @@ class PoseQuality:
         if confidence < self._least_confidence():
             return Judgement(
                 LocalizationState.UNCERTAIN,
-                f"the pose is right with a chance of only {confidence:.0%}; {explained}; {spread}",
+                f"the probability that the pose is right is only {confidence:.0%}; {explained}; {spread}",
                 confidence,
             )
         return Judgement(LocalizationState.LOCALIZED, f"{explained}; {spread}", confidence)
@@ -182,7 +182,7 @@ def _elsewhere(verdict: Optional[Verdict]) -> Optional[str]:
         x, y, yaw = verdict.elsewhere
         return f"the scans fit as well or better elsewhere, best at x {x:.1f} m, y {y:.1f} m, {np.degrees(yaw):.0f} deg"
     if verdict.moved:
-        return "what the lidar sees changed at once, as if the robot had been carried away"
+        return "the view of the lidar changed abruptly, as if the robot had been moved by hand"
     if verdict.poor:
         return f"scan fit {verdict.fit:.0%}, usually {verdict.usual:.0%}"
     return None

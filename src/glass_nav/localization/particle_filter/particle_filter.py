@@ -139,7 +139,7 @@ class ParticleFilter:
     def stand_for(
         self, poses: np.ndarray, weights: np.ndarray, here: np.ndarray, covariance: np.ndarray, most: int
     ) -> None:
-        """Be drawn from candidates that somebody else follows, the best first.
+        """Draw the particles from candidates of a global search, best first.
 
         Args:
             poses, weights: (K, 3) candidates in map, and (K,) weights that sum to 1.

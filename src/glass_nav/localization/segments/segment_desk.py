@@ -46,7 +46,7 @@ class SegmentDesk:
         if rough.shape != (3,) or not np.all(np.isfinite(rough)):
             raise ValueError(f"the rough pose must be finite x, y, yaw, got {rough}")
         if not scan.answered.any():
-            raise ValueError("no beam of the scan answered")
+            raise ValueError("no beam of the scan returned")
         with self._lock:
             locator = self._locator(grid_map)
             if not len(locator.segments_m):

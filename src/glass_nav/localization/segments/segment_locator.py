@@ -136,7 +136,7 @@ def free_in_words(found: SegmentCorrection) -> str:
     if not len(found.free):
         return "nothing: the walls constrain x, y and yaw"
     if len(found.free) == 3:
-        return "x, y and yaw: the walls constrain nothing"
+        return "x, y and yaw: no wall constrains them"
     heading = found.free_heading_rad
     if heading is not None:
         return f"the direction {np.degrees(heading):.0f} deg of the map: not corrected"

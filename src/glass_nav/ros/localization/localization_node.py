@@ -15,8 +15,8 @@ Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseAr
     used; none for a scan that is rejected or has no transforms, because it is unknown where to cut it;
     ~glass_map (OccupancyGrid, latched): probability of glass by wall cell [percent], -1 where unknown, with the cells
     of panes that were found and that the map lacks;
-    ~segment_quality (SegmentQuality), while somebody listens: how well the scan lies on the wall segments of the map;
-    for rviz, while somebody listens: ~beam_cloud (PointCloud2), ~beam_markers (MarkerArray, a namespace per case
+    ~segment_quality (SegmentQuality), while it has subscribers: how well the scan lies on the wall segments of the map;
+    for rviz, with subscribers: ~beam_cloud (PointCloud2), ~beam_markers (MarkerArray, a namespace per case
     and one for the status), ~wall_markers (MarkerArray, latched: the known cells of the glass map, and
     the panes that the map lacks), legend and ~legend (Image, latched).
 Services: ~save_panes (Trigger: writes ~panes_file), global_localization, request_nomotion_update (Empty), set_map (SetMap), ~locate (Locate: a rough pose

@@ -26,7 +26,7 @@ from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
 
 NOT_KNOWN = float("nan")
-UNHEARD_STATUS_S = 1.0  # the latched status is renewed that often while nobody listens
+UNHEARD_STATUS_S = 1.0  # the latched status is renewed that often without subscribers
 
 
 class Publishers:
@@ -70,7 +70,7 @@ class Publishers:
     def send(self, placed: PlacedScan, estimate: Estimate, now_s: float, pose_is_news: bool) -> None:
         """Publish everything about one scan that was used: first what the robot drives by, last what people look at.
 
-        A topic that is not latched costs nothing while nobody listens, and a latched one little.
+        A topic that is not latched costs nothing without subscribers, and a latched one little.
 
         Args:
             placed: the scan.
@@ -154,7 +154,7 @@ class Publishers:
             )
 
     def send_glass_map(self, localizer: PoseFilter, grid_map: GridMap, stamp_ns: int, now_s: float) -> None:
-        """The glass map, if it has changed, somebody listens and it is due."""
+        """The glass map, if it has changed, has subscribers and is due."""
         listeners = self._glass_map.get_num_connections() + self._wall_markers.get_num_connections()
         if not (self._glass_is_news and listeners and self._glass_pace.is_due(now_s, self._p.glass_map_period_s)):
             return

@@ -2,7 +2,7 @@
 
 The dataclasses of the parameters define what can be changed, and to what; there is no .cfg file. dynamic_reconfigure's
 own server is not used: it silently clamps values that are out of range, and writes every default to the parameter
-server, where it looks as if somebody had set it.
+server, where it looks as if it had been set.
 """
 
 from __future__ import annotations

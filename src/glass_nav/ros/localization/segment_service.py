@@ -1,4 +1,4 @@
-"""The service ~locate, and the topic ~segment_quality while somebody listens."""
+"""The service ~locate, and the topic ~segment_quality while it has subscribers."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The parameters in effect on the parameter server while the node runs: `rosparam get /amcl/tf_broadcast`, as with AMCL.
 
-Those that nobody gave are taken away at the end: the next start would take them as given.
+Parameters that were not set are removed at the end; otherwise the next start would take them as set.
 """
 
 from __future__ import annotations

@@ -79,7 +79,9 @@ class WheelTransforms(TfTransforms):
             resets = self._odometry.resets
         if resets != self._told_resets:
             self._told_resets = resets
-            self._log.warn(f"an encoder started over (left {resets[0]}, right {resets[1]} times): its wheel stood then")
+            self._log.warn(
+                f"an encoder restarted (left {resets[0]}, right {resets[1]} times): its wheel is assumed to have stood still"
+            )
         if self._broadcaster is not None:
             for news, pose in zip(news_ns.tolist(), poses):
                 self._broadcaster.sendTransform(

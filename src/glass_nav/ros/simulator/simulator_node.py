@@ -189,7 +189,7 @@ class SimulatorNode:
     def _keep_pace(self, pace: Pace, ending: threading.Event) -> None:
         factor = self._p.speed_factor
         if factor == 0.0 and self._steering.waits:
-            factor = 1.0  # whoever it waits for needs the processor
+            factor = 1.0  # the localization that it waits for needs the processor
         wait_s = pace.wait_s(self._simulation.stamp_ns, factor, time.monotonic())
         if wait_s > 0.0:
             ending.wait(wait_s)

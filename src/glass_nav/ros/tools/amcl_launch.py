@@ -33,19 +33,19 @@ KINDS = ("amcl", "localization_node")  # programs whose parameters these are
 
 WHY_UNUSED = {
     "bag_scan_period": "of amcl's own replay; glass_nav replay takes every scan by its stamp",
-    "restore_defaults": "a button of dynamic_reconfigure, no setting",
-    "laser_model_type": "there is one sensor model here; vote_mode says how beams are told apart",
+    "restore_defaults": "a button of dynamic_reconfigure, not a setting",
+    "laser_model_type": "there is one sensor model here; vote_mode selects how beams are classified",
     "laser_likelihood_max_dist": "fixed: distances to walls are cut at 2 m",
-    "laser_lambda_short": "a beam that ends short of the map is uncertain and weighs nothing",
-    "laser_z_short": "a beam that ends short of the map is uncertain and weighs nothing",
-    "laser_z_max": "a beam without an answer weighs nothing",
+    "laser_lambda_short": "a beam that ends in front of all mapped surfaces is uncertain and has no weight",
+    "laser_z_short": "a beam that ends in front of all mapped surfaces is uncertain and has no weight",
+    "laser_z_max": "a beam without a return has no weight",
     **dict.fromkeys(
         ("do_beamskip", "beam_skip_distance", "beam_skip_threshold", "beam_skip_error_threshold"),
-        "each beam is told apart by what it met, instead of being left out",
+        "beams are classified by what they met, instead of being skipped",
     ),
     **dict.fromkeys(
         ("recovery_alpha_slow", "recovery_alpha_fast"),
-        "no random particles are strewn: a robot that is lost is looked for in the whole map",
+        "no random particles are added: a lost robot is searched for in the whole map",
     ),
 }
 WORTH_KNOWING = {
@@ -170,16 +170,16 @@ def explained(node: AmclNode, source: str) -> str:
         if name not in taken and adapted[name] == defaults[name]:
             continue
         if name not in taken:
-            lines.append(_line(name, adapted[name], "not in the file; the default would contradict what is"))
+            lines.append(_line(name, adapted[name], "not in the file; the default would contradict a value that is"))
         elif defaults[name] == taken[name]:
             lines.append(_line(name, taken[name], "the default here, too"))
         else:
             lines.append(_line(name, taken[name], WORTH_KNOWING.get(name, "")))
     if unused:
-        lines += ["# without a meaning here:"]
+        lines += ["# not used here:"]
         lines += [f"# {_line(name, known[name], WHY_UNUSED[name])}" for name in unused]
     if unknown:
-        lines += ["# names that neither amcl nor this node knows; amcl takes no notice of them either:"]
+        lines += ["# names that neither amcl nor this node knows; amcl ignores them too:"]
         lines += [f"# {line.partition(': ')[2].partition(';')[0]}" for line in unknown]
     if ignored:
         lines += ["# values that amcl does not read:"]

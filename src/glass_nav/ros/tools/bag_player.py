@@ -39,7 +39,7 @@ def main() -> None:
     end_s = time.monotonic() + wait_s  # by the wall clock: simulated time stands still until the bag plays
     while not _localization_is_ready() and not ending.is_set():
         if time.monotonic() > end_s:
-            rospy.logwarn(f"no localization with a map after {wait_s:g} s: playing all the same")
+            rospy.logwarn(f"no localization with a map after {wait_s:g} s: playing anyway")
             break
         ending.wait(ASK_PERIOD_S)
     if ending.is_set():

@@ -88,7 +88,7 @@ def _now_ns() -> int:
 
 
 def served_map() -> Optional[GridMap]:
-    """The map of static_map or of the topic map; None: nobody provides one."""
+    """The map of static_map or of the topic map; None: there is none."""
     try:
         rospy.wait_for_service("static_map", timeout=MAP_WAIT_S)
         return conversions.map_from_msg(rospy.ServiceProxy("static_map", GetMap)().map)

@@ -174,7 +174,7 @@ class TopologyNode:
             return meetpoint
         scan, why_not = self._scans.at(msg.header.stamp, msg.header.frame_id)
         if scan is None:
-            self._log.warn(f"candidates are not judged by the scan at this meetpoint: {why_not}")
+            self._log.warn(f"the scan at this meetpoint is not used as evidence: {why_not}")
         return replace(meetpoint, scan=scan)
 
     def _take_traversal(self, msg: EdgeTraversal) -> None:
@@ -243,9 +243,9 @@ class TopologyNode:
 
         @contextmanager
         def watched(what: str, steps: int) -> Iterator[Callable[[], None]]:
-            rospy.loginfo(f"making the atlas: {what}, {steps} steps")
+            rospy.loginfo(f"building the atlas: {what}, {steps} steps")
             done = itertools.count(1)
-            yield lambda: rospy.loginfo_throttle(5.0, f"making the atlas: {what}, {next(done)} of {steps} steps")
+            yield lambda: rospy.loginfo_throttle(5.0, f"building the atlas: {what}, {next(done)} of {steps} steps")
 
         def make() -> None:
             made: "Atlas | AtlasError"
@@ -272,7 +272,7 @@ class TopologyNode:
             self._carry_out_as[type(decision)](decision)
 
     def _publish(self, status: SearchStatus) -> None:
-        """Status, candidates and markers, all latched: whoever comes later sees what is."""
+        """Status, candidates and markers, all latched for later subscribers."""
         frame, localizer = self._p.global_frame_id, self._session.localizer
         if status.estimate is None and status.belief is None:
             self._scene.forget()

@@ -10,6 +10,9 @@ import numpy as np
 from glass_nav.hypotheses import pose_tracker
 
 NO_DART = -1
+_MOST_BY_GRAPH = (
+    2.0  # nats of the lead of a place over another one that meetpoints may give: as for one that is missing
+)
 
 
 @dataclass(frozen=True)
@@ -49,27 +52,34 @@ class Belief:
         return np.flatnonzero(self.share > risk * self.share[0]) if len(self) else np.zeros(0, np.int64)
 
 
-def places(poses: np.ndarray, nats: np.ndarray) -> Tuple[np.ndarray, np.ndarray, float]:
+def places(poses: np.ndarray, scan_nats: np.ndarray, graph_nats: np.ndarray) -> Tuple[np.ndarray, np.ndarray, float]:
     """Shares of distinct places.
+
+    All evidence tells whether the robot is in the map at all. Between two places of it scans must have their part:
+    meetpoints of two copies of a room may differ by how their graph was drawn, and a spurious one speaks for whichever
+    has a node there.
 
     Args:
         poses: (N, 3) hypotheses; those that are no rivals of each other are one place.
-        nats: (N,) log likelihood ratios to elsewhere, as likely as one place before there was evidence.
+        scan_nats: (N,) log likelihood ratios to elsewhere, as likely as one place before there was evidence, by scans.
+        graph_nats: (N,) ... by meetpoints and edges.
 
     Returns:
         (K,) indices of the best pose of each place, the likeliest first; (K,) shares; share of elsewhere.
     """
     if not len(poses):
         return np.zeros(0, np.int64), np.zeros(0), 1.0
-    highest = max(float(nats.max()), 0.0)
-    weights, elsewhere = np.exp(nats - highest), float(np.exp(-highest))
+    nats = scan_nats + graph_nats
     left = np.argsort(-nats, kind="stable")
-    first, mass = [], []
+    first, log_mass = [], []
     while len(left):
         same = pose_tracker.same_place(poses[left], poses[left[0]])
         first.append(int(left[0]))
-        mass.append(float(weights[left[same]].sum()))
+        log_mass.append(float(np.logaddexp.reduce(nats[left[same]])))
         left = left[~same]
-    total = sum(mass) + elsewhere
-    order = np.argsort(-np.array(mass), kind="stable")
-    return np.array(first, np.int64)[order], np.array(mass)[order] / total, elsewhere / total
+    in_map = float(np.logaddexp.reduce(log_mass))
+    total = np.logaddexp(in_map, 0.0)
+    among = log_mass + np.maximum(graph_nats[first[0]] - graph_nats[first] - _MOST_BY_GRAPH, 0.0)
+    order = np.argsort(-among, kind="stable")
+    share = np.exp(among[order] - np.logaddexp.reduce(among) + in_map - total)
+    return np.array(first, np.int64)[order], share, float(np.exp(-total))

@@ -12,17 +12,18 @@ from typing import Dict, List, Tuple
 
 import numpy as np
 
+from glass_nav.geometry import angles
 from glass_nav.hypotheses import pose_belief
 from glass_nav.hypotheses.pose_belief import MapScans
 from glass_nav.topology.atlas.atlas import Atlas
 
 _COMPARED = 300  # new pairs for each step: 0.1 s
-_DIFFERENT = 3.0  # nats that tell two places apart; copies of a room that are drawn at another angle differ by less
+_DIFFERENT = 2.0  # nats that tell two places apart; copies of a room that are drawn at another angle differ by less
 DECISIVE = 8.0  # ... so surely that a robot drives there to see it
 _ROOM_M = 0.5  # nearer to walls a scan depends on each centimetre, and the robot stops short of a dead end
 _MAX_KEPT = 100_000  # pairs
 _SAME_M = 0.7  # a meetpoint nearer than this to one where the robot was is that
-_ROUNDED = np.array([0.05, 0.05, 0.02])  # poses in one such cell look the same
+_ROUNDED = np.array([0.1, 0.1, 0.04])  # poses in one such cell are compared once: they slide to where a scan fits
 
 Pose = Tuple[int, ...]
 
@@ -34,18 +35,27 @@ class ExpectedViews:
         self._atlas, self._scans = atlas, scans
         self._known: Dict[Tuple[Pose, Pose], float] = {}
         self._seen: List[np.ndarray] = []  # (C, 2) where the robot would have been, at each arrival
+        self._aimed = np.zeros((0, 3))  # where the robot will have been at its next arrival
         self._left = _COMPARED
 
     def forget(self) -> None:
         """Start over for another search."""
         self._seen.clear()
+        self._aimed = np.zeros((0, 3))
 
     def arrive(self, poses: np.ndarray) -> None:
         """The robot is at one of poses (C, 3): what is seen there is known now, and told them apart or not."""
-        self._seen.append(poses[:, :2].copy())
+        self._seen.append(np.concatenate([poses, self._aimed])[:, :2])
+        self._aimed = np.zeros((0, 3))
         self._left = _COMPARED  # pairs for the next step
         if len(self._known) > _MAX_KEPT:
             self._known.clear()
+
+    def aim(self, poses: np.ndarray) -> None:
+        """The robot drives to one of poses (C, 3), and sees at its next arrival what it can see there: it may find the way
+        blocked, or its graph drawn otherwise than the atlas, and is not to try again for ever.
+        """
+        self._aimed = poses
 
     @property
     def is_exhausted(self) -> bool:
@@ -57,6 +67,7 @@ class ExpectedViews:
 
         0 for pairs that hardly differ or that there was no time to compare, and where the robot has been.
         """
+        first, second = _facing_east(first, second)
         pairs = [(_rounded(a), _rounded(b)) for a, b in zip(first, second)]
         been = self._has_been(first, second)
         new: Dict[Pose, Dict[Pose, int]] = {}
@@ -101,6 +112,16 @@ class ExpectedViews:
             ]
             been |= near[0] & near[1]
         return been
+
+
+def _facing_east(first: np.ndarray, second: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Poses (P, 3) each, turned so that the first has yaw 0: a simulated scan looks all around, and where several edges meet
+    the robot sees the same however it came.
+    """
+    facing, turned = first.copy(), second.copy()
+    facing[:, 2] = 0.0
+    turned[:, 2] = angles.wrap(second[:, 2] - first[:, 2])
+    return facing, turned
 
 
 def _rounded(pose: np.ndarray) -> Pose:

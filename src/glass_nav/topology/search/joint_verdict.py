@@ -26,10 +26,9 @@ from glass_nav.vocabulary import SearchState
 
 _MIN_CHECKED, _MIN_DRIVEN_M = 1.0, 1.0  # before a place is confirmed: nats by scans that did not choose it, which some
 # 4 m of wall give, or a distance over which odometry agreed with it
-_LOST_SEARCHES, _LOST_M = 3, 4.0  # of the whole map, and driven, before it is given up
+_LOST_SEARCHES, _LOST_M = 3, 3.0  # of the whole map, and driven, before it is given up
 _PLACED = 8  # places, the likeliest first, whose node is looked up though it does not match
 _NODE_M, _EDGE_RAD = 0.7, 0.6  # from where a pose expects a meetpoint, and the directions of its edges in the mean
-_MOST_BY_GRAPH = 4.0  # nats of the lead over another place that meetpoints may give
 _WORTH = 0.25  # share of the doubt that a turn removes by itself; else a difference farther away is the better goal
 _STILL_LIKELY = 0.3  # share of the likeliest place's probability
 _MAX_SHOWN = 0.9995  # of a probability in words
@@ -60,7 +59,6 @@ class JointVerdict:
         explained = belief.explained[0]
         if (
             1.0 - share < risk
-            and self._scans_agree(belief)
             and (belief.checked_nats[0] >= _MIN_CHECKED or belief.driven_m >= _MIN_DRIVEN_M)
             and (np.isnan(explained) or explained >= self._params.least_explained)
         ):
@@ -68,7 +66,7 @@ class JointVerdict:
             reason = f"{self._place(belief)}; it explains {explained:.0%} of the walls seen"
             return self._estimate(SearchState.CONFIRMED, reason, depth, dart, None, belief.poses[0].copy())
         if 1.0 - belief.elsewhere < risk and belief.searches >= _LOST_SEARCHES and belief.driven_m >= _LOST_M:
-            reason = f"no place of the map explains what was seen: the best one {explained:.0%} of the walls"
+            reason = f"no place in the map explains what was seen: the best one {explained:.0%} of the walls"
             return self._estimate(SearchState.LOST, reason, depth, np.zeros(0, np.int64), None)
         return None
 
@@ -85,39 +83,48 @@ class JointVerdict:
         known, at = left[at != NO_DART], at[at != NO_DART]
         dart, first = np.unique(at, return_index=True)
         order = np.argsort(first)
-        dart, share = dart[order], belief.share[known[first[order]]]
+        dart, known = dart[order], known[first[order]]
         places = f"{self._place(belief)}, {len(left)} place{'s' * (len(left) != 1)} left"
-        if len(dart) < 2:
+        if len(left) < 2 or not len(dart):
             state = SearchState.TENTATIVE if len(left) == 1 else SearchState.SEARCHING
             choice = TurnChoice(self._least_passed(here), here.degree)
-            reason = f"{places}; next a new edge, as more walls are to confirm it"
+            reason = f"{places}; next a new edge, to see more walls"
             return self._estimate(state, reason, depth, dart, choice)
-        poses = belief.poses[known[first[order]]]
+        poses, share = belief.poses[known], belief.share[known]
         if self._views is not None:
-            self._views.arrive(poses)
-        voted = vote.expected(self._matcher, dart, share, self._views, poses)
-        ranks = None
-        if voted.removed < _WORTH and self._views is not None:
+            self._views.arrive(belief.poses[left])
+        voted, ranks = None, None
+        if len(dart) > 1:
+            voted = vote.expected(self._matcher, dart, share, self._views, poses)
+        if self._views is not None and (voted is None or voted.removed < _WORTH):
             lead = self._followed(belief, poses, share)
-            others = np.delete(poses, lead, axis=0)
-            ranks = vote.towards_difference(self._matcher, self._views, int(dart[lead]), poses[lead], others)
-        if ranks is None and voted.splits and (self._views is None or voted.removed >= _WORTH):
+            others = belief.poses[left[left != known[lead]]]
+            difference = vote.towards_difference(self._matcher, self._views, int(dart[lead]), poses[lead], others)
+            if difference is not None:
+                ranks = difference.ranks
+                if len(ranks) == 1:
+                    self._views.aim(difference.poses)
+        if ranks is None and voted is not None and voted.splits and (self._views is None or voted.removed >= _WORTH):
             reason = f"{places}; next the turn that leaves the least doubt per metre"
             return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(voted.rank, here.degree))
         proof = None
-        if ranks is None:
+        if ranks is None and len(dart) > 1:
             proof = ambiguity.prove(self._matcher, dart, views=self._views)
             ranks = proof.ranks if self._views is None else None
         if ranks is not None:
             reason = f"{places}; next towards the nearest difference, {len(ranks)} edge{'s' * (len(ranks) != 1)} away"
             return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(ranks[0], here.degree))
-        rank = self._least_passed(here)
-        listed = float(belief.share[known].sum())
-        if proof is not None and proof.indistinguishable and 1.0 - listed < self._params.tolerances.risk and depth > 0:
-            reason = f"{len(dart)} places match, and no turn can tell them apart"
-            return self._estimate(SearchState.AMBIGUOUS, reason, depth, dart, None)
-        reason = f"{places}; no turn is known to tell them apart, next a new edge"
-        return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(rank, here.degree))
+        if proof is not None and depth > 0 and 1.0 - belief.share[known].sum() < self._params.tolerances.risk:
+            if proof.indistinguishable:
+                reason = f"{len(dart)} places match, and no turn can tell them apart"
+                return self._estimate(SearchState.AMBIGUOUS, reason, depth, dart, None)
+            if self._views is not None and not self._views.is_exhausted and self._has_passed_all(here):
+                reason = f"{len(dart)} places match, and nothing that is left to see tells them apart"
+                return self._estimate(SearchState.AMBIGUOUS, reason, depth, dart, None)
+        reason = f"{places}; no turn is known to tell them apart; next a new edge"
+        return self._estimate(
+            SearchState.SEARCHING, reason, depth, dart, TurnChoice(self._least_passed(here), here.degree)
+        )
 
     def _estimate(
         self,
@@ -129,14 +136,6 @@ class JointVerdict:
         pose: Optional[np.ndarray] = None,
     ) -> SearchEstimate:
         return SearchEstimate(state, reason, depth, dart, np.zeros(len(dart), np.int64), choice, pose)
-
-    def _scans_agree(self, belief: Belief) -> bool:
-        """Whether scans have their part in the lead over every other place. Meetpoints of two copies of a place may differ
-        by how their graph was drawn, and a spurious one speaks for whichever has a node there.
-        """
-        needed = -np.log(self._params.tolerances.risk)
-        by_graph = np.minimum(belief.graph_nats[0] - belief.graph_nats[1:], _MOST_BY_GRAPH)
-        return bool((belief.scan_nats[0] - belief.scan_nats[1:] + by_graph >= needed).all())
 
     def _followed(self, belief: Belief, poses: np.ndarray, share: np.ndarray) -> int:
         """Index of the place for which the robot drives to a difference: the same as before as long as it is likely, or
@@ -162,6 +161,11 @@ class JointVerdict:
     def _on_path(self, dart: np.ndarray) -> np.ndarray:
         """The darts to which the forest has a path."""
         return dart[np.isin(dart, self._forest.candidates()[0])] if self._forest.depth >= 0 else dart[:0]
+
+    def _has_passed_all(self, here: Meetpoint) -> bool:
+        """Whether the robot has driven along every edge of a meetpoint where several meet."""
+        times = self._passed.times(here)
+        return times is not None and len(times) > 1 and bool(times.min() > 0)
 
     def _least_passed(self, here: Meetpoint) -> int:
         """Rank of an edge that was passed least often; back only if there is no other."""

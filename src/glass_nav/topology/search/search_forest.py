@@ -20,7 +20,7 @@ when no candidate without errors is left. Rules for the row of depth d with e er
   travelled; with one more error a meetpoint may have been missed on it.
 
 A meetpoint that robots usually miss (Visits.usually_missed), as at a door that is shut for weeks, joins edges without
-an error; whoever sees it all the same finds it in its place.
+an error; a robot that sees it nevertheless finds it in its place.
 """
 
 from __future__ import annotations

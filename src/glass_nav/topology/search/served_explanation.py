@@ -43,3 +43,9 @@ class ServedExplanation:
         if self._explanation is None:
             return Scan(0, np.zeros(0), np.zeros(0), 0.0, 1.0, np.zeros(3))
         return self._explanation.seen_from(map_from_base)
+
+    def is_free(self, points_m: np.ndarray) -> np.ndarray:
+        """As of ScanExplanation; without a map a robot may stand everywhere."""
+        if self._explanation is None:
+            return np.ones(points_m.shape[:-1], bool)
+        return self._explanation.is_free(points_m)

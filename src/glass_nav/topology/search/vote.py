@@ -11,7 +11,7 @@ after a turn those remain that expect what the true one shows. C candidates, R r
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import List, Optional, Tuple
+from typing import List, Optional, Set, Tuple
 
 import numpy as np
 
@@ -112,10 +112,18 @@ def carried(here: np.ndarray, there: np.ndarray, other: np.ndarray) -> np.ndarra
     return se2.compose(other, se2.compose(se2.inverse(here), there))
 
 
+@dataclass(frozen=True)
+class Difference:
+    """A meetpoint from which places look different."""
+
+    ranks: List[int]  # turns that lead there
+    poses: np.ndarray  # (1 + C, 3) of the robot there, if the leading place is right, and if one of the C others is
+
+
 def towards_difference(
     matcher: Matcher, views: ExpectedViews, dart: int, pose: np.ndarray, others: np.ndarray
-) -> Optional[List[int]]:
-    """Turns to the nearest meetpoint, by edges, where a robot would see for certain that it is not at one of the other
+) -> Optional[Difference]:
+    """The nearest meetpoint, by edges, where a robot would see for certain that it is not at one of the other
     places; if there is none, where it would see a difference at all.
 
     Args:
@@ -126,10 +134,11 @@ def towards_difference(
         others: (C, 3) poses at the other places, the likeliest first; some of them are looked at.
 
     Returns:
-        Ranks; None: no difference was found, in as many comparisons as a step may take.
+        None: no difference was found, in as many comparisons as a step may take.
     """
     level: List[Tuple[int, List[int]]] = [(dart, [])]
-    known, hint = {dart}, None
+    known: Set[int] = {dart}
+    hint: Optional[Difference] = None
     others = others[:_LOOKED_FOR]
     while level and not views.is_exhausted:
         following = []
@@ -148,10 +157,13 @@ def towards_difference(
         of_others = np.tile(others, (len(looks), 1))
         nats = views.nats(there, carried(np.broadcast_to(pose, there.shape), there, of_others))
         nats = nats.reshape(len(looks), len(others)).max(axis=1, initial=0.0)
-        if nats.max(initial=0.0) >= DECISIVE:
-            return following[int(looks[nats.argmax()])][1]
-        if hint is None and nats.max(initial=0.0) > 0.0:
-            hint = following[int(looks[nats.argmax()])][1]
+        if nats.max(initial=0.0) >= (DECISIVE if hint is not None else _EQUAL):
+            arrival, ranks = following[int(looks[nats.argmax()])]
+            there_if_right = views.at(np.array([arrival]))
+            found = Difference(ranks, np.concatenate([there_if_right, carried(pose, there_if_right, others)]))
+            if nats.max() >= DECISIVE:
+                return found
+            hint = found
     return hint
 
 

@@ -224,11 +224,11 @@ def test_a_search_that_was_stopped_goes_on():
 @pytest.mark.long_run
 def test_what_it_cannot_do_it_says_and_changes_nothing():
     driver = EdgeDriver()
-    with pytest.raises(ValueError, match="^it stands at no meetpoint that it could leave: it is IDLE$"):
+    with pytest.raises(ValueError, match="^the robot is not at a meetpoint that it could leave: the driver is IDLE$"):
         driver.leave(0)
-    with pytest.raises(ValueError, match="^it left no meetpoint that it could return to$"):
+    with pytest.raises(ValueError, match="^the robot has left no meetpoint to which it could return$"):
         driver.go_back()
-    with pytest.raises(ValueError, match="^nothing was stopped that it could go on with: it is IDLE$"):
+    with pytest.raises(ValueError, match="^nothing was stopped that could be continued: the driver is IDLE$"):
         driver.resume()
     assert driver.local_grid is None and driver.local_graph is None and driver.node is None
     assert driver.obstacles_m(np.zeros(3)).shape == (0, 2) and driver.way_m.shape == (0, 2)
@@ -237,7 +237,7 @@ def test_what_it_cannot_do_it_says_and_changes_nothing():
     for rank in (-1, 3):
         with pytest.raises(ObservationError, match=f"^turn of rank {rank}: the meetpoint it left has degree 3"):
             drive.driver.leave(rank)
-    with pytest.raises(ValueError, match="^nothing was stopped that it could go on with: it is ARRIVED$"):
+    with pytest.raises(ValueError, match="^nothing was stopped that could be continued: the driver is ARRIVED$"):
         drive.driver.resume()
     assert drive.driver.progress.phase == DriverPhase.ARRIVED
     drive.driver.leave(1)
@@ -285,7 +285,7 @@ def test_what_bars_the_edge_ends_it_as_blocked_in_front_of_it_and_there_is_a_way
     drive.until(lambda: drive.driver.progress.phase == DriverPhase.FAILED)
     told = drive.driver.progress
     assert told.failure == Outcome.BLOCKED
-    assert told.reason.startswith("something stands in the way, ") and told.reason.endswith(
+    assert told.reason.startswith("something is in the way, ") and told.reason.endswith(
         " m before the end of what is seen of the edge"
     )
     assert 3.5 < drive.simulation.map_from_base[0] < 4.5 - 0.22 and drive.blocked == 0
@@ -296,12 +296,12 @@ def test_what_bars_the_edge_ends_it_as_blocked_in_front_of_it_and_there_is_a_way
 
 @pytest.mark.long_run
 @pytest.mark.parametrize("way_m", [[[11.0, 0.3], [9.0, 0.3]], [[10.0, 0.2], [14.0, 0.2]]], ids=["here", "away"])
-def test_somebody_who_walks_at_a_decimetre_a_second_is_no_meetpoint(way_m):
+def test_a_person_who_walks_at_a_decimetre_a_second_is_no_meetpoint(way_m):
     faces = np.array([[0.0, -1.25], [16.0, -1.25], [16.0, 1.25], [0.0, 1.25]])
     walker = Person(np.array(way_m), speed_m_s=0.1)
     drive = Drive(Building(walled(faces).walls, people=(walker,)), (8.0, 0.0, 0.0))
     drive.driver.seek()
-    drive.until(lambda: drive.driver.progress.reason == "what looked like a meetpoint is none", limit_s=15.0)
+    drive.until(lambda: drive.driver.progress.reason == "the apparent meetpoint is none", limit_s=15.0)
     assert drive.driver.take_arrival() is None and drive.blocked == 0
 
 
@@ -324,7 +324,7 @@ def test_where_there_is_no_way_it_looks_around_again_and_gives_up():
     drive.until(lambda: drive.driver.progress.phase == DriverPhase.FAILED)
     told = drive.driver.progress
     assert told.failure == Outcome.NO_GRAPH
-    assert told.reason == "no edge is near that can be reached straight on, also after looking around"
+    assert told.reason == "no edge nearby can be reached in a straight line, even after looking around"
     turned_rad = sum(command[2] for command in drive.commands) * CONTROL_S
     assert turned_rad > 3.9 * math.pi and drive.blocked == 0
 
@@ -342,7 +342,7 @@ def test_a_side_corridor_that_turns_out_to_be_behind_a_pane_is_no_meetpoint():
         return drive.driver.progress.phase == DriverPhase.ARRIVED
 
     drive.until(done)
-    assert "what looked like a meetpoint is none" in reasons
+    assert "the apparent meetpoint is none" in reasons
     arrival = drive.driver.take_arrival()
     assert arrival is not None and arrival.traversal is not None and arrival.meetpoint.degree == 1
     assert drive.where(arrival) == pytest.approx([11.0, 1.0], abs=0.15)

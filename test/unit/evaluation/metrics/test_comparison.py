@@ -34,7 +34,7 @@ def test_seeds_are_compared_in_pairs():
     assert difference.mean == pytest.approx(-0.04 / 3)
     assert difference.half_width == pytest.approx(4.302653 * np.std([0.01, 0.01, 0.02], ddof=1) / math.sqrt(3))
     # -0.0133 +- 0.0143: three seeds do not yet tell them apart
-    assert comparison.judged(MEAN, difference) == "not told apart"
+    assert comparison.judged(MEAN, difference) == "not significantly different"
     assert comparison.judged(MEAN, Interval(-0.0133, 0.01)) == "better"
     assert comparison.judged(BY_NAME["localized_share"], Interval(-0.2, 0.1)) == "worse"
     assert comparison.judged(MEAN, Interval(0.0, 0.0)) == "equal"
@@ -99,7 +99,7 @@ def test_without_a_ground_truth_they_are_only_measured_against_each_other():
     assert found.interval("one", MEAN) is None and found.difference("two", MEAN) is None
 
 
-def test_a_filter_that_diverged_is_infinitely_far_off_and_no_interval_is_told():
+def test_a_filter_that_diverged_is_infinitely_far_off_and_no_interval_is_reported():
     runs = [run("one", 0, 0.1), run("two", 0, math.nan)]
     found = comparison.of(runs, ["one", "two"], ["a.bag"])
     assert found.interval("two", MEAN).mean == math.inf

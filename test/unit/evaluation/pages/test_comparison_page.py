@@ -39,8 +39,8 @@ def compared(errors_m, log="a.bag"):
 def test_the_headline_says_who_is_better_and_by_how_much():
     found = compared({"old": (0.4, 0.5), "new": (0.3, 0.4), "odd": (0.9, 0.2), "same": (0.4, 0.5)})
     assert comparison_page.headline(found) == (
-        "Position error, mean: new is better than old (-0.1000 ± 0.0000 m); odd and old are not told apart "
-        "(+0.1000 ± 5.0825 m); same and old are equal (+0.0000 ± 0.0000 m)"
+        "Position error, mean: new is better than old (-0.1000 ± 0.0000 m); odd and old are not significantly "
+        "different (+0.1000 ± 5.0825 m); same and old are equal (+0.0000 ± 0.0000 m)"
     )
     assert comparison_page.headline(compared({"old": (0.5, 0.5)})) == "Position error, mean: old 0.5000 ± 0.0000 m"
 

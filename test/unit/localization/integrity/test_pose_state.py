@@ -112,7 +112,7 @@ def test_a_scan_without_answers_says_nothing():
 def test_a_given_pose_that_was_not_compared_with_other_places_must_be_rather_right_than_wrong():
     told = judgement([0.55] * 3, best(0.1), given=True)
     assert told.state == "UNCERTAIN" and 0.05 < told.confidence < 0.5
-    assert told.reason.startswith(f"the pose is right with a chance of only {told.confidence:.0%}; ")
+    assert told.reason.startswith(f"the probability that the pose is right is only {told.confidence:.0%}; ")
     assert judgement([0.55] * 3, best(0.1)).state == "LOCALIZED"
     assert judgement([0.9] * 3, best(0.05), given=True).state == "LOCALIZED"
 
@@ -201,7 +201,9 @@ def test_a_pose_that_is_more_likely_wrong_is_not_called_localized():
     """No sign alone is bad enough."""
     told = judgement([0.6], fit=0.85, usual=0.95, doubted=True)
     assert 0.0 < told.confidence < 0.7 and told.state == "UNCERTAIN"
-    assert told.reason.startswith(f"the pose is right with a chance of only {told.confidence:.0%}; the map explains ")
+    assert told.reason.startswith(
+        f"the probability that the pose is right is only {told.confidence:.0%}; the map explains "
+    )
     assert judgement([0.6], fit=0.95, usual=0.95).state == "LOCALIZED"  # scans fit as they always did here
     assert judgement([0.9], fit=0.93, usual=0.95, doubted=True).state == "LOCALIZED"
 

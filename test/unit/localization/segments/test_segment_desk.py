@@ -25,7 +25,7 @@ def test_a_rough_pose_is_corrected():
     assert answer.correction.after.combined > answer.correction.before.combined
 
 
-def test_the_hallway_effect_is_told_in_the_message():
+def test_the_hallway_effect_is_reported_in_the_message():
     true = np.array([30.0, 1.1, 0.2])
     scan = CORRIDOR.scan(true)
     answer = SegmentDesk().locate(CORRIDOR.grid_map(), replace(scan, range_max_m=8.0), true + [0.3, 0.1, 0.0])
@@ -49,7 +49,7 @@ def test_a_scan_that_fits_nowhere_near_leaves_the_pose_as_it_was():
             L_ROOM.grid_map(),
             replace(SCAN, ranges_m=np.full(len(SCAN), np.inf)),
             HERE,
-            "no beam of the scan answered",
+            "no beam of the scan returned",
         ),
         (
             GridMap(np.zeros((40, 40), np.int8), 0.1, np.zeros(3)),

@@ -90,7 +90,7 @@ def test_numbers_without_a_stamp_are_of_the_time_at_which_they_come(monkeypatch)
     np.testing.assert_allclose(one_each.odom_from_base(6_000 * MS), [0.5, 0.0, 0.0])
 
 
-def test_what_cannot_be_used_is_said(monkeypatch):
+def test_what_cannot_be_used_is_reported(monkeypatch):
     log = Log()
     robot = wheels(monkeypatch, log, wheel_topics=("joint_states",))
     robot._take(0, packed(String(data="fast"), "std_msgs/String"))
@@ -99,7 +99,7 @@ def test_what_cannot_be_used_is_said(monkeypatch):
     assert log.lines[1].startswith("wheel counts not used: nobody_msgs/Wheels is not installed")
     for step, count in enumerate((0.0, 0.1, -900.0)):
         robot._take(0, joints(step * 20 * MS + MS, count, 0.1 * step))
-    assert log.lines[2] == "an encoder started over (left 1, right 0 times): its wheel stood then"
+    assert log.lines[2] == "an encoder restarted (left 1, right 0 times): its wheel is assumed to have stood still"
 
 
 def test_another_distance_between_the_wheels_holds_from_now_on(monkeypatch):

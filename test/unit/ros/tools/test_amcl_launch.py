@@ -59,7 +59,7 @@ def test_includes_args_groups_and_files_mean_what_they_mean_to_roslaunch(launch,
     lines = out.splitlines()
     assert lines[0] == f"# {launch}: node /r2/amcl (amcl/amcl)"
     assert (
-        "# laser_model_type: beam  # there is one sensor model here; vote_mode says how beams are told apart"
+        "# laser_model_type: beam  # there is one sensor model here; vote_mode selects how beams are classified"
     ) in lines
     assert "# unknown parameter ~odom_frame" in lines
     assert lines[-1] == "# remaps stay in the launch file: scan -> base_scan"
@@ -79,7 +79,7 @@ def test_every_parameter_of_amcl_is_taken_or_has_a_reason():
     assert all(amcl_launch.WHY_UNUSED.values())
 
 
-def test_a_default_that_the_file_contradicts_gives_way_and_is_told():
+def test_a_default_that_the_file_contradicts_gives_way_and_is_reported():
     node = amcl_launch.AmclNode("/amcl", "amcl/amcl", {"max_particles": 100}, [])
     assert yaml.safe_load(amcl_launch.explained(node, "x.launch")) == {"max_particles": 100, "min_particles": 100}
     assert "min_particles: 100  # not in the file; the default would contradict" in amcl_launch.explained(node, "x")

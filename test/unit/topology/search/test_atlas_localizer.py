@@ -335,7 +335,7 @@ def test_a_robot_of_another_building_is_lost() -> None:
     localizer = AtlasLocalizer(twins(), SearchParams(use_edge_angles=False), nowhere)
     told = driven_in_the_first_row(localizer, nowhere)
     assert told[-1].state == SearchState.LOST and told[-1].choice is None and len(told[-1].dart) == 0
-    assert told[-1].reason.startswith("no place of the map explains what was seen: the best one ")
+    assert told[-1].reason.startswith("no place in the map explains what was seen: the best one ")
 
 
 def test_where_the_graph_is_wrong_the_belief_stays() -> None:

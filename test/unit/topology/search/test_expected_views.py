@@ -46,8 +46,11 @@ def test_the_nearest_difference_is_found_by_where_the_robot_would_stand(differ: 
     matcher, views = rows(differ)
     west = np.array([0, 4])  # at the west ends, come from the middle
     pose, other = views.at(west)
-    ranks = vote.towards_difference(matcher, views, int(west[0]), pose, other[None])
-    assert ranks == ([0, 1] if differ else None)  # back, then straight on
+    found = vote.towards_difference(matcher, views, int(west[0]), pose, other[None])
+    assert (found is not None) == differ
+    if found is not None:
+        assert found.ranks == [0, 1]  # back, then straight on
+        np.testing.assert_allclose(found.poses[:, 0], [12.0, 112.0])
 
 
 def test_a_difference_that_is_not_decisive_is_a_goal_where_there_is_no_better_one(
@@ -56,7 +59,8 @@ def test_a_difference_that_is_not_decisive_is_a_goal_where_there_is_no_better_on
     matcher, views = rows(True)
     monkeypatch.setattr(vote, "DECISIVE", 1000.0)
     pose, other = views.at(np.array([0, 4]))
-    assert vote.towards_difference(matcher, views, 0, pose, other[None]) == [0, 1]
+    found = vote.towards_difference(matcher, views, 0, pose, other[None])
+    assert found is not None and found.ranks == [0, 1]
 
 
 def test_what_was_seen_once_is_expected_to_tell_nothing_more_until_another_search() -> None:
@@ -66,6 +70,20 @@ def test_what_was_seen_once_is_expected_to_tell_nothing_more_until_another_searc
     views.arrive(np.concatenate([first, second]))
     assert views.nats(first, second).tolist() == [0.0]
     views.forget()
+    assert views.differ(first, second).all()
+
+
+def test_where_a_robot_wanted_to_look_it_has_looked_at_its_next_arrival_wherever_that_is() -> None:
+    _, views = rows(True)
+    first, second = views.at(np.array([3])), views.at(np.array([7]))
+    views.aim(np.concatenate([first, second]))
+    assert views.differ(first, second).all()  # it is on its way
+    views.arrive(np.array([[50.0, 50.0, 0.0]]))
+    assert not views.differ(first, second).any()
+    views.forget()
+    views.aim(np.concatenate([first, second]))
+    views.forget()
+    views.arrive(np.zeros((0, 3)))
     assert views.differ(first, second).all()
 
 

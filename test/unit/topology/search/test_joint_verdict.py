@@ -5,10 +5,12 @@ from __future__ import annotations
 import made_atlases
 import numpy as np
 import pytest
+from made_scans import MadeScans
 
 from glass_nav.topology.observations import Meetpoint
 from glass_nav.topology.search import belief, joint_verdict
 from glass_nav.topology.search.belief import NO_DART, Belief
+from glass_nav.topology.search.expected_views import ExpectedViews
 from glass_nav.topology.search.joint_verdict import JointVerdict
 from glass_nav.topology.search.matching import Matcher
 from glass_nav.topology.search.passed_edges import PassedEdges
@@ -43,15 +45,35 @@ def test_no_edge_is_told_where_the_atlas_has_no_such_node(pose: "list[float]", d
     assert joint_verdict.darts_near(CROSS, np.array([pose]), meetpoint).tolist() == [NO_DART]
 
 
+def test_a_place_without_a_node_is_told_apart_by_driving_to_where_it_looks_different() -> None:
+    row = made_atlases.corridors(
+        [(x, y) for y in (0.0, 100.0) for x in (0.0, 6.0, 12.0)], [0.5, 1.3, 0.5] * 2, [(0, 1), (1, 2), (3, 4), (4, 5)]
+    )
+    matcher, params = Matcher(row, SearchParams().tolerances, use_angles=False), SearchParams()
+    scans = MadeScans(lambda poses: np.where((poses[:, 0] > 10.0) & (poses[:, 1] > 50.0), 0.5, 1.0), np.zeros((0, 3)))
+    forest, passed = SearchForest(matcher, 2), PassedEdges()
+    here = Meetpoint(2, 1.3, bearings_rad=np.array([np.pi, 0.0]), odom_from_base=np.zeros(3))
+    forest.begin(here)
+    passed.begin(here)
+    verdict = JointVerdict(matcher, forest, passed, params, ExpectedViews(row, scans))
+    poses, even = np.array([[6.0, 0.0, 0.0], [6.5, 103.0, 0.0]]), np.zeros(2)  # the atlas has no node at the second
+    share, dart = np.array([0.6, 0.4]), np.array([1, NO_DART])
+    told = Belief(np.zeros(3), poses, share, 0.0, even, even, even, np.ones(2), dart, 3.0, 2)
+    estimate = verdict.at_meetpoint(told, 1)
+    assert estimate.state == SearchState.SEARCHING and estimate.choice is not None and estimate.choice.rank == 1
+    assert estimate.reason.endswith("2 places left; next towards the nearest difference, 1 edge away")
+    again = verdict.at_meetpoint(told, 2)  # it has looked, and sees no difference
+    assert again.state == SearchState.SEARCHING and again.reason.endswith("next a new edge")
+
+
 def is_confirmed(
     scans: "tuple[float, float]", checked: float, graph: "tuple[float, float]" = (0.0, 0.0), driven_m: float = 0.0
 ) -> bool:
     """Of two places with such evidence by scans, by those of them that did not choose the first, and by meetpoints."""
     params, matcher = SearchParams(), Matcher(CROSS, SearchParams().tolerances, use_angles=True)
-    nats = np.array(scans) + graph
     poses = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]])
-    _, share, elsewhere = belief.places(poses, nats)
-    evidence = np.array(scans), np.full(2, checked), np.array(graph), np.ones(2)
+    first, share, elsewhere = belief.places(poses, np.array(scans), np.array(graph))
+    evidence = np.array(scans)[first], np.full(2, checked), np.array(graph)[first], np.ones(2)
     told = Belief(np.zeros(3), poses, share, elsewhere, *evidence, np.full(2, NO_DART), driven_m, 3)
     verdict = JointVerdict(matcher, SearchForest(matcher, 2), PassedEdges(), params)
     final = verdict.final(told, 0)
@@ -62,7 +84,7 @@ def is_confirmed(
     "scans, graph, confirmed",
     [
         pytest.param((20.0, 5.0), (0.0, 0.0), True, id="by scans"),
-        pytest.param((20.0, 16.5), (6.0, 0.0), True, id="by both"),
+        pytest.param((20.0, 14.5), (6.0, 0.0), True, id="by both"),
         pytest.param((20.0, 20.0), (9.0, 0.0), False, id="by meetpoints alone"),
     ],
 )

@@ -30,18 +30,18 @@ def test_a_meetpoint_speaks_for_the_poses_where_the_atlas_has_it_and_against_all
     darts = row.all_at(seen)
     assert row.atlas.darts.node[darts].tolist() == [2, 2]
     poses = poses_at(row.atlas, darts, seen)
-    nats, dart = evidence(row, seen, every).at(np.concatenate([poses, [[10.0, 0.0, 0.0], [20.0, 3.0, 0.0]]]))
-    assert dart.tolist() == [*darts.tolist(), NO_DART, NO_DART]
+    at = evidence(row, seen, every).at(np.concatenate([poses, [[10.0, 0.0, 0.0], [20.0, 3.0, 0.0]]]))
+    assert at.dart.tolist() == [*darts.tolist(), NO_DART, NO_DART]
     # Two of the eight darts show it: each is four times as likely as any.
-    np.testing.assert_allclose(nats, [np.log(4.0), np.log(4.0), -1.9, -1.9], atol=1e-6)
+    np.testing.assert_allclose(at.nats, [np.log(4.0), np.log(4.0), -1.9, -1.9], atol=1e-6)
 
 
 def test_what_all_meetpoints_have_in_common_speaks_for_none() -> None:
     row = matcher([1.0] * 12)
     seen = Meetpoint(2, 1.0)
     darts = row.all_at(seen)
-    nats, _ = evidence(row, seen, darts).at(poses_at(row.atlas, darts, seen))
-    np.testing.assert_allclose(nats, np.log(22 / 20), atol=1e-6)
+    at = evidence(row, seen, darts).at(poses_at(row.atlas, darts, seen))
+    np.testing.assert_allclose(at.nats, np.log(22 / 20), atol=1e-6)
 
 
 def test_the_path_of_the_forest_counts() -> None:
@@ -49,8 +49,9 @@ def test_the_path_of_the_forest_counts() -> None:
     seen = Meetpoint(2, 2.0)
     darts = row.all_at(seen)
     poses = poses_at(row.atlas, darts, seen)
-    plain, one, none = (evidence(row, seen, *given).at(poses)[0][0] for given in ((darts,), (darts, 1), ()))
-    assert plain - one == pytest.approx(1.5) and plain - none == pytest.approx(3.0)
+    plain, one, none = (evidence(row, seen, *given).at(poses) for given in ((darts,), (darts, 1), ()))
+    assert [at.path_nats[0] for at in (plain, one, none)] == pytest.approx([0.0, -1.5, -3.0])
+    assert plain.nats.tolist() == one.nats.tolist() == none.nats.tolist()
 
 
 def test_a_pose_that_odometry_has_carried_may_be_further_off() -> None:
@@ -58,10 +59,10 @@ def test_a_pose_that_odometry_has_carried_may_be_further_off() -> None:
     seen = Meetpoint(2, 2.0)
     at = evidence(row, seen)
     beside = poses_at(row.atlas, row.all_at(seen)[:1], seen) + [0.0, 1.2, 0.0]
-    assert at.at(beside)[1].tolist() == [NO_DART] and at.at(beside, 0.6)[1].tolist() != [NO_DART]
+    assert at.at(beside).dart.tolist() == [NO_DART] and at.at(beside, 0.6).dart.tolist() != [NO_DART]
 
 
 def test_a_meetpoint_that_the_atlas_does_not_have_speaks_against_all() -> None:
     row = matcher([0.5, 1.0, 2.0, 3.0, 0.5])
-    nats, dart = evidence(row, Meetpoint(7, 2.0)).at(np.array([[10.0, 0.0, 0.0]]))
-    assert (nats.tolist(), dart.tolist()) == ([-1.9], [NO_DART])
+    at = evidence(row, Meetpoint(7, 2.0)).at(np.array([[10.0, 0.0, 0.0]]))
+    assert (at.nats.tolist(), at.path_nats.tolist(), at.dart.tolist()) == ([-1.9], [0.0], [NO_DART])

@@ -22,6 +22,7 @@ def room() -> GridMap:
 def test_without_a_map_scans_tell_nothing():
     served = ServedExplanation()
     assert not served.has_map
+    assert served.is_free(POSES[:, :2]).all()
     assert served.search(SCAN, np.zeros(3)) is None and served.beams(SCAN, POSES, 0.5, 0.5) is None
 
 
@@ -36,6 +37,7 @@ def test_with_a_map_they_tell_what_they_tell_in_that_map():
     served, plain = ServedExplanation(), ScanExplanation(room())
     served.take(room())
     assert served.has_map
+    assert served.is_free(np.array([[2.0, 2.0], [0.05, 2.0]])).tolist() == [True, False]
     np.testing.assert_array_equal(
         served.beams(SCAN, POSES, 0.5, 0.5).explained, plain.beams(SCAN, POSES, 0.5, 0.5).explained
     )

@@ -64,7 +64,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
         folder,
         figure,
         "candidates",
-        "From anywhere to one place",
+        "Global search",
         f"Number of places that were possible over time: up to {most}, {ending}.",
         "The upright line is where the search ended."
         if after is not None

@@ -20,5 +20,5 @@ def draw(folder: Path, confusion: np.ndarray) -> Picture:
         "confusion",
         "Reported and true cases",
         f"Confusion matrix of the beam cases: {100 * right:.1f} % of {int(confusion.sum())} beams were classified correctly.",
-        "The log knows what each beam truly met. Rows: true case; columns: reported case.",
+        "The log has the true case of each beam. Rows: true case; columns: reported case.",
     )

@@ -18,7 +18,7 @@ from glass_nav.vocabulary import TRUTH_COLOUR, state_colour, state_mark, states_
 
 MARGIN_M = 3.0
 MARKED = 40  # scans of a path have the mark of their state
-_JUMP_M = 2.0  # farther apart, two poses are not joined by a line: nobody drove there
+_JUMP_M = 2.0  # poses farther apart are not joined by a line: the robot did not drive there
 
 
 def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture]:
@@ -72,7 +72,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
         "way",
         "Where it drove",
         f"The robot's path over the map, coloured by the state that the filter reported: {shares}.",
-        "Coloured: where the filter said the robot was, by what it said of itself. "
+        "Coloured: the reported poses, by the reported state. "
         + ("Dashed: the ground truth. " if errors.matched.any() else "")
         + "Numbers: the worst scans, pictured below.",
     )

@@ -27,8 +27,8 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
             folder,
             figure,
             "errors",
-            "What the filter claims",
-            "The standard deviations of position and heading that the filter claims, over time.",
+            "Reported uncertainty",
+            "The reported standard deviations of position and heading over time.",
             "There is no ground truth to compare with.",
         )
     left, beside = figure.subplots(1, 2, gridspec_kw={"width_ratios": [2.4, 1.0]})
@@ -45,7 +45,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
         folder,
         figure,
         "errors",
-        "How far off it was",
+        "Errors",
         f"Position and heading error over time; median {metres(float(np.median(off)))}, at most "
         f"{metres(float(off.max()))}.",
         "Left: errors against the ground truth over time, and the state. Right: for how many scans the error "

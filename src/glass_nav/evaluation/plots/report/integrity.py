@@ -64,7 +64,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
         folder,
         figure,
         "integrity",
-        "Errors against the levels that the filter claimed",
+        "Errors against protection levels",
         f"Integrity diagram: error of each scan against its 99.9 % protection level, along and across the heading and "
         f"of the heading. {share} of the scans are misleading: LOCALIZED and above the diagonal.",
         "Each dot is a scan. Below the dashed line the error is within its protection level. Above it (shaded) a pose "

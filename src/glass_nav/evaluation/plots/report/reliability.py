@@ -29,10 +29,10 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
             folder,
             figure,
             "reliability",
-            "How reliable it said it was",
+            "Reported reliability",
             f"The probability of a correct pose that the filter reports, over time; median "
             f"{np.median(result.reliability):.2f}.",
-            "Without a ground truth it cannot be checked.",
+            "It cannot be checked without a ground truth.",
         )
     reported, off = result.reliability[errors.matched], errors.position_m[errors.matched]
     state_of, right = np.array(result.states)[errors.matched], run_story.right(errors)[errors.matched]
