@@ -95,8 +95,6 @@ class FixedWalk {
     cell_ = cell_0_ + static_cast<std::int32_t>(x_.cell) * step_x_ + static_cast<std::int32_t>(y_.cell) * step_y_;
   }
 
-  void step() { leap(1); }
-
  private:
   static constexpr int kPointBits = 32;
   static constexpr double kPoint = 4294967296.0;  // 2^kPointBits: multiplying by it rounds nothing

@@ -70,27 +70,6 @@ class GridWalk {
     off_boundary_ = std::min(off_x, off_y);
   }
 
-  /// As leap(1), in less time.
-  void step() {
-    const double tx = x_axis_.crossing(x_axis_.cell + 1), ty = y_axis_.crossing(y_axis_.cell + 1);
-    t_ = std::min(tx, ty);
-    crossed_x_ = tx < ty;
-    const Axis& other = crossed_x_ ? y_axis_ : x_axis_;
-    const double past = other.start + t_ * other.speed - other.cell;
-    off_boundary_ = std::min(past, 1.0 - past);
-    x_axis_.cell += crossed_x_;
-    y_axis_.cell += !crossed_x_;
-  }
-
-  /// Goes to a cell ahead that the ray is known to enter at t, far from any corner.
-  /// @param x, y  of the cell, mirrored as the axes are
-  void skip_to(int x, int y, double t) {
-    x_axis_.cell = x;
-    y_axis_.cell = y;
-    t_ = t;
-    off_boundary_ = 1.0;
-  }
-
   /// False if the ray certainly did not enter the present cell at a corner.
   bool near_corner() const { return off_boundary_ <= kCorner; }
 

@@ -152,7 +152,7 @@ class GuidedRayMarcher {
   std::int32_t seek(const Ray& ray, GridWalk& walk, const Ignored& ignored) const {
     while (walk.inside()) {
       const double look_until = walk.t() + guide_.along(ray, walk.t(), walk.t_max()) + kMarginCells;
-      for (; walk.inside() && walk.t() <= look_until; walk.step()) {
+      for (; walk.inside() && walk.t() <= look_until; walk.leap(1)) {
         const std::int32_t met = cells_.met(walk, ignored);
         if (met >= 0) return met;
         if (cells_.stops(walk.cell())) return -1;

@@ -240,7 +240,7 @@ class SurfaceFinder {
     double t_out = t_in;
     for (;;) {
       const bool occupied = cells_.occupied(walk.cell());
-      walk.step();
+      walk.leap(1);
       if (walk.is_doubtful()) return kInfinity;
       if (occupied) t_out = walk.t();
       if (t_out - t_in > max_length || t_out > walk.t_max()) return kInfinity;
