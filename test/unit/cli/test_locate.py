@@ -73,8 +73,8 @@ def test_a_rough_pose_is_corrected_and_drawn(room, capsys, options):
     out = capsys.readouterr().out
     left = told(out) - TRUE
     assert np.hypot(left[0], left[1]) < 0.03 and abs(angles.wrap(left[2])) < np.radians(0.5)
-    assert "free      nothing: the walls constrain x, y and yaw" in out
-    assert "360 beams, 360 answered" in out
+    assert "free      none: the walls constrain x, y and yaw" in out
+    assert "360 beams, 360 returned" in out
     moved = float(out.split("moved ")[1].split()[0])
     assert moved == pytest.approx(np.hypot(*OFF[:2]), abs=0.03)
     with Image.open(room / "out.png") as image:

@@ -21,7 +21,7 @@ def test_a_rough_pose_is_corrected():
     answer = PoseLocator().locate(L_ROOM.grid_map(), SCAN, HERE + [0.2, -0.1, 0.05])
     away_m, away_rad = off(answer.map_from_base, HERE)
     assert away_m < 0.02 and away_rad < np.radians(0.3)
-    assert answer.refusal is None and answer.text == "free: nothing: the walls constrain x, y and yaw"
+    assert answer.refusal is None and answer.text == "free: none: the walls constrain x, y and yaw"
     assert answer.correction.after.combined > answer.correction.before.combined
 
 
