@@ -89,7 +89,11 @@ class Verdict:
 
         A given pose is contested once scans have cost it half of its head start over another place.
         """
-        return self.moved or (self.doubted and self.log_ratio > _CLOSE) or (self.given and self.log_ratio > -0.5 * _HEAD_START)
+        return (
+            self.moved
+            or (self.doubted and self.log_ratio > _CLOSE)
+            or (self.given and self.log_ratio > -0.5 * _HEAD_START)
+        )
 
 
 class KidnapDetector:
@@ -259,7 +263,9 @@ class KidnapDetector:
             self._search = None
             self._moved = self._given = False
         found = (
-            candidates.poses[0] if candidates.found and not here[0] and self.is_fit_for(candidates, points, on_map) else None
+            candidates.poses[0]
+            if candidates.found and not here[0] and self.is_fit_for(candidates, points, on_map)
+            else None
         )
         there = None if elsewhere is None else candidates.poses[elsewhere]
         return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates, there, contested, kept, given)
