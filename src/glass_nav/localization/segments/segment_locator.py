@@ -1,4 +1,4 @@
-"""One scan, rough pose -> corrected pose, by the beams that ended at walls: corrections and cases alternate.
+"""Corrects a rough pose by the beams of a scan that ended at walls: corrections and cases alternate.
 
 Beams are classified at a pose (case_votes.py), and a pose is corrected by beams of known case (segment_correction.py),
 so each needs the other. First all beams pull, from the rough pose and others around it, and the result with the most
