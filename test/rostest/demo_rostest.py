@@ -167,7 +167,7 @@ class Demo(unittest.TestCase):
         self.assertLessEqual(np.median(np.diff(times)), 20_000_000)  # a subscriber under load may miss one
         self.assertEqual((self.odometry.last.header.frame_id, self.odometry.last.child_frame_id), ("odom", "base_link"))
 
-    def test_3_whoever_listens_is_given_the_pose_and_nobody_else(self) -> None:
+    def test_3_a_subscriber_is_given_the_pose_and_nobody_else(self) -> None:
         lines = len(self.lines.having("starting at x"))
         heard = Heard("initialpose", PoseWithCovarianceStamped)
         self.assertTrue(wait_until(lambda: len(heard), 30.0), "no initialpose within 30 s")

@@ -145,7 +145,7 @@ class Landmarks(unittest.TestCase):
             self.assertTrue(wait_until(lambda: self.send().success, 30.0))
         self.assertTrue(wait_until(self.is_localized, TURN_S), f"{self.status.last}, {self.poses.last}")
 
-    def test_5_what_gives_no_position_is_said(self) -> None:
+    def test_5_what_gives_no_position_is_reported(self) -> None:
         self.see_now()
         self.publisher.publish(self.see(A3=0.3, A4=-0.25))
         self.assertTrue(

@@ -229,7 +229,7 @@ class LocalizationInterface(RoomTest):
         self.assertLess(np.abs(now - start).max(), 0.01, f"true {now}, started at {start}")
         self.expect_right_pose()
 
-    def test_a_stamp_before_all_odometry_is_said(self) -> None:
+    def test_a_stamp_before_all_odometry_is_reported(self) -> None:
         self.initialpose.publish(changed(pose_message(self.robot.map_from_base()), header__stamp=rospy.Time(10)))
         self.expect_line("taken as of now", "no odometry at its stamp")
         self.expect_right_pose()
@@ -297,13 +297,13 @@ class LocalizationInterface(RoomTest):
         self.robot.odometry_is_told = True
         self.expect_right_pose()
 
-    def test_an_unknown_scan_frame_is_said(self) -> None:
+    def test_an_unknown_scan_frame_is_reported(self) -> None:
         self.robot.spoil = lambda msg: changed(msg, header__frame_id="nowhere")
         self.expect_line("no transform base_link <- nowhere")
         self.robot.spoil = lambda msg: msg
         self.expect_right_pose()
 
-    def test_silence_of_the_scan_is_told_in_the_status(self) -> None:
+    def test_silence_of_the_scan_is_reported_in_the_status(self) -> None:
         self.robot.lidar.silent = True
         self.assertTrue(
             wait_until(lambda: self.status.last.reason.startswith("no scan on /scan for"), 30.0), str(self.status.last)

@@ -71,7 +71,7 @@ class LocalizationLidars(RoomTest):
         self.assertEqual(self.frames_used(8), {"front_laser", "rear_laser", "tower_laser"})
         self.expect_right_pose()
 
-    def test_a_time_that_no_lidar_takes_is_said(self) -> None:
+    def test_a_time_that_no_lidar_takes_is_reported(self) -> None:
         self.robot.spoil = lambda msg: changed(msg, time_increment=0.5)
         self.expect_line("scans are not deskewed: time_increment 0.5 s")
         self.expect_right_pose()

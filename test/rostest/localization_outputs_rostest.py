@@ -247,7 +247,7 @@ class LocalizationOutputs(unittest.TestCase):
             "nothing said in ~beam_markers within 10 s",
         )
 
-    def test_the_legend_waits_for_whoever_comes(self) -> None:
+    def test_the_legend_waits_for_the_first_subscriber(self) -> None:
         for _ in range(2):
             legend = Heard(f"{NODE}/legend", Image)
             self.assertTrue(wait_until(lambda legend=legend: len(legend), 30.0), "no ~legend within 30 s")
@@ -322,7 +322,7 @@ class LocalizationOutputs(unittest.TestCase):
             locate(LaserScan(), self.rough_pose([0.0, 0.0, 0.0], "odom"))
         self.assertIn("the pose must be given in frame 'map', got 'odom'", str(refused.exception))
 
-    def test_the_quality_of_each_scan_is_sent_while_somebody_listens(self) -> None:
+    def test_the_quality_of_each_scan_is_sent_to_subscribers(self) -> None:
         quality = Heard(f"{NODE}/segment_quality", SegmentQuality)
         self.assertTrue(wait_until(lambda: len(quality), 30.0), "no ~segment_quality within 30 s")
         last = quality.last

@@ -89,7 +89,7 @@ class LocalizationPanes(unittest.TestCase):
         glass = np.array(self.glass.last.data).reshape(self.grid_map.occupancy.shape)
         return int(((glass >= 50) & room_with_a_pane().occupied & ~self.grid_map.occupied).sum())
 
-    def test_a_pane_is_found_told_kept_and_known_at_the_next_start(self) -> None:
+    def test_a_pane_is_found_reported_kept_and_known_at_the_next_start(self) -> None:
         self.start()
         self.assertTrue(wait_until(self.line_is_drawn, ROUND_S), f"no pane within {ROUND_S:g} s")
         self.assertTrue(wait_until(lambda: self.pane_cells() > 10, 20.0), "the pane is not in ~glass_map")

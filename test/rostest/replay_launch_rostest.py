@@ -80,7 +80,7 @@ class ReplayLaunch(unittest.TestCase):
                 live = Process("glass_nav", "doctor", "--live", "--seconds", "5")
                 code, printed = live.wait(60.0)
                 self.assertEqual(code, 0, printed)
-                self.assertIn("nothing found", printed)
+                self.assertIn("no fault found", printed)
                 self.assertIn("/scan: ", printed)
                 self.assertIn("map: ", printed)
                 log, _ = launch.communicate(timeout=PLAY_S)

@@ -1,4 +1,4 @@
-"""The rooms of the package: who may import whom, that ros/ decides nothing, that every file parses on Python 3.8."""
+"""The packages of glass_nav: which may import which, that ros/ decides nothing, that every file parses on Python 3.8."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from glass_nav.vocabulary import DriverPhase, Outcome, SearchState
 REPO = Path(__file__).parents[2]
 PACKAGE = REPO / "src" / "glass_nav"
 
-MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or less than the room
+MAY_IMPORT = {  # a package, or a subpackage of one where the subpackage may import more or less than the package
     "geometry": "",
     "world": "geometry",
     "sensing": "geometry world",
@@ -46,7 +46,7 @@ MAY_IMPORT = {  # a room, or a wing of one where the wing may import more or les
     "ros": "geometry world sensing panes hypotheses localization topology driving recording simulation evaluation checkup "
     "demo",
 }
-# modules of no room
+# modules of no package
 FOR_ALL = {
     "amcl_parameters",
     "health",
@@ -110,34 +110,34 @@ def imported(source: str) -> Iterator[str]:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, "write the whole name: from glass_nav.room import module"
+            assert node.level == 0, "write the whole name: from glass_nav.package import module"
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
-def room_of(module: str) -> str:
-    """The narrowest room of MAY_IMPORT that holds a module, as "topology/search"; "" if none does."""
+def package_of(module: str) -> str:
+    """The narrowest package of MAY_IMPORT that holds a module, as "topology/search"; "" if none does."""
     parts = module.split("/")
     places = ["/".join(parts[:count]) for count in range(len(parts), 0, -1)]
     return next((place for place in places if place in MAY_IMPORT), "")
 
 
-def may_import(room: str, module: str) -> bool:
-    """Whether files of a room may import a module: a room calls its wings, a wing not its room."""
-    return any((module + "/").startswith(place + "/") for place in [room, *MAY_IMPORT[room].split()])
+def may_import(package: str, module: str) -> bool:
+    """Whether files of a package may import a module: a package calls its subpackages, a subpackage not its package."""
+    return any((module + "/").startswith(place + "/") for place in [package, *MAY_IMPORT[package].split()])
 
 
-def breaches(room: str, source: str) -> Iterator[str]:
-    """Names that a file of this room imports and may not."""
-    top_room = room.split("/")[0]
+def breaches(package: str, source: str) -> Iterator[str]:
+    """Names that a file of this package imports and may not."""
+    top_package = package.split("/")[0]
     for name in imported(source):
         top, below = (name + ".").split(".")[:2]
-        if (top in MIDDLEWARE or top.endswith("_msgs") or name.startswith("glass_nav.msg")) and top_room != "ros":
+        if (top in MIDDLEWARE or top.endswith("_msgs") or name.startswith("glass_nav.msg")) and top_package != "ros":
             yield name
         module = name[len("glass_nav.") :].replace(".", "/")
-        if top == "glass_nav" and below in MAY_IMPORT and not may_import(room, module):
+        if top == "glass_nav" and below in MAY_IMPORT and not may_import(package, module):
             yield name
-        for guarded, rooms in ONLY_BY.items():
-            if (name + ".").startswith(guarded + ".") and top_room not in rooms.split():
+        for guarded, packages in ONLY_BY.items():
+            if (name + ".").startswith(guarded + ".") and top_package not in packages.split():
                 yield name
 
 
@@ -180,9 +180,9 @@ PYTHON_FILES = sorted(
 
 @pytest.mark.parametrize("path", [pytest.param(path, id=str(path.relative_to(PACKAGE))) for path in MODULES])
 def test_a_room_imports_only_the_rooms_before_it(path: Path) -> None:
-    room = room_of(str(path.relative_to(PACKAGE).parent))
-    assert room, f"{path.parent} is no room; add it to MAY_IMPORT and say why in the commit"
-    assert not list(breaches(room, path.read_text()))
+    package = package_of(str(path.relative_to(PACKAGE).parent))
+    assert package, f"{path.parent} is no package; add it to MAY_IMPORT and say why in the commit"
+    assert not list(breaches(package, path.read_text()))
 
 
 @pytest.mark.parametrize("path", sorted(PACKAGE.glob("*.py")), ids=lambda path: path.name)
@@ -193,16 +193,18 @@ def test_what_has_no_room_imports_no_room(path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "room, source",
+    "package, source",
     [
-        pytest.param("geometry", "import glass_nav.world.grid_map", id="a later room"),
-        pytest.param("world", "from glass_nav import sensing", id="a later room, by from"),
+        pytest.param("geometry", "import glass_nav.world.grid_map", id="a later package"),
+        pytest.param("world", "from glass_nav import sensing", id="a later package, by from"),
         pytest.param(
             "localization/particle_filter",
             "from glass_nav.localization.integrity import kidnap_detector",
-            id="a later wing",
+            id="a later subpackage",
         ),
-        pytest.param("topology/search", "from glass_nav.topology import search_session", id="what calls the wing"),
+        pytest.param(
+            "topology/search", "from glass_nav.topology import search_session", id="what calls the subpackage"
+        ),
         pytest.param("localization", "def f():\n    import rospy", id="ROS, inside a function"),
         pytest.param("cli", "from sensor_msgs.msg import LaserScan", id="messages"),
         pytest.param("recording", "from glass_nav.msg import BeamCases", id="our messages"),
@@ -210,8 +212,8 @@ def test_what_has_no_room_imports_no_room(path: Path) -> None:
         pytest.param("cli", "from rosbags.rosbag1 import Reader", id="rosbags outside recording"),
     ],
 )
-def test_the_rule_sees_a_breach(room: str, source: str) -> None:
-    assert list(breaches(room, source))
+def test_the_rule_sees_a_breach(package: str, source: str) -> None:
+    assert list(breaches(package, source))
 
 
 @pytest.mark.parametrize(

@@ -56,7 +56,7 @@ class Report:
         for finding in self.findings:
             lines += ["", f"finding  {finding.name}: {finding.what}", f"  to do  {finding.advice}"]
         count = len(self.findings)
-        return "\n".join([*lines, "", f"{count} finding{'' if count == 1 else 's'}" if count else "nothing found"])
+        return "\n".join([*lines, "", f"{count} finding{'' if count == 1 else 's'}" if count else "no fault found"])
 
 
 def examine(seen: Observed, grid_map: Optional[GridMap] = None, names: FrameNames = FrameNames()) -> Report:

@@ -164,12 +164,12 @@ def _lines(scan: Scan, located: Located, rough: np.ndarray, segments: int) -> "l
     x, y, yaw = found.map_from_base
     moved = found.map_from_base - rough
     return [
-        f"scan      {len(scan)} beams, {np.count_nonzero(scan.answered)} answered, "
-        f"{np.count_nonzero(located.used)} pull; {segments} wall segments",
+        f"scan      {len(scan)} beams, {np.count_nonzero(scan.answered)} returned, "
+        f"{np.count_nonzero(located.used)} used; {segments} wall segments",
         f"pose      x {x:.3f} m  y {y:.3f} m  yaw {yaw:.4f} rad ({np.degrees(yaw):.2f} deg)",
         f"moved     {np.hypot(moved[0], moved[1]):.3f} m, {np.degrees(angles.wrap(moved[2])):+.2f} deg",
         f"free      {segment_locator.free_in_words(found)}",
-        f"quality   {_measures(found.after)}; {found.after.inlier_share:.0%} of those that pull within "
+        f"quality   {_measures(found.after)}; {found.after.inlier_share:.0%} of the used ones within "
         f"{SegmentCorrectionParams().outlier_m:g} m of walls",
         f"before    {_measures(found.before)}",
     ]

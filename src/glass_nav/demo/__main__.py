@@ -27,7 +27,7 @@ def wake_up(seed: int, picture: Path) -> bool:
     simulation = Simulation(building, lidar.preset("sensitive"), seed=seed, start=start)
     robot = SimulatedRobot(simulation, building_map.draw(building), atlas, seed, _say)
     p = WakeUpDemoParams(atlas=BUILDING, picture=str(picture), tour=3, seed=seed)
-    return WakeUpDemo(atlas, p, robot.heard, robot).run()
+    return WakeUpDemo(atlas, p, robot.reports, robot).run()
 
 
 def main(arguments: Optional[List[str]] = None) -> int:

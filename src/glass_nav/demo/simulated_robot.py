@@ -10,7 +10,7 @@ from typing import Callable, Optional
 
 import numpy as np
 
-from glass_nav.demo.heard import Candidates, Heard, SearchNews
+from glass_nav.demo.reports import Candidates, Reports, SearchNews
 from glass_nav.demo.wake_up_demo import Arrival
 from glass_nav.demo.wired_robot import WiredRobot
 from glass_nav.driving.driver_params import DriveParams
@@ -24,7 +24,7 @@ from glass_nav.world.grid_map import GridMap
 
 
 class SimulatedRobot:
-    """The DemoRobot of a simulation; what is heard goes into `heard`."""
+    """The DemoRobot of a simulation; its reports are kept in `reports`."""
 
     def __init__(
         self,
@@ -44,8 +44,8 @@ class SimulatedRobot:
             say: prints a line for the user.
             search: how it is done.
         """
-        self.heard = Heard()
-        self.heard.grid_map = grid_map
+        self.reports = Reports()
+        self.reports.grid_map = grid_map
         self._simulation, self._atlas = simulation, atlas
         self._localizer = Localizer(LocalizerParams(), grid_map, np.random.default_rng([seed, 1]))
         session = SearchSession(lambda: (atlas.name, atlas), SessionParams(), search)
@@ -57,16 +57,16 @@ class SimulatedRobot:
 
     def listen(self) -> None:
         """Simulates until the next scan, and processes it."""
-        robot, heard = self._robot, self.heard
+        robot, reports = self._robot, self.reports
         frame = robot.step()
         stamp_ns = frame.scan.stamp_ns
-        heard.truth[stamp_ns] = frame.map_from_base
-        if robot.initial_pose is not None and heard.initial_pose is None:
-            heard.initial_pose = robot.session.status.stamp_ns, robot.initial_pose
+        reports.truth[stamp_ns] = frame.map_from_base
+        if robot.initial_pose is not None and reports.initial_pose is None:
+            reports.initial_pose = robot.session.status.stamp_ns, robot.initial_pose
             robot.localize(self._localizer)
         if robot.estimate is not None:
-            heard.poses[stamp_ns] = robot.estimate.map_from_base
-            heard.localization = robot.estimate.state
+            reports.poses[stamp_ns] = robot.estimate.map_from_base
+            reports.localization = robot.estimate.state
 
     def is_ending(self) -> bool:
         """Never: it has all the time it needs."""
@@ -106,16 +106,16 @@ class SimulatedRobot:
         self._robot.give_up()
 
     def _hear_search(self, status: SearchStatus) -> None:
-        heard, estimate, arrival = self.heard, status.estimate, self._robot.arrival
+        reports, estimate, arrival = self.reports, status.estimate, self._robot.arrival
         if estimate is not None and arrival is not None and arrival.stamp_ns == status.stamp_ns:
-            heard.meetpoints[status.stamp_ns] = arrival.meetpoint
+            reports.meetpoints[status.stamp_ns] = arrival.meetpoint
             if arrival.traversal is not None:
-                heard.traversals[status.stamp_ns] = arrival.traversal
+                reports.traversals[status.stamp_ns] = arrival.traversal
         if estimate is not None:
             dart = estimate.dart[: len(status.poses)]
-            heard.candidates[status.stamp_ns] = Candidates(
+            reports.candidates[status.stamp_ns] = Candidates(
                 len(estimate.dart), self._atlas.darts.node[dart].tolist(), (dart >> 1).tolist(), status.poses
             )
         depth, count = (0, 0) if estimate is None else (estimate.depth, len(estimate.dart))
         turn = estimate.choice.name if estimate is not None and estimate.choice else ""
-        heard.take_search(SearchNews(status.stamp_ns, status.state, status.reason, depth, count, turn))
+        reports.take_search(SearchNews(status.stamp_ns, status.state, status.reason, depth, count, turn))

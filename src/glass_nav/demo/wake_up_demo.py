@@ -14,7 +14,7 @@ from typing import Callable, List, Optional, Protocol
 import numpy as np
 
 from glass_nav.demo import tour
-from glass_nav.demo.heard import Heard, SearchNews
+from glass_nav.demo.reports import Reports, SearchNews
 from glass_nav.evaluation.metrics import pose_errors
 from glass_nav.evaluation.plots import wake_up_picture
 from glass_nav.evaluation.plots.wake_up_picture import Depth, WakeUpStory
@@ -25,7 +25,7 @@ from glass_nav.vocabulary import SEARCH_IS_OVER, LocalizationState, Outcome, Sea
 
 SEARCH_ENDED = (*SEARCH_IS_OVER, SearchState.NO_ATLAS)  # nothing more will come
 RIGHT_M, RIGHT_RAD = 0.5, 0.35  # a pose that is handed over so near is right
-REQUESTS = 3  # for a node, where the driver has not heard of the localization yet
+REQUESTS = 3  # for a node, while the driver has no status of the localization yet
 LISTED = 8  # candidates in a row
 ROW_LIMIT_S = 2.0  # of the wall clock, for the reports that belong to a row
 RESTART_LIMIT_S = 10.0  # of the wall clock
@@ -71,7 +71,7 @@ class DemoRobot(Protocol):
     """The robot and the user."""
 
     def listen(self) -> None:
-        """Wait a moment, then put what came into Heard."""
+        """Wait a moment, then store new messages in Reports."""
 
     def is_ending(self) -> bool:
         """Whether the demo is to stop at once."""
@@ -101,20 +101,20 @@ class DemoRobot(Protocol):
 class WakeUpDemo:
     """run() once."""
 
-    def __init__(self, atlas: Atlas, p: WakeUpDemoParams, heard: Heard, robot: DemoRobot) -> None:
+    def __init__(self, atlas: Atlas, p: WakeUpDemoParams, reports: Reports, robot: DemoRobot) -> None:
         self._atlas, self._p = atlas, p
-        self._heard, self._robot = heard, robot
+        self._reports, self._robot = reports, robot
         self._depths: List[Depth] = []
         self._degree_before = 0
         self._confirmed_ns = 0
 
     def run(self) -> bool:
         """Whether the place was right and the whole tour was driven."""
-        heard = self._heard
-        if not self._wait(lambda: bool(heard.truth) and heard.grid_map is not None, wall_s=self._p.start_limit_s):
+        reports = self._reports
+        if not self._wait(lambda: bool(reports.truth) and reports.grid_map is not None, wall_s=self._p.start_limit_s):
             self._robot.say("no messages received: is launch/wakeup.launch running?")
             return False
-        x, y, yaw = heard.truth[min(heard.truth)]
+        x, y, yaw = reports.truth[min(reports.truth)]
         self._robot.say(
             f"wakes up at x {x:.2f} m, y {y:.2f} m, yaw {math.degrees(yaw):.0f} degrees, which the robot does not know"
         )
@@ -137,11 +137,11 @@ class WakeUpDemo:
                 return None
             if self._state != SearchState.LOST or not searches_left or not self._search_again():
                 break
-        return self._heard.search
+        return self._reports.search
 
     @property
     def _state(self) -> Optional[SearchState]:
-        return None if self._heard.search is None else self._heard.search.state
+        return None if self._reports.search is None else self._reports.search.state
 
     def _search_again(self) -> bool:
         """Whether there will be another search, from the meetpoint where the robot stands."""
@@ -158,21 +158,21 @@ class WakeUpDemo:
         """Whether the place is known, and right."""
         if found.state != SearchState.CONFIRMED:
             self._robot.say(f"{found.state}: {found.reason}")
-            candidates = self._heard.candidates.get(found.stamp_ns)
+            candidates = self._reports.candidates.get(found.stamp_ns)
             for x, y, yaw in [] if candidates is None else candidates.poses[:10]:
                 self._robot.say(f"  may be at x {x:.2f} m, y {y:.2f} m, yaw {math.degrees(yaw):.0f} degrees")
             return False
-        self._wait(lambda: self._heard.initial_pose is not None, wall_s=POSE_LIMIT_S)
-        if self._heard.initial_pose is None:
+        self._wait(lambda: self._reports.initial_pose is not None, wall_s=POSE_LIMIT_S)
+        if self._reports.initial_pose is None:
             self._robot.say("CONFIRMED, but no initialpose came")
             return False
-        stamp_ns, pose = self._heard.initial_pose
+        stamp_ns, pose = self._reports.initial_pose
         true = self._true_at(stamp_ns)
         off_m = float(np.hypot(*(pose - true)[:2]))
         off_rad = abs(float(angles.wrap(pose[2] - true[2])))
         right = off_m < RIGHT_M and off_rad < RIGHT_RAD
-        taken_s = 1e-9 * (stamp_ns - min(self._heard.truth))
-        driven_m = polyline.length(self._heard.true_path_m(to_ns=stamp_ns))
+        taken_s = 1e-9 * (stamp_ns - min(self._reports.truth))
+        driven_m = polyline.length(self._reports.true_path_m(to_ns=stamp_ns))
         self._robot.say(f"after {taken_s:.0f} s and {driven_m:.1f} m: {found.reason}")
         self._robot.say(
             f"CONFIRMED after {found.depth} edges, {'right' if right else 'WRONG'}: hands over x {pose[0]:.2f} m, "
@@ -182,20 +182,20 @@ class WakeUpDemo:
 
     def _show_row(self, news: SearchNews) -> None:
         """Prints one row of the search forest: match edge, match node, remaining candidates, turn."""
-        heard, stamp_ns = self._heard, news.stamp_ns
+        reports, stamp_ns = self._reports, news.stamp_ns
 
         def is_complete() -> bool:
-            candidates = heard.candidates.get(stamp_ns)
-            return stamp_ns in heard.meetpoints and candidates is not None and candidates.total >= news.candidates
+            candidates = reports.candidates.get(stamp_ns)
+            return stamp_ns in reports.meetpoints and candidates is not None and candidates.total >= news.candidates
 
         self._wait(is_complete, wall_s=ROW_LIMIT_S, shows_rows=False)
-        meetpoint, candidates = heard.meetpoints.get(stamp_ns), heard.candidates.get(stamp_ns)
+        meetpoint, candidates = reports.meetpoints.get(stamp_ns), reports.candidates.get(stamp_ns)
         if meetpoint is None or candidates is None:
             return
         if news.depth == 0:
             self._depths = []
         self._robot.say(f"search depth {news.depth}")
-        traversal = heard.traversals.get(stamp_ns)
+        traversal = reports.traversals.get(stamp_ns)
         if traversal is not None and news.depth:
             rank, degree = traversal.rank, self._degree_before
             name = turn_name(rank, degree) if degree > rank else f"RANK_{rank}"
@@ -219,17 +219,19 @@ class WakeUpDemo:
 
     def _drive_tour(self, found: SearchNews) -> bool:
         """Whether every node was reached."""
-        heard, robot = self._heard, self._robot
+        reports, robot = self._reports, self._robot
         self._confirmed_ns = found.stamp_ns
-        if not self._wait(lambda: heard.localization == LocalizationState.LOCALIZED, simulated_s=LOCALIZATION_LIMIT_S):
-            robot.say(f"the localization is {heard.localization or 'silent'}, not LOCALIZED: no tour")
+        if not self._wait(
+            lambda: reports.localization == LocalizationState.LOCALIZED, simulated_s=LOCALIZATION_LIMIT_S
+        ):
+            robot.say(f"the localization is {reports.localization or 'silent'}, not LOCALIZED: no tour")
             return False
         if not robot.takes_goals():
             robot.say("no action server goto_node")
             return False
         reached = True
         rng = np.random.default_rng(self._p.seed)
-        for node in tour.nodes(self._atlas, heard.newest_truth[:2], self._p.tour, rng):
+        for node in tour.nodes(self._atlas, reports.newest_truth[:2], self._p.tour, rng):
             arrival = self._drive_to(node)
             if robot.is_ending():
                 return False
@@ -238,7 +240,7 @@ class WakeUpDemo:
                 robot.say(f"goto_node {node}: not there within {self._p.tour_limit_s:g} s")
                 reached = False
                 continue
-            off_m = float(np.hypot(*(heard.newest_truth[:2] - self._atlas.nodes.position_m[node])))
+            off_m = float(np.hypot(*(reports.newest_truth[:2] - self._atlas.nodes.position_m[node])))
             robot.say(
                 f"goto_node {node}: {arrival.reason}, {arrival.travelled_m:.1f} m driven; truly {off_m:.2f} m from the "
                 "node"
@@ -262,15 +264,15 @@ class WakeUpDemo:
         return arrival
 
     def _show_tracking(self) -> None:
-        heard = self._heard
-        stamps_ns = np.array(sorted(stamp for stamp in heard.poses if stamp >= self._confirmed_ns), np.int64)
-        estimates = np.array([heard.poses[stamp] for stamp in stamps_ns.tolist()]).reshape(-1, 3)
-        figures = pose_errors.summary(pose_errors.of(stamps_ns, estimates, heard.true_trajectory()))
+        reports = self._reports
+        stamps_ns = np.array(sorted(stamp for stamp in reports.poses if stamp >= self._confirmed_ns), np.int64)
+        estimates = np.array([reports.poses[stamp] for stamp in stamps_ns.tolist()]).reshape(-1, 3)
+        figures = pose_errors.summary(pose_errors.of(stamps_ns, estimates, reports.true_trajectory()))
         if figures["position_mean_m"] is None:
             self._robot.say("tracking: no pose of the localization")
             return
         self._robot.say(
-            f"tracking over {polyline.length(heard.true_path_m(self._confirmed_ns)):.0f} m: mean "
+            f"tracking over {polyline.length(reports.true_path_m(self._confirmed_ns)):.0f} m: mean "
             f"{figures['position_mean_m']:.3f} m, 95 % within {figures['position_p95_m']:.3f} m, most "
             f"{figures['position_max_m']:.3f} m; heading mean {figures['yaw_mean_deg']:.2f} degrees, at "
             f"{len(stamps_ns)} scans"
@@ -286,35 +288,35 @@ class WakeUpDemo:
         shows_rows: bool = True,
     ) -> bool:
         """Listen until the condition holds, or too much time has passed; rows of the search are shown as they come."""
-        began_s, wall_began_s = self._heard.simulated_s, self._robot.wall_s()
+        began_s, wall_began_s = self._reports.simulated_s, self._robot.wall_s()
         while not self._robot.is_ending():
             if condition():
                 return True
-            if self._heard.simulated_s - began_s > simulated_s or self._robot.wall_s() - wall_began_s > wall_s:
+            if self._reports.simulated_s - began_s > simulated_s or self._robot.wall_s() - wall_began_s > wall_s:
                 return False
             self._robot.listen()
-            while shows_rows and self._heard.rows:
-                self._show_row(self._heard.rows.popleft())
+            while shows_rows and self._reports.rows:
+                self._show_row(self._reports.rows.popleft())
         return False
 
     def _true_at(self, stamp_ns: int) -> np.ndarray:
-        return self._heard.true_trajectory().at(np.int64(stamp_ns))
+        return self._reports.true_trajectory().at(np.int64(stamp_ns))
 
     def _draw(self, outcome: str) -> None:
-        heard = self._heard
-        if not self._p.picture or heard.grid_map is None:
+        reports = self._reports
+        if not self._p.picture or reports.grid_map is None:
             return
-        last_ns = max(heard.poses, default=0)
+        last_ns = max(reports.poses, default=0)
         story = WakeUpStory(
             self._depths,
-            heard.true_path_m(to_ns=self._confirmed_ns or math.inf),
-            heard.true_path_m(self._confirmed_ns) if self._confirmed_ns else np.zeros((0, 2)),
-            None if heard.initial_pose is None else heard.initial_pose[1],
-            heard.poses.get(last_ns),
-            heard.truth.get(last_ns),
+            reports.true_path_m(to_ns=self._confirmed_ns or math.inf),
+            reports.true_path_m(self._confirmed_ns) if self._confirmed_ns else np.zeros((0, 2)),
+            None if reports.initial_pose is None else reports.initial_pose[1],
+            reports.poses.get(last_ns),
+            reports.truth.get(last_ns),
         )
         path = Path(self._p.picture)
         path.parent.mkdir(parents=True, exist_ok=True)
         title = f"{self._atlas.name}: {outcome} after {max(len(self._depths) - 1, 0)} edges"
-        wake_up_picture.draw(path, heard.grid_map, story, title)
+        wake_up_picture.draw(path, reports.grid_map, story, title)
         self._robot.say(f"picture: {path}")

@@ -1,8 +1,8 @@
-"""Odometry, poses -> through how many walls would the robot have driven, if it were there?
+"""Counts the walls through which the robot would have driven, for each of many poses.
 
-A robot drives where there is room. A pose that odometry carries through walls of the map, or through what its mapper never
-saw, is hardly right, whatever its scans show. The path is judged in pieces, since one thing that was moved, or a door
-that was shut when the map was made, blocks several points of it. N points, K poses.
+A robot drives only through free space. A pose from which odometry would have led through walls or unmapped space is
+probably wrong, whatever its scans show. The path is judged in pieces, since one moved object, or a door that was closed
+when the map was made, blocks several points of it. N points, K poses.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ IsFree = Callable[[np.ndarray], np.ndarray]  # points (..., 2) of the map -> (..
 
 
 class DrivenPath:
-    """add() the odometry of each scan."""
+    """The path by odometry: add() the odometry of each scan."""
 
     def __init__(self) -> None:
         self._points: List[np.ndarray] = []  # (2,) in the frame of odometry

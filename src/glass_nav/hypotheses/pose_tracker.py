@@ -80,7 +80,6 @@ def lead(pose: np.ndarray, score: float, poses: np.ndarray, scores: np.ndarray) 
 
 def first_of_each_cell(poses: np.ndarray) -> np.ndarray:
     """Ascending indices of the poses (K, 3) that are the first in their cell, yaw wrapped."""
-    if not len(poses):  # numpy 1.17 cannot take unique rows of none
-        return np.zeros(0, np.int64)
     cells = np.round(np.column_stack([poses[:, :2], angles.wrap(poses[:, 2])]) / _SAME_CELL).astype(np.int64)
-    return np.sort(np.unique(cells, axis=0, return_index=True)[1])
+    # One number for each cell: unique rows take ten times as long.
+    return np.sort(np.unique(cells @ [2**32, 2**8, 1], return_index=True)[1])

@@ -1,4 +1,4 @@
-"""Maps, scans and poses <-> those of MRPT's official Python bindings (`mrpt.pymrpt`).
+"""Converts maps, scans and poses to and from those of MRPT's official Python bindings (`mrpt.pymrpt`).
 
 The bindings are packaged for Debian 13 (python3-pymrpt) and Noetic (ros-noetic-python-mrpt); nothing else in this package
 needs them. doc/mrpt.md is a tutorial. B beams.

@@ -111,11 +111,11 @@ class LocalizationHealth:
         answered, beams = int(now.scan.answered.sum()), len(now.scan)
         shares = now.estimate.cases.share()
         values = {case.label: f"{shares[case]:.1%}" for case in CASES_IN_ORDER}
-        text = f"{answered} of {beams} beams answered"
+        text = f"{answered} of {beams} beams returned"
         if answered < FEW_BEAMS:
             return Health(Level.WARN, f"only {text}: odometry leads", values)
         if np.isnan(now.estimate.inlier_ratio):
-            return Health(Level.OK, f"{text}, none from where the map knows something", values)
+            return Health(Level.OK, f"{text}, none from mapped space", values)
         return Health(Level.OK, f"{text}, the map explains {now.estimate.inlier_ratio:.0%} of those it covers", values)
 
     def _timing(self, now: Situation) -> Health:

@@ -44,6 +44,7 @@ from glass_nav.world.pane import Pane
 
 _FOUND = np.array([0.1, 0.1, 0.05])  # deviations [m, m, rad] of a place that was found among all others
 _ASTRAY = 3.0  # deviations of dead reckoning from which a pose that scans do not support is given up
+_UNSURE_M = 0.5  # driven since the pose was sure, times the worth of a scan: then it no longer overrules odometry
 _SHOWN = 500  # candidates drawn for particlecloud
 
 
@@ -327,7 +328,7 @@ class Localizer:
         if step is not None:
             self._filter.predict(step)
             if self._dead_reckoning is not None:
-                self._dead_reckoning = self._dead_reckoning.carried(step, self._params.odometry)
+                self._dead_reckoning = self._reckoned(self._dead_reckoning, step)
         taken = self._bearings_from(odom_from_base)
         for bearings, landmarks in taken:
             self._filter.weigh_by_bearings(bearings, landmarks)
@@ -345,7 +346,7 @@ class Localizer:
         """Check the tracked pose by the scan; `step` since the last update: None at an update."""
         reckoned = self._dead_reckoning
         if reckoned is not None and step is not None:
-            reckoned = reckoned.carried(step, self._params.odometry)
+            reckoned = self._reckoned(reckoned, step)
         verdict = self._kidnap_detector.observe(scan, odom_from_base, map_from_base, reckoned, self._schedule.period_s)
         self._quality.doubt(verdict)
         return verdict
@@ -360,8 +361,8 @@ class Localizer:
         self._filter.weigh(scan, cases, registration, self._classifier)
         self._filter.estimate()
         self._filter.resample()
-        if not registration.worth:
-            self._keep_to_odometry()
+        if registration.worth < 1.0:
+            self._keep_to_odometry(step, _UNSURE_M * registration.worth)
         suspect = self._filter.suspect
         self._integrity.update(
             scan,
@@ -373,10 +374,21 @@ class Localizer:
         )
         return cases
 
-    def _keep_to_odometry(self) -> None:
-        """The scan hardly fits: where such scans led the pose astray, odometry has it back."""
+    def _reckoned(self, reckoned: DeadReckoning, step: np.ndarray) -> DeadReckoning:
+        """After a step, with the noise of odometry as the model says or as it proved, whichever is larger."""
+        return reckoned.carried(step, self._params.odometry, np.maximum(self._integrity.noise_scale, 1.0))
+
+    def _keep_to_odometry(self, step: Optional[np.ndarray], unsure_m: float) -> None:
+        """The scan hardly fits. If such scans led the pose astray, odometry has it back.
+
+        Args:
+            step: (3,) of odometry since the last update; None: there was none.
+            unsure_m: least distance that the pose was not sure before the step.
+        """
         reckoned = self._dead_reckoning
-        if reckoned is not None and reckoned.mahalanobis(self._filter.best.map_from_base[None])[0] > _ASTRAY:
+        if reckoned is None or reckoned.distance_m - _length(step) < unsure_m - 1e-6:
+            return
+        if reckoned.mahalanobis(self._filter.best.map_from_base[None])[0] > _ASTRAY:
             self._filter.move_to(reckoned.map_from_base)
 
     def _find(self, scan: Scan, odom_from_base: np.ndarray) -> BeamCases:
@@ -476,3 +488,8 @@ class Localizer:
 
     def _new_kidnap_detector(self, usual_fit: Optional[float] = None, given: bool = False) -> KidnapDetector:
         return KidnapDetector(self._field, self._everywhere, self._params.search, usual_fit, self._known_area, given)
+
+
+def _length(step: Optional[np.ndarray]) -> float:
+    """Distance [m] of a step (3,); None: there was none."""
+    return 0.0 if step is None else se2.travelled(step)[0]

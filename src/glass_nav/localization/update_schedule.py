@@ -1,4 +1,4 @@
-"""Stamps, odometry -> is this scan to move the particles?  The rule is AMCL's, for each lidar by itself."""
+"""Decides whether a scan updates the particles, by AMCL's rule, for each lidar separately."""
 
 from __future__ import annotations
 

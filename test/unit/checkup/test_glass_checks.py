@@ -83,7 +83,7 @@ def test_a_wall_that_beams_pass_from_all_sides_is_gone(drive):
     assert "of walls of the map in all directions, in 1 piece: " in finding.what and "y 2.2 m" in finding.what
 
 
-def test_where_the_robot_is_not_found_nothing_is_said(drive):
+def test_where_the_robot_is_not_found_nothing_is_reported(drive):
     scans, odom_from_base = drive
     other = Building((Wall(np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0], [0.0, 0.0]])),), start=np.ones(3))
     assert list(glass_checks.check(building_map.draw(other), scans[:30], odom_from_base[:30])) == []

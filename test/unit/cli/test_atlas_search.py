@@ -71,7 +71,7 @@ def test_check_says_which_places_are_indistinguishable(tmp_path: Path, capsys: A
     assert "node 0 looking 0 deg, node 1 looking 180 deg" in printed
 
 
-def test_check_tries_as_many_places_as_it_is_told(capsys: Any) -> None:
+def test_check_tries_as_many_places_as_it_is_reported(capsys: Any) -> None:
     assert run("check", "glass_bridge", "--starts", "7", "--map", str(REPO / "maps" / "glass_bridge" / "map.yaml")) == 0
     places = len(atlas_file.load(shipped_atlases.find("glass_bridge")).darts)
     assert places > 7

@@ -123,7 +123,7 @@ def test_what_another_localization_left_in_the_bag_is_measured_as_ours_is(run, r
 
 
 @pytest.mark.long_run
-def test_a_log_that_has_no_recorded_pose_in_time_is_told(run, room_bag, room_map, tmp_path):
+def test_a_log_that_has_no_recorded_pose_in_time_is_reported(run, room_bag, room_map, tmp_path):
     path = room_bag(amcl_error_m=0.1).write()
     options = ("compare", "topic:/amcl_pose", "--log", f"{path}={room_map}", "--out", tmp_path / "out")
     code, _, err = run(*options, "--max-scans", 4)

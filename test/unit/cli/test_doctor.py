@@ -38,7 +38,7 @@ def test_a_good_bag_is_0_and_told_in_figures(doctor, room_bag, room_map):
         "seen     tf odom -> base_link: 20 Hz for 6 s, 3.0 m; frames: base_link, laser, odom",
         "seen     map: 122 x 82 cells of 0.05 m",
         "",
-        "nothing found",
+        "no fault found",
     ]
 
 

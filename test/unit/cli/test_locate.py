@@ -73,8 +73,8 @@ def test_a_rough_pose_is_corrected_and_drawn(room, capsys, options):
     out = capsys.readouterr().out
     left = told(out) - TRUE
     assert np.hypot(left[0], left[1]) < 0.03 and abs(angles.wrap(left[2])) < np.radians(0.5)
-    assert "free      nothing: the walls constrain x, y and yaw" in out
-    assert "360 beams, 360 answered" in out
+    assert "free      none: the walls constrain x, y and yaw" in out
+    assert "360 beams, 360 returned" in out
     moved = float(out.split("moved ")[1].split()[0])
     assert moved == pytest.approx(np.hypot(*OFF[:2]), abs=0.03)
     with Image.open(room / "out.png") as image:
@@ -172,7 +172,7 @@ def test_wrong_options_are_told_before_any_file_is_opened(room, capsys, options,
     assert line in capsys.readouterr().err
 
 
-def test_files_that_are_not_there_are_told(room, capsys):
+def test_files_that_are_not_there_are_reported(room, capsys):
     assert locate(room, TRUE, scan="none.csv") == 3
     assert "none.csv" in capsys.readouterr().err
     assert locate(room, TRUE, grid="none.yaml") == 3

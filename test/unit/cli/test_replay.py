@@ -105,7 +105,7 @@ def test_the_same_seed_gives_the_same_answer_and_another_one_another(run, room_b
     assert not (tmp_path / "out" / "trajectory.png").exists()
 
 
-def test_a_start_given_by_hand_is_used_and_said(run, room_bag, tmp_path):
+def test_a_start_given_by_hand_is_used_and_reported(run, room_bag, tmp_path):
     path = room_bag(ground_truth=False).write()
     x, y, yaw = room_bag().poses(np.array([room_bag().start_ns]))[0]
     code, out, err = run(path, "--initial-pose", x, y, yaw, "--initial-cov", 0.01, 0.01, 0.01)
@@ -163,7 +163,7 @@ def one_bad_scan(**changes):
         ({"stamp_ns": 10**12 - 10**11}, "time runs backwards"),
     ],
 )
-def test_a_bad_scan_is_counted_and_said(run, room_bag, tmp_path, changes, reason):
+def test_a_bad_scan_is_counted_and_reported(run, room_bag, tmp_path, changes, reason):
     code, _, err = run(room_bag(scan_fields=one_bad_scan(**changes)).write())
     assert code == 0
     assert figures(tmp_path)["scans"] == 19

@@ -124,7 +124,7 @@ def test_what_a_worker_of_the_cluster_cannot_do_stops_no_other(scheduler):
     assert failed.job == "two" and failed.reason.startswith("TypeError: ")
 
 
-def test_a_scheduler_without_workers_is_told(monkeypatch):
+def test_a_scheduler_without_workers_is_reported(monkeypatch):
     distributed = pytest.importorskip("distributed", reason=WHY)
     monkeypatch.setattr(engine, "WORKER_S", 0.5)
     with distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0", scheduler_port=0) as cluster:
@@ -134,7 +134,7 @@ def test_a_scheduler_without_workers_is_told(monkeypatch):
     assert str(caught.value) == f"no worker has joined the Dask scheduler at {address} within 0.5 s"
 
 
-def test_a_scheduler_that_loses_its_last_worker_is_told(monkeypatch, tmp_path):
+def test_a_scheduler_that_loses_its_last_worker_is_reported(monkeypatch, tmp_path):
     monkeypatch.setattr(engine, "WORKER_S", 1.0)
     with dask_scheduler(tmp_path) as (address, _):
         with pytest.raises(EngineError) as caught:
@@ -142,7 +142,7 @@ def test_a_scheduler_that_loses_its_last_worker_is_told(monkeypatch, tmp_path):
     assert str(caught.value) == f"the Dask scheduler at {address} has lost its last worker"
 
 
-def test_a_scheduler_that_ends_is_told(tmp_path):
+def test_a_scheduler_that_ends_is_reported(tmp_path):
     with dask_scheduler(tmp_path) as (address, process):
         with pytest.raises(EngineError) as caught:
             engine.run([process.pid], engine_jobs.killed, lambda count: None, scheduler=address)
@@ -157,7 +157,7 @@ def test_without_the_package_the_option_that_needs_it_is_named(monkeypatch):
         engine.run([1, 2], engine_jobs.squared, lambda count: None, scheduler="tcp://a:1")
 
 
-def test_a_scheduler_that_does_not_answer_is_told(monkeypatch):
+def test_a_scheduler_that_does_not_answer_is_reported(monkeypatch):
     pytest.importorskip("distributed", reason=WHY)
     monkeypatch.setattr(engine, "CONNECT_S", 0.5)
     with pytest.raises(EngineError, match="^no Dask scheduler answers at tcp://127.0.0.1:9: ") as caught:

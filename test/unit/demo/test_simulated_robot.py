@@ -33,10 +33,10 @@ def test_a_robot_finds_its_place_is_localized_and_takes_goals() -> None:
     lines: List[str] = []
     robot = robot_at(1, lines, SearchParams(confirm_edges=0, use_scans=False))
     assert robot.restart_search() == "" and robot.takes_goals() and not robot.is_ending()
-    assert WakeUpDemo(ATLAS, WakeUpDemoParams(atlas="house", tour=0), robot.heard, robot).run(), lines
+    assert WakeUpDemo(ATLAS, WakeUpDemoParams(atlas="house", tour=0), robot.reports, robot).run(), lines
     assert any("match node M0: degree " in line for line in lines)
     assert any(", right: hands over" in line for line in lines)
-    assert robot.heard.localization == LocalizationState.LOCALIZED
+    assert robot.reports.localization == LocalizationState.LOCALIZED
     robot.go_to(0)
     assert robot.arrival() is None
     robot.stop()
@@ -50,6 +50,6 @@ def test_the_same_seed_gives_the_same_drive() -> None:
     for robot in robots:
         for _ in range(30):
             robot.listen()
-    first, again = (robot.heard.true_trajectory().poses for robot in robots)
+    first, again = (robot.reports.true_trajectory().poses for robot in robots)
     np.testing.assert_array_equal(first, again)
-    assert robots[0].wall_s() > robots[0].heard.simulated_s
+    assert robots[0].wall_s() > robots[0].reports.simulated_s

@@ -10,7 +10,7 @@ import made_atlases
 import numpy as np
 import pytest
 
-from glass_nav.demo.heard import Candidates, Heard, SearchNews
+from glass_nav.demo.reports import Candidates, Reports, SearchNews
 from glass_nav.demo.wake_up_demo import Arrival, WakeUpDemo, WakeUpDemoParams
 from glass_nav.topology.observations import Meetpoint, Traversal
 from glass_nav.vocabulary import LocalizationState, Outcome, SearchState
@@ -28,7 +28,7 @@ class Robot:
     """Each listen() takes a second, simulated and on the wall, and one event."""
 
     def __init__(self, *events: Event) -> None:
-        self.heard = Heard()
+        self.reports = Reports()
         self.events = list(events)
         self.lines: List[str] = []
         self.goals: List[int] = []
@@ -42,16 +42,16 @@ class Robot:
 
     def listen(self) -> None:
         self._wall_s += 1.0
-        if self.heard.truth:
-            self.stand(self.heard.newest_truth)
+        if self.reports.truth:
+            self.stand(self.reports.newest_truth)
         if self.events:
             self.events.pop(0)()
 
     def stand(self, pose: np.ndarray) -> None:
-        stamp_ns = max(self.heard.truth, default=0) + S
-        self.heard.truth[stamp_ns] = pose
-        if self.heard.localization is not None:
-            self.heard.poses[stamp_ns] = pose + np.array([0.03, 0.0, 0.0])
+        stamp_ns = max(self.reports.truth, default=0) + S
+        self.reports.truth[stamp_ns] = pose
+        if self.reports.localization is not None:
+            self.reports.poses[stamp_ns] = pose + np.array([0.03, 0.0, 0.0])
 
     def is_ending(self) -> bool:
         return self._wall_s >= self.ends_at_s
@@ -84,44 +84,44 @@ class Robot:
     # -- events
 
     def wakes_up(self) -> None:
-        self.heard.truth[S] = np.zeros(3)
-        self.heard.grid_map = GridMap(np.zeros((40, 40), np.int8), 0.5, np.zeros(3))
+        self.reports.truth[S] = np.zeros(3)
+        self.reports.grid_map = GridMap(np.zeros((40, 40), np.int8), 0.5, np.zeros(3))
 
-    def reports(
+    def search_reports(
         self, state: SearchState, depth: int = 0, turn: str = "", traversal: Optional[Traversal] = None
     ) -> Event:
         """A row of the search, with all that belongs to it."""
 
         def event() -> None:
-            stamp_ns = max(self.heard.truth)
-            self.heard.meetpoints[stamp_ns] = Meetpoint(3, 1.5, stamp_ns=stamp_ns)
-            self.heard.candidates[stamp_ns] = Candidates(10, list(range(10)), [0] * 10, np.zeros((10, 3)))
+            stamp_ns = max(self.reports.truth)
+            self.reports.meetpoints[stamp_ns] = Meetpoint(3, 1.5, stamp_ns=stamp_ns)
+            self.reports.candidates[stamp_ns] = Candidates(10, list(range(10)), [0] * 10, np.zeros((10, 3)))
             if traversal is not None:
-                self.heard.traversals[stamp_ns] = traversal
-            self.heard.take_search(SearchNews(stamp_ns, state, "why", depth, 10, turn))
+                self.reports.traversals[stamp_ns] = traversal
+            self.reports.take_search(SearchNews(stamp_ns, state, "why", depth, 10, turn))
 
         return event
 
     def says(self, state: SearchState, stamp_ns: int = 0) -> Event:
-        return lambda: self.heard.take_search(SearchNews(stamp_ns, state, "why", 0, 1, ""))
+        return lambda: self.reports.take_search(SearchNews(stamp_ns, state, "why", 0, 1, ""))
 
     def hands_over(self, x_m: float) -> Event:
         def event() -> None:
-            self.heard.initial_pose = max(self.heard.truth), np.array([x_m, 0.0, 0.0])
+            self.reports.initial_pose = max(self.reports.truth), np.array([x_m, 0.0, 0.0])
 
         return event
 
     def is_localized(self) -> None:
-        self.heard.localization = LocalizationState.LOCALIZED
+        self.reports.localization = LocalizationState.LOCALIZED
 
 
 def run(robot: Robot, **fields: Any) -> bool:
     p = WakeUpDemoParams(**{"atlas": "made", "tour": 1, "search_limit_s": 20.0, "tour_limit_s": 5.0, **fields})
-    return WakeUpDemo(ATLAS, p, robot.heard, robot).run()
+    return WakeUpDemo(ATLAS, p, robot.reports, robot).run()
 
 
 def found(robot: Robot, x_m: float = 0.1) -> "list[Event]":
-    return [robot.wakes_up, robot.reports(SearchState.CONFIRMED), robot.hands_over(x_m)]
+    return [robot.wakes_up, robot.search_reports(SearchState.CONFIRMED), robot.hands_over(x_m)]
 
 
 def localized(*arrivals: Optional[Arrival]) -> Robot:
@@ -150,8 +150,8 @@ def test_rows_of_the_search_are_shown_as_the_document_draws_them() -> None:
     robot = Robot()
     robot.events = [
         robot.wakes_up,
-        robot.reports(SearchState.SEARCHING, 0, "LEFT"),
-        robot.reports(SearchState.AMBIGUOUS, 1, "", Traversal(1, 8.0, 7.5)),
+        robot.search_reports(SearchState.SEARCHING, 0, "LEFT"),
+        robot.search_reports(SearchState.AMBIGUOUS, 1, "", Traversal(1, 8.0, 7.5)),
     ]
     assert not run(robot)
     places = ", ".join(f"{node} along 0" for node in range(8))
@@ -171,7 +171,7 @@ def test_rows_of_the_search_are_shown_as_the_document_draws_them() -> None:
 
 def test_a_turn_that_the_meetpoint_before_does_not_have_is_shown_by_its_number() -> None:
     robot = Robot()
-    robot.events = [robot.wakes_up, robot.reports(SearchState.LOST, 1, "", Traversal(4, 8.0, 7.5))]
+    robot.events = [robot.wakes_up, robot.search_reports(SearchState.LOST, 1, "", Traversal(4, 8.0, 7.5))]
     run(robot, searches=1)
     assert "  match edge E0: RANK_4, length 8.00 m, chord 7.50 m" in robot.lines
 
@@ -188,7 +188,7 @@ def test_a_lost_robot_searches_again() -> None:
     confirmed = robot.events[1:]
     robot.events = [
         robot.wakes_up,
-        robot.reports(SearchState.LOST),
+        robot.search_reports(SearchState.LOST),
         robot.says(SearchState.WAITING),
         *confirmed,
     ]
@@ -199,8 +199,8 @@ def test_a_lost_robot_searches_again() -> None:
 
 def test_it_searches_no_more_often_than_allowed() -> None:
     robot = Robot()
-    robot.events = [robot.wakes_up, robot.reports(SearchState.LOST), robot.says(SearchState.WAITING)]
-    robot.events.append(robot.reports(SearchState.LOST))
+    robot.events = [robot.wakes_up, robot.search_reports(SearchState.LOST), robot.says(SearchState.WAITING)]
+    robot.events.append(robot.search_reports(SearchState.LOST))
     assert not run(robot, searches=2)
     assert robot.restarts == 1 and "LOST: why" in robot.lines
 
@@ -208,7 +208,7 @@ def test_it_searches_no_more_often_than_allowed() -> None:
 @pytest.mark.parametrize("why_not", ["no such service", ""])
 def test_where_no_other_search_begins_the_robot_stays_lost(why_not: str) -> None:
     robot = Robot()
-    robot.events = [robot.wakes_up, robot.reports(SearchState.LOST)]
+    robot.events = [robot.wakes_up, robot.search_reports(SearchState.LOST)]
     robot.why_no_restart = why_not
     assert not run(robot)
     assert robot.restarts == 1 and ("no new search: no such service" in robot.lines) == bool(why_not)
@@ -224,7 +224,7 @@ def test_a_place_that_is_wrong_is_said_and_no_tour_is_driven() -> None:
 
 def test_without_an_initial_pose_there_is_nothing_to_judge() -> None:
     robot = Robot()
-    robot.events = [robot.wakes_up, robot.reports(SearchState.CONFIRMED)]
+    robot.events = [robot.wakes_up, robot.search_reports(SearchState.CONFIRMED)]
     assert not run(robot)
     assert robot.lines[-1] == "CONFIRMED, but no initialpose came"
 
@@ -237,7 +237,7 @@ def test_where_nothing_is_heard_the_demo_says_what_may_be_missing() -> None:
 
 def test_a_search_that_takes_too_long_is_drawn_as_it_stands(tmp_path: Path) -> None:
     robot = Robot()
-    robot.events = [robot.wakes_up, robot.reports(SearchState.SEARCHING, 0, "LEFT")]
+    robot.events = [robot.wakes_up, robot.search_reports(SearchState.SEARCHING, 0, "LEFT")]
     assert not run(robot, picture=str(tmp_path / "wakeup.png"))
     assert robot.lines[-2:] == ["the search did not end within 20 s", f"picture: {tmp_path / 'wakeup.png'}"]
 
@@ -297,7 +297,7 @@ def test_a_robot_without_localization_or_driver_drives_no_tour() -> None:
 
 def test_without_poses_nothing_is_measured() -> None:
     robot = localized(THERE)
-    robot.heard.poses = NoPoses()
+    robot.reports.poses = NoPoses()
     assert run(robot, tour=0)
     assert robot.lines[-1] == "tracking: no pose of the localization"
 

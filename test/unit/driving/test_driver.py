@@ -209,7 +209,7 @@ def test_after_a_task_it_commands_zeros_for_a_moment_and_then_nothing():
     assert robot.phase == DriverPhase.ARRIVED
 
 
-def test_without_seek_at_start_it_waits_for_somebody():
+def test_without_seek_at_start_it_waits_for_a_request():
     robot = Robot(WAITS)
     robot.sees = False
     robot.scan()
@@ -330,7 +330,7 @@ def test_a_turn_that_answers_its_meetpoint_is_driven_and_the_edge_reported_befor
         (9, "", 0, "turn_choice 9 refused: turn of rank 9: the meetpoint it left has degree 3, allowed 0 to 2"),
     ],
 )
-def test_a_turn_that_it_cannot_take_is_told(rank, name, stamp, text):
+def test_a_turn_that_it_cannot_take_is_reported(rank, name, stamp, text):
     robot = standing()
     (line,) = robot.do(robot.driver.turn_choice(rank, name, stamp))
     assert line.text.startswith(text) and line.level == logging.WARNING and line.often
@@ -598,7 +598,7 @@ def test_when_time_jumps_back_it_starts_over():
     assert robot.phase == DriverPhase.SEEKING  # as at the start
 
 
-def test_decisions_are_told_once():
+def test_decisions_are_reported_once():
     robot = started()
     robot.do(robot.driver.traverse_edge("LEFT"))
     assert robot.driver.preempt(Action.TRAVERSE_EDGE) == []

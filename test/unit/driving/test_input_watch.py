@@ -40,7 +40,7 @@ def test_it_tells_how_far_the_robot_came_between_two_poses(watch):
     assert InputWatch(RULES, InputNames()).take_poses(Odometry(1, np.ones(3)), None) == 0.0  # the first one
 
 
-def test_what_is_missing_is_told(watch):
+def test_what_is_missing_is_reported(watch):
     assert InputWatch(RULES, InputNames()).no_input(100.0, "no scan used yet") == "no scan used yet"
     assert watch.no_input(100.7, "") == "the last scan is 0.7 s old"
     watch.take_scan(100_500_000_000)
@@ -49,7 +49,7 @@ def test_what_is_missing_is_told(watch):
     assert watch.no_input(100.6, "") == "no transform odom <- base_link"
 
 
-def test_what_keeps_the_pose_from_being_known_is_told(watch):
+def test_what_keeps_the_pose_from_being_known_is_reported(watch):
     assert InputWatch(RULES, InputNames(localization="/status")).no_pose(0.0) == "no word on /status"
     assert watch.no_pose(103.1) == "the localization is silent for 3.1 s"
     watch.take_localization(LocalizationState.LOST, "", 103.0)

@@ -81,7 +81,7 @@ def test_at_its_place_already_it_only_turns():
     assert RouteFollower(np.array([[1.0, 1.0]]), LIMITS).command(np.zeros(3)).tolist() == [0.0, 0.0, 0.0]
 
 
-def test_a_base_that_was_pushed_aside_comes_back_and_the_distance_is_told():
+def test_a_base_that_was_pushed_aside_comes_back_and_the_distance_is_reported():
     follower = RouteFollower(np.array(ROUTES["straight"], float), LIMITS)
     follower.command(np.array([1.0, 0.0, 0.0]))
     assert follower.off_route_m < 1e-9

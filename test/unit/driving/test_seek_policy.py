@@ -32,7 +32,7 @@ def test_where_an_edge_of_a_search_led_nowhere_it_seeks_another_meetpoint(policy
     assert not policy.is_due(waits=False, searching=False)  # nobody searches
 
 
-def test_after_so_many_failures_in_a_row_it_waits_for_somebody(policy):
+def test_after_so_many_failures_in_a_row_it_waits_for_a_request(policy):
     for _ in range(3):
         assert policy.is_due(waits=True, searching=True)
         policy.seeks()

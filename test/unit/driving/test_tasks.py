@@ -178,7 +178,7 @@ def test_a_cart_across_the_only_way_is_waited_for_looked_at_and_given_up(planner
     assert not drive.touched
 
 
-def test_a_place_without_a_way_is_told(planner):
+def test_a_place_without_a_way_is_reported(planner):
     drive = Drive(corridor(), (1.5, 0.8, 2.0))
     ending = drive.run(going(drive, planner, np.array([30.0, 1.0])))
     assert ending.outcome == Outcome.NO_WAY and ending.reason.startswith("the goal at x 30.00 m")
@@ -218,7 +218,7 @@ def test_an_edge_that_cannot_be_driven_is_left_for_another_one_where_any_will_do
 
 
 @pytest.mark.long_run
-def test_an_edge_that_was_asked_for_and_cannot_be_driven_is_told_back_at_its_meetpoint():
+def test_an_edge_that_was_asked_for_and_cannot_be_driven_is_reported_back_at_its_meetpoint():
     drive = arrived(corridor(), ledge_x=8.0)
     before = drive.simulation.map_from_base
     ending = drive.run(EdgeTask(drive.driver, QUICK, LIMITS, rank_towards(drive, 0.0)))

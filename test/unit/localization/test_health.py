@@ -92,7 +92,7 @@ def test_scans_say_where_they_went_since_the_last_report(reporter):
 
 def test_beams_say_how_many_are_explained_and_which_case_they_are(reporter):
     level, text, values = said(reporter, "beams")
-    assert (level, text) == (OK, "100 of 100 beams answered, the map explains 90% of those it covers")
+    assert (level, text) == (OK, "100 of 100 beams returned, the map explains 90% of those it covers")
     assert list(values.items()) == [
         ("1 first surface", "75.0%"),
         ("2 mirrored", "0.0%"),
@@ -100,7 +100,7 @@ def test_beams_say_how_many_are_explained_and_which_case_they_are(reporter):
         ("4 behind two panes", "0.0%"),
         ("0 uncertain", "0.0%"),
     ]
-    few = "only 12 of 100 beams answered: odometry leads"
+    few = "only 12 of 100 beams returned: odometry leads"
     assert said(reporter, "beams", scan=scan(answered=12))[:2] == (WARN, few)
     assert said(reporter, "beams", scan=None)[:2] == (OK, "no scan used yet")
 

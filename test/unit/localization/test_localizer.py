@@ -355,7 +355,7 @@ def test_from_anywhere_scans_lead_to_the_right_place(seed):
     assert all(way_m[index] < 0.1 for index, state in enumerate(states) if state == "LOCALIZED")
 
 
-def test_while_places_look_alike_all_of_them_are_told():
+def test_while_places_look_alike_all_of_them_are_reported():
     """In a square room without a mark there are four."""
     room = Building([(0, 0), (6, 0), (6, 6), (0, 6)])
     localizer = Localizer(parameters(), room.grid_map(), np.random.default_rng(0))

@@ -42,7 +42,7 @@ def memory(file="") -> PanesMemory:
     return PanesMemory(PanesFilePath(panes_file=str(file)))
 
 
-def test_glass_is_told_once_and_again_when_there_is_much_more(caplog):
+def test_glass_is_reported_once_and_again_when_there_is_much_more(caplog):
     told = memory()
     for lengths_m in ((), (0.6,), (3.0,), (3.0,), (3.0, 1.2), (3.0, 3.0)):
         told.tell(FakeLocalizer(*lengths_m))

@@ -127,7 +127,7 @@ def test_a_type_of_a_topic_that_is_not_needed_may_be_unknown(room_bag):
     assert len(list(open_log(path))) == 20
 
 
-def test_a_definition_that_is_no_definition_is_said(room_bag):
+def test_a_definition_that_is_no_definition_is_reported(room_bag):
     path = rewritten(room_bag().write(), lambda topic, kind, definition, md5: (topic, kind, "no type: 3 of", md5))
     assert refusal(path).startswith("changed.bag: a message definition in it cannot be read: ")
 

@@ -93,7 +93,7 @@ def test_a_static_transform_can_be_replaced():
     assert tree.lookup("base", "laser", 0) == turned(2.0)
 
 
-def test_what_is_not_known_is_said():
+def test_what_is_not_known_is_reported():
     tree = FrameTree()
     tree.add("odom", "base", 10**9, turned(0.0), static=False)
     tree.add("odom", "base", 2 * 10**9, turned(1.0), static=False)

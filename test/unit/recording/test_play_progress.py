@@ -7,7 +7,7 @@ import pytest
 from glass_nav.recording.play_progress import PlayedPart, bags_of, played_part
 
 
-def test_the_start_and_the_progress_are_said():
+def test_the_start_and_the_progress_are_reported():
     part = played_part(["--clock", "--rate=2", "run.bag"], [(100.0, 171.0)])
     assert part.started(["run.bag"]) == "playing run.bag: 71 s, 2 times as fast"
     assert part.progress(130.0) == "played 30 of 71 s (42 %), 20 s left"

@@ -18,7 +18,7 @@ def test_after_its_period_a_line_is_due_again():
     assert log.is_due("no scan", 0.0)
 
 
-def test_memory_stays_bounded_whatever_is_said():
+def test_memory_stays_bounded_whatever_is_reported():
     log = LogThrottle()
     for index in range(1000):
         log.is_due("frame " + "x" * index, 60.0)

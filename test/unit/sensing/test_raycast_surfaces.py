@@ -341,7 +341,7 @@ def test_behind_a_corner_without_normal_nothing_is_left_out():
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
-def test_the_cell_where_the_mirrored_path_ends_is_told(backend):
+def test_the_cell_where_the_mirrored_path_ends_is_reported(backend):
     """Head-on between two walls, each way: back to the wall behind the robot."""
     cells = np.zeros((400, 160), np.int8)
     cells[:, [10, 120]] = 100

@@ -70,7 +70,7 @@ def test_a_scan_without_transforms_is_dropped_after_the_limit_even_if_others_flo
     assert queue.warnings == ["scan dropped after 1 s: no transform odom <- base"]
 
 
-def test_a_transform_that_comes_after_the_limit_is_said():
+def test_a_transform_that_comes_after_the_limit_is_reported():
     queue = Queue()
     queue.come(10, 20)
     queue.add(raw_scan(STAMP_NS + 30), 5.0)

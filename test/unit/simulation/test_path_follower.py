@@ -179,7 +179,7 @@ def test_a_file_that_holds_no_path_is_refused(tmp_path, name, text, reason):
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_that_cannot_be_read_is_said(tmp_path):
+def test_a_file_that_cannot_be_read_is_reported(tmp_path):
     with pytest.raises(PathError, match="no.csv: cannot be read: No such file or directory$"):
         path_follower.load(tmp_path / "no.csv")
     (tmp_path / "p.csv").write_bytes(b"\xff\xfe")

@@ -61,7 +61,7 @@ def test_words_that_are_no_place_are_refused(words):
         start_place.start(words, OFFICE, 0)
 
 
-def test_a_building_without_room_is_told():
+def test_a_building_without_room_is_reported():
     narrow = Building(
         (Wall(np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 0.9], [0.0, 0.9], [0.0, 0.0]])),),
         start=np.array([1.0, 0.45, 0.0]),

@@ -69,7 +69,7 @@ def test_the_map_is_not_overwritten(tmp_path: Path) -> None:
         map_copy.save(source, map_file.load(source), source)
 
 
-def test_a_map_that_cannot_be_edited_is_told(tmp_path: Path) -> None:
+def test_a_map_that_cannot_be_edited_is_reported(tmp_path: Path) -> None:
     source = written(tmp_path, GREYS)
     before = map_file.load(source)
     fewer = np.where(before.occupancy == 100, 0, before.occupancy).astype(np.int8)

@@ -92,13 +92,25 @@ GridCells GridRaycaster::cells() const {
 }
 
 template <class Use>
-void GridRaycaster::with_ray_marcher(const Use& use) const {
+void GridRaycaster::with_first_hits(const Use& use) const {
+  if (guide_ == nullptr) {
+    use(FirstHits(cells()));
+  } else {
+    const GuidedRayMarcher marcher(cells(), *guide_);
+    use(MarchedFirstHits(cells(), marcher));
+  }
+}
+
+template <class Use>
+void GridRaycaster::with_surface_finder(const SurfaceLimits& limits, const Use& use) const {
+  const SurfaceRules rules{limits.max_thickness_m / resolution_m_, limits.min_linearity,
+                           limits.min_gap_m / resolution_m_};
   const GridCells grid = cells();
   if (guide_ == nullptr) {
-    use(grid, FirstHits(grid), ExactRayMarcher(grid));
+    use(ExactSurfaceFinder(grid, normals(), rules));
   } else {
     const GuidedRayMarcher marcher(grid, *guide_);
-    use(grid, MarchedFirstHits(grid, marcher), marcher);
+    use(MarchedSurfaceFinder(grid, marcher, normals(), rules));
   }
 }
 
@@ -113,7 +125,7 @@ void GridRaycaster::cast_first(const RayBatch& batch, const double* reach_m, dou
 
 template <class Reach>
 void GridRaycaster::find_first(const RayBatch& batch, const Reach& t_max, double* range_m, std::int32_t* cell) const {
-  with_ray_marcher([&](const GridCells&, const auto& first_hits, const auto&) {
+  with_first_hits([&](const auto& first_hits) {
     for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
       first_hits.along_all(count, t_max, rays, [&](std::size_t i, double t, std::int32_t met, const auto&) {
         range_m[first + i] = met < 0 ? kInfinity : t * resolution_m_;
@@ -126,11 +138,7 @@ void GridRaycaster::find_first(const RayBatch& batch, const Reach& t_max, double
 template <class Reach, class Store>
 void GridRaycaster::find_surfaces(const RayBatch& batch, const SurfaceLimits& limits, const Reach& t_max,
                                   const PathChoice* choices, const Store& store) const {
-  const SurfaceRules rules{limits.max_thickness_m / resolution_m_, limits.min_linearity,
-                           limits.min_gap_m / resolution_m_};
-  const WallNormals& wall_normals = normals();  // before the threads start
-  with_ray_marcher([&](const GridCells& grid, const auto& first_hits, const auto& marcher) {
-    const SurfaceFinder finder(grid, first_hits, marcher, wall_normals, rules);
+  with_surface_finder(limits, [&](const auto& finder) {
     for_each_chunk(batch, resolution_m_, [&](std::size_t first, std::size_t count, RayStream& rays) {
       constexpr std::size_t kTogether = 512;  // their state fits the level 2 cache
       for (std::size_t done = 0; done < count; done += kTogether) {

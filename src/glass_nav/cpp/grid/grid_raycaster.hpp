@@ -97,7 +97,9 @@ class GridRaycaster {
  private:
   GridCells cells() const;
   template <class Use>
-  void with_ray_marcher(const Use& use) const;  // use(GridCells, first hits, marcher)
+  void with_first_hits(const Use& use) const;
+  template <class Use>
+  void with_surface_finder(const SurfaceLimits& limits, const Use& use) const;
   template <class Reach>
   void find_first(const RayBatch& batch, const Reach& t_max, double* range_m, std::int32_t* cell) const;
   template <class Reach, class Store>

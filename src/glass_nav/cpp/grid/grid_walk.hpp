@@ -42,6 +42,8 @@ class GridWalk {
   /// False once the ray has left the grid or is longer than t_max.
   bool inside() const { return t_ <= t_max_ && x_axis_.cell < x_axis_.size && y_axis_.cell < y_axis_.size; }
 
+  static constexpr bool is_doubtful() { return false; }  // as a FixedWalk may be
+
   /// Length of the ray where it entered the present cell.
   double t() const { return t_; }
 
@@ -66,27 +68,6 @@ class GridWalk {
     const double off_x = x_axis_.follow(t_, cells, crossed_x_);
     const double off_y = y_axis_.follow(t_, cells, !crossed_x_);
     off_boundary_ = std::min(off_x, off_y);
-  }
-
-  /// As leap(1), in less time.
-  void step() {
-    const double tx = x_axis_.crossing(x_axis_.cell + 1), ty = y_axis_.crossing(y_axis_.cell + 1);
-    t_ = std::min(tx, ty);
-    crossed_x_ = tx < ty;
-    const Axis& other = crossed_x_ ? y_axis_ : x_axis_;
-    const double past = other.start + t_ * other.speed - other.cell;
-    off_boundary_ = std::min(past, 1.0 - past);
-    x_axis_.cell += crossed_x_;
-    y_axis_.cell += !crossed_x_;
-  }
-
-  /// Goes to a cell ahead that the ray is known to enter at t, far from any corner.
-  /// @param x, y  of the cell, mirrored as the axes are
-  void skip_to(int x, int y, double t) {
-    x_axis_.cell = x;
-    y_axis_.cell = y;
-    t_ = t;
-    off_boundary_ = 1.0;
   }
 
   /// False if the ray certainly did not enter the present cell at a corner.

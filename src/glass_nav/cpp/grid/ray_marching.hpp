@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "chessboard_distance.hpp"
+#include "fixed_walk.hpp"
 #include "free_ranges.hpp"
 #include "grid_walk.hpp"
 
@@ -35,12 +36,19 @@ struct GridCells {
     const std::int32_t beside = walk.cell_beside_corner();
     return beside >= 0 && occupied(beside) && !ignored(beside) ? beside : -1;
   }
+
+  /// The same of a walk that passes no corner.
+  template <class Ignored>
+  std::int32_t met(const FixedWalk& walk, const Ignored& ignored) const {
+    return walk.inside() && occupied(walk.cell()) && !ignored(walk.cell()) ? walk.cell() : -1;
+  }
 };
 
 /// A ray and how far it has been followed.
+template <class Walk>
 struct Search {
   Ray ray;
-  GridWalk walk;
+  Walk walk;
 };
 
 /// For rays that ignore no occupied cell.
@@ -50,9 +58,10 @@ struct NothingIgnored {
 };
 
 /// Skips from free square to free square; exact.
-class ExactRayMarcher {
+template <class Walk>
+class SquareMarcher {
  public:
-  explicit ExactRayMarcher(const GridCells& cells) : cells_(cells) {}
+  explicit SquareMarcher(const GridCells& cells) : cells_(cells) {}
 
   /// Walks on along many rays, each to the next occupied cell that is not ignored.
   ///
@@ -61,17 +70,25 @@ class ExactRayMarcher {
   ///
   /// @param start    start(i), called once for every i < count in order: the Search to go on with
   /// @param ignored  ignored(i, cell): cells that ray i passes
-  /// @param found    found(i, walk, cell): where that walk ended, and the cell it met; -1 if the ray ends before one
+  /// @param found    found(i, walk, cell): where that walk ended, and the cell it met; -1 if the ray ends before one, or
+  ///                 the walk has become doubtful
   template <class Start, class Ignored, class Found>
   void march_all(std::size_t count, const Start& start, const Ignored& ignored, const Found& found) const {
     std::array<Lane, kLanes> lanes;
     std::size_t next = 0, busy = 0;
-    const auto fill = [&](Lane& lane) {
-      lane.walk = start(next).walk;
-      lane.free_square = cells_.chessboard_distance->towards(lane.walk.minus_x(), lane.walk.minus_y());
-      lane.ray = next++;
+    const auto fill = [&](Lane& lane) {  // false if no ray is left
+      while (next < count) {
+        lane.walk = start(next).walk;
+        lane.ray = next++;
+        if (!lane.walk.is_doubtful()) {
+          lane.free_square = cells_.chessboard_distance->towards(lane.walk.minus_x(), lane.walk.minus_y());
+          return true;
+        }
+        found(lane.ray, lane.walk, -1);
+      }
+      return false;
     };
-    while (busy < kLanes && next < count) fill(lanes[busy++]);
+    while (busy < kLanes && fill(lanes[busy])) ++busy;
     while (busy > 0) {
       for (std::size_t i = 0; i < busy; ++i) {
         Lane& lane = lanes[i];
@@ -79,11 +96,7 @@ class ExactRayMarcher {
             step(lane.walk, lane.free_square, [&](std::int32_t cell) { return ignored(lane.ray, cell); });
         if (met == kContinues) continue;
         found(lane.ray, lane.walk, met);
-        if (next < count) {
-          fill(lane);
-        } else {
-          lane = lanes[--busy];  // it is processed in the next round
-        }
+        if (!fill(lane)) lane = lanes[--busy];  // it is processed in the next round
       }
     }
   }
@@ -93,14 +106,14 @@ class ExactRayMarcher {
   static constexpr std::size_t kLanes = 16;
 
   struct Lane {
-    GridWalk walk;
+    Walk walk;
     const std::uint8_t* free_square = nullptr;
     std::size_t ray = 0;
   };
 
   /// Checks the present cell and skips ahead. Returns the cell met, -1 where the ray ends, or kContinues.
   template <class Ignored>
-  std::int32_t step(GridWalk& walk, const std::uint8_t* free_square, const Ignored& ignored) const {
+  std::int32_t step(Walk& walk, const std::uint8_t* free_square, const Ignored& ignored) const {
     if (!walk.inside()) return cells_.met(walk, ignored);
     const int edge = free_square[walk.cell()];
     if (edge == 0 || walk.near_corner()) {
@@ -109,6 +122,7 @@ class ExactRayMarcher {
       if (cells_.stops(walk.cell())) return -1;
     }
     walk.leap(std::max(edge, 1));
+    if (walk.is_doubtful()) return -1;
     __builtin_prefetch(free_square + walk.cell());  // may lie outside: a prefetch does not fault
     return kContinues;
   }
@@ -122,11 +136,11 @@ class GuidedRayMarcher {
  public:
   GuidedRayMarcher(const GridCells& cells, const FreeRanges& guide) : cells_(cells), guide_(guide) {}
 
-  /// As ExactRayMarcher::march_all, one ray after the other.
+  /// As SquareMarcher::march_all, one ray after the other.
   template <class Start, class Ignored, class Found>
   void march_all(std::size_t count, const Start& start, const Ignored& ignored, const Found& found) const {
     for (std::size_t i = 0; i < count; ++i) {
-      Search search = start(i);
+      Search<GridWalk> search = start(i);
       const auto passes = [&](std::int32_t cell) { return ignored(i, cell); };
       const std::int32_t met = seek(search.ray, search.walk, passes);
       found(i, search.walk, met);
@@ -138,7 +152,7 @@ class GuidedRayMarcher {
   std::int32_t seek(const Ray& ray, GridWalk& walk, const Ignored& ignored) const {
     while (walk.inside()) {
       const double look_until = walk.t() + guide_.along(ray, walk.t(), walk.t_max()) + kMarginCells;
-      for (; walk.inside() && walk.t() <= look_until; walk.step()) {
+      for (; walk.inside() && walk.t() <= look_until; walk.leap(1)) {
         const std::int32_t met = cells_.met(walk, ignored);
         if (met >= 0) return met;
         if (cells_.stops(walk.cell())) return -1;

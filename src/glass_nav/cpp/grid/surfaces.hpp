@@ -9,6 +9,8 @@
 #include <limits>
 #include <vector>
 
+#include "first_hits.hpp"
+#include "fixed_walk.hpp"
 #include "grid_walk.hpp"
 #include "ray_marching.hpp"
 #include "wall_normals.hpp"
@@ -41,7 +43,7 @@ struct Incidences {
 };
 
 /// Looks along rays and through what they meet.
-template <class FirstHits, class RayMarcher>
+template <class Walk, class FirstHits, class RayMarcher>
 class SurfaceFinder {
  public:
   /// @param first_hits  finds the first surfaces
@@ -51,12 +53,13 @@ class SurfaceFinder {
       : cells_(cells), first_hits_(first_hits), marcher_(marcher), normals_(normals), rules_(rules) {}
 
   /// Follows `count` rays of the stream `rays`, each up to t_max(beam) and for the paths of choice(i) only; found(i,
-  /// Surfaces, Ray) for each, in any order and without the ray where it meets nothing. All rays go from surface to
-  /// surface together, since the marcher is fastest with many.
-  template <class Rays, class Reach, class Choice, class Found>
-  void along_all(std::size_t count, const Reach& t_max, const Choice& choice, Rays& rays, const Found& found) const {
+  /// Surfaces, Ray) for each, in any order and without the ray where it meets nothing, or doubtful(DoubtfulRay) where
+  /// Walk cannot follow it. All rays go from surface to surface together, since the marcher is fastest with many.
+  template <class Rays, class Reach, class Choice, class Found, class Doubt>
+  void along_all(std::size_t count, const Reach& t_max, const Choice& choice, Rays& rays, const Found& found,
+                 const Doubt& doubtful) const {
     std::vector<std::size_t> meeting;  // the rays that meet something, whose searches and surfaces follow
-    std::vector<Search> searches;
+    std::vector<Search<Walk>> searches;
     std::vector<Surfaces> surfaces;
     std::vector<int> wanted;         // surfaces along each of them
     std::vector<std::size_t> going;  // those of them that are not at their end
@@ -67,7 +70,7 @@ class SurfaceFinder {
     mirrored.reserve(count);
     searches.reserve(count);
     surfaces.reserve(count);
-    first_hits_.along_all(count, t_max, rays, [&](std::size_t i, double t, std::int32_t met, const auto& search) {
+    const auto hit = [&](std::size_t i, double t, std::int32_t met, const auto& search) {
       if (met < 0) {
         found(i, Surfaces{}, Ray{});
         return;
@@ -84,8 +87,10 @@ class SurfaceFinder {
       surfaces.back().cell[0] = met;
       surfaces.back().range[0] = t;
       surfaces.back().normal = normal;
-    });
-    mirror(mirrored, searches, surfaces);
+    };
+    first_hits_.along_all(count, t_max, rays, hit, doubtful);
+    std::vector<bool> in_doubt(meeting.size());
+    mirror(mirrored, searches, surfaces, in_doubt);
     for (std::size_t k = 1; k < 3 && !going.empty(); ++k) {
       pass_surface(k - 1, going, searches, surfaces);
       seek_surface(k, going, searches, surfaces);
@@ -95,7 +100,14 @@ class SurfaceFinder {
       };
       going.erase(std::remove_if(going.begin(), going.end(), done), going.end());
     }
-    for (std::size_t j = 0; j < meeting.size(); ++j) found(meeting[j], surfaces[j], searches[j].ray);
+    for (std::size_t j = 0; j < meeting.size(); ++j) {
+      const Search<Walk>& search = searches[j];
+      if (in_doubt[j] || search.walk.is_doubtful()) {
+        doubtful(DoubtfulRay{meeting[j], search.ray, search.walk.t_max()});
+      } else {
+        found(meeting[j], surfaces[j], search.ray);
+      }
+    }
   }
 
   /// The incidence at the end of the ray and of its mirrored path.
@@ -130,14 +142,14 @@ class SurfaceFinder {
   };
 
   /// Sends the rays on to their surface number k > 0; `going` keeps those that meet one.
-  void seek_surface(std::size_t k, std::vector<std::size_t>& going, std::vector<Search>& searches,
+  void seek_surface(std::size_t k, std::vector<std::size_t>& going, std::vector<Search<Walk>>& searches,
                     std::vector<Surfaces>& surfaces) const {
     std::vector<WallLine> passed;  // a flat ray would meet the posts and steps of the wall it has passed again
     for (const std::size_t i : going) passed.push_back(wall_line(surfaces[i].cell[k - 1]));
     marcher_.march_all(
-        going.size(), [&](std::size_t j) -> const Search& { return searches[going[j]]; },
+        going.size(), [&](std::size_t j) -> const Search<Walk>& { return searches[going[j]]; },
         [&](std::size_t j, std::int32_t cell) { return passed[j].has(cell); },
-        [&](std::size_t j, const GridWalk& walk, std::int32_t met) {
+        [&](std::size_t j, const Walk& walk, std::int32_t met) {
           searches[going[j]].walk = walk;
           surfaces[going[j]].cell[k] = met;
           if (met >= 0) surfaces[going[j]].range[k] = walk.t();
@@ -147,10 +159,10 @@ class SurfaceFinder {
   }
 
   /// Takes the rays through their surface number k; `going` keeps those that come out.
-  void pass_surface(std::size_t k, std::vector<std::size_t>& going, std::vector<Search>& searches,
+  void pass_surface(std::size_t k, std::vector<std::size_t>& going, std::vector<Search<Walk>>& searches,
                     std::vector<Surfaces>& surfaces) const {
     const auto ends = [&](std::size_t i) {
-      Search& search = searches[i];
+      Search<Walk>& search = searches[i];
       const WallNormals::Normal normal =
           k == 0 ? surfaces[i].normal : facing(normals_.at(surfaces[i].cell[k]), search.ray);
       const double cos_incidence = usable(normal) ? -projection(normal, search.ray) : 1.0;
@@ -162,8 +174,8 @@ class SurfaceFinder {
   }
 
   /// Follows the rays mirrored at their first surfaces: along u - 2 (u . n) n.
-  void mirror(const std::vector<std::size_t>& hits, const std::vector<Search>& searches,
-              std::vector<Surfaces>& surfaces) const {
+  void mirror(const std::vector<std::size_t>& hits, const std::vector<Search<Walk>>& searches,
+              std::vector<Surfaces>& surfaces, std::vector<bool>& in_doubt) const {
     std::vector<std::size_t> mirrored;
     std::vector<WallLine> mirrors;
     for (const std::size_t i : hits) {
@@ -177,12 +189,13 @@ class SurfaceFinder {
           const double t = surfaces[mirrored[j]].range[0];
           const Ray ray = reflected(searches[mirrored[j]].ray, t, surfaces[mirrored[j]].normal);
           const double t_max = searches[mirrored[j]].walk.t_max();
-          return Search{ray, GridWalk(ray, cells_.width, cells_.height, t_max - t)};
+          return Search<Walk>{ray, Walk(ray, cells_.width, cells_.height, t_max - t)};
         },
         // Cells of the mirror itself, within the patch that gave its normal: the staircase of a slanted wall.
         [&](std::size_t j, std::int32_t cell) { return mirrors[j].has_nearby(cell, WallNormals::kRadiusCells); },
-        [&](std::size_t j, const GridWalk& walk, std::int32_t met) {
+        [&](std::size_t j, const Walk& walk, std::int32_t met) {
           Surfaces& at = surfaces[mirrored[j]];
+          in_doubt[mirrored[j]] = walk.is_doubtful();
           at.mirrored_cell = met;
           if (met >= 0) at.mirrored = at.range[0] + walk.t();
         });
@@ -220,14 +233,15 @@ class SurfaceFinder {
 
   /// Leaves the run of occupied cells in which the walk stands, including gaps too short to count.
   ///
-  /// Returns its length along the ray. inf if it is longer than max_length, or the ray ends in it.
-  double pass_run(GridWalk& walk, double max_length) const {
+  /// Returns its length along the ray. inf if it is longer than max_length, the ray ends in it, or becomes doubtful.
+  double pass_run(Walk& walk, double max_length) const {
     const double min_gap = std::max(rules_.min_gap, GridWalk::kCorner);
     const double t_in = walk.t();
     double t_out = t_in;
     for (;;) {
       const bool occupied = cells_.occupied(walk.cell());
-      walk.step();
+      walk.leap(1);
+      if (walk.is_doubtful()) return kInfinity;
       if (occupied) t_out = walk.t();
       if (t_out - t_in > max_length || t_out > walk.t_max()) return kInfinity;
       if (!walk.inside() || walk.t() - t_out >= min_gap) return t_out - t_in;
@@ -244,6 +258,72 @@ class SurfaceFinder {
   const RayMarcher& marcher_;
   const WallNormals& normals_;
   SurfaceRules rules_;
+};
+
+/// A SurfaceFinder that follows all rays in one way, without doubts.
+template <class RayMarcher>
+class MarchedSurfaceFinder {
+ public:
+  MarchedSurfaceFinder(const GridCells& cells, const RayMarcher& marcher, const WallNormals& normals,
+                       const SurfaceRules& rules)
+      : first_hits_(cells, marcher), finder_(cells, first_hits_, marcher, normals, rules) {}
+  MarchedSurfaceFinder(const MarchedSurfaceFinder&) = delete;
+  MarchedSurfaceFinder& operator=(const MarchedSurfaceFinder&) = delete;
+
+  /// As SurfaceFinder::along_all().
+  template <class Rays, class Reach, class Choice, class Found>
+  void along_all(std::size_t count, const Reach& t_max, const Choice& choice, Rays& rays, const Found& found) const {
+    finder_.along_all(count, t_max, choice, rays, found, [](const DoubtfulRay&) {});
+  }
+
+  Incidences incidences(const Surfaces& at, const Ray& ray) const { return finder_.incidences(at, ray); }
+
+ private:
+  MarchedFirstHits<RayMarcher> first_hits_;
+  SurfaceFinder<GridWalk, MarchedFirstHits<RayMarcher>, RayMarcher> finder_;
+};
+
+/// A SurfaceFinder by FixedWalks, and by GridWalks for the few rays that these cannot follow.
+class ExactSurfaceFinder {
+ public:
+  ExactSurfaceFinder(const GridCells& cells, const WallNormals& normals, const SurfaceRules& rules)
+      : first_hits_(cells),
+        marcher_(cells),
+        finder_(cells, first_hits_, marcher_, normals, rules),
+        corner_marcher_(cells),
+        corner_finder_(cells, corner_marcher_, normals, rules) {}
+  ExactSurfaceFinder(const ExactSurfaceFinder&) = delete;
+  ExactSurfaceFinder& operator=(const ExactSurfaceFinder&) = delete;
+
+  /// As SurfaceFinder::along_all(); no ray is doubtful.
+  template <class Rays, class Reach, class Choice, class Found>
+  void along_all(std::size_t count, const Reach& t_max, const Choice& choice, Rays& rays, const Found& found) const {
+    std::vector<DoubtfulRay> left;
+    finder_.along_all(count, t_max, choice, rays, found, [&](const DoubtfulRay& ray) { left.push_back(ray); });
+    ListedRays again{left};
+    corner_finder_.along_all(
+        left.size(), [&](std::size_t j) { return left[j].t_max; },
+        [&](std::size_t j) { return choice(left[j].index); }, again,
+        [&](std::size_t j, const Surfaces& surfaces, const Ray& ray) { found(left[j].index, surfaces, ray); });
+  }
+
+  Incidences incidences(const Surfaces& at, const Ray& ray) const { return finder_.incidences(at, ray); }
+
+ private:
+  /// A stream of rays that are no beams of a pose: each has its own number.
+  struct ListedRays {
+    const std::vector<DoubtfulRay>& rays;
+    std::size_t number = 0;
+
+    std::size_t beam() const { return number; }
+    Ray next() { return rays[number++].ray; }
+  };
+
+  FirstHits first_hits_;
+  SquareMarcher<FixedWalk> marcher_;
+  SurfaceFinder<FixedWalk, FirstHits, SquareMarcher<FixedWalk>> finder_;
+  SquareMarcher<GridWalk> corner_marcher_;
+  MarchedSurfaceFinder<SquareMarcher<GridWalk>> corner_finder_;
 };
 
 }  // namespace glass_nav

@@ -1,1 +1,1 @@
-"""Trajectories, cases and runs -> figures."""
+"""Figures of trajectories, cases and runs."""

@@ -1,1 +1,1 @@
-"""Figures and pictures -> one HTML file."""
+"""HTML pages of figures and pictures, each one file."""

@@ -76,7 +76,7 @@ def _case_lines(scores: Optional[Dict[str, Any]]) -> List[str]:
         return []
     lines = [
         f"reported cases  {_figure(scores['accuracy'])} of {scores['beams']} beams correct, "
-        f"{_figure(scores['accuracy_answered'])} of those that answered; macro F1 {_figure(scores['macro_f1'])}; "
+        f"{_figure(scores['accuracy_answered'])} of those that returned; macro F1 {_figure(scores['macro_f1'])}; "
         f"{_figure(scores['used_share'])} used",
         f"  {'':22s}{'true':>9s}{'reported':>9s}{'precision':>11s}{'recall':>8s}{'F1':>8s}",
     ]

@@ -1,4 +1,4 @@
-"""Values -> a page: the templates beside this file, with everything that is put into them escaped.
+"""Fills the templates beside this file with values, all of them escaped.
 
 A page is one file that asks no address for anything: style and pictures inside, no script; its own
 Content-Security-Policy forbids the rest. It opens from a USB stick and prints.

@@ -1,4 +1,4 @@
-"""Scan, cases -> coloured points: what rviz' Select tool shows of each return. B beams, N returns."""
+"""The end points of a scan as coloured points, with what rviz' Select tool shows. B beams, N returns."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Bearings to landmarks and a landmark map -> pose, with its error."""
+"""The pose from bearings to landmarks, with its error."""

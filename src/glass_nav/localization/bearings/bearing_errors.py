@@ -1,4 +1,4 @@
-"""How wrong will a position from bearings be?  Step angle -> limits of the error, covariance, sigma over a map.
+"""Errors of positions from bearings: limits by the step angle, covariance, standard deviation over a map.
 
 Seed document landmark_bearings.txt (Tsukiyama 2009), sec. 3: an emitter that turns in steps measures the angle between
 two landmarks with an error of up to one step; Tables 1 and 2 list the position errors of one triple at these limits and

@@ -1,4 +1,4 @@
-"""Three bearings -> pose: the robot is where the two inscribed-angle circles through the middle landmark meet again.
+"""The pose from three bearings: the intersection of two inscribed-angle circles through the middle landmark.
 
 Seed document landmark_bearings.txt (Tsukiyama 2009), sec. 2, eqs. 1-9: from a place P two landmarks A and B appear at
 the angle alpha apart, so P is on one circle through A and B; B and C at the angle beta apart give another one. Both go

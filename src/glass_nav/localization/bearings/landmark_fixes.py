@@ -1,4 +1,4 @@
-"""Incoming bearings -> fixes, and when a fix becomes the initial pose of the localization."""
+"""Computes fixes from incoming bearings, and decides when a fix becomes the initial pose."""
 
 from __future__ import annotations
 

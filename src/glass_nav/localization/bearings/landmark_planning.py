@@ -1,4 +1,4 @@
-"""Map, landmarks -> where a robot can localize by their bearings, and where one more tag helps most.
+"""Where in a map a robot can localize by landmarks, and where one more landmark helps most.
 
 Points are places of the map where a robot may stand; a landmark is visible from one if its range and view allow it and
 no wall stands between. The cost of a point is its expected standard deviation, at most CAP_M; a point without three

@@ -1,4 +1,4 @@
-"""BEARINGS -> TRIPLES -> FIT -> POSE: where is a robot that sees landmarks in these directions?
+"""The pose from any number of bearings to landmarks: triples, then a least-squares fit.
 
 Seed document landmark_bearings.txt (Tsukiyama 2009): every three bearings give a pose (inscribed_circles.py), and with
 four landmarks the four poses should be averaged; average() does that. Ours beyond it: triangulate() starts from the

@@ -95,6 +95,11 @@ class IntegrityMonitor:
         """(3, 3) covariance after a step (3,) of odometry since the last update, before a scan; None: unknown."""
         return None if self._covariance is None else self._covariance.carried(step, noise)
 
+    @property
+    def noise_scale(self) -> np.ndarray:
+        """(3,) of the variances of odometry's model, along, across and of the heading: how large its errors have been."""
+        return np.ones(3) if self._covariance is None else self._covariance.noise_scale
+
     def narrow(self, spread: np.ndarray) -> None:
         """Evidence other than scans weighed the particles, whose spread (3, 3) holds now."""
         if self._covariance is not None:

@@ -38,7 +38,7 @@ class PoseCovariance:
         """
         self._at_update = np.array(covariance, float)
         self._last: Optional[np.ndarray] = None  # (3,) map_from_base at the last update
-        self._noise_scale = np.ones(3)  # of the variances along, across and of the heading
+        self.noise_scale = np.ones(3)  # of the variances along, across and of the heading
         self._unproven = np.zeros(2)  # corrections of odometry's position, in map, by scans that hardly fit
 
     def update(
@@ -82,7 +82,7 @@ class PoseCovariance:
         """(3, 3) after a step (3,) of odometry since the last update, in the robot's frame then."""
         if step is None or self._last is None:
             return self._at_update
-        return DeadReckoning(self._last, self._at_update).carried(step, noise, self._noise_scale).covariance
+        return DeadReckoning(self._last, self._at_update).carried(step, noise, self.noise_scale).covariance
 
     def _correction(self, step: np.ndarray, map_from_base: np.ndarray) -> np.ndarray:
         """(3,) in map: how far a pose is off the one that a step of odometry led to."""
@@ -100,8 +100,8 @@ class PoseCovariance:
         variance = np.diag(turned.T @ predicted.covariance @ turned)
         known = variance > 1e-10
         squared = np.minimum((turned.T @ off)[known] ** 2 / variance[known], _MAX_CORRECTION**2)
-        scale = memory * self._noise_scale[known] + (1.0 - memory) * squared
-        self._noise_scale[known] = np.maximum(scale, _MIN_SCALE)
+        scale = memory * self.noise_scale[known] + (1.0 - memory) * squared
+        self.noise_scale[known] = np.maximum(scale, _MIN_SCALE)
 
 
 def _doubt(worth: float, step: np.ndarray) -> float:

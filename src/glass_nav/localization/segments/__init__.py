@@ -1,1 +1,1 @@
-"""Scan and segment map -> corrected pose, with its quality measures."""
+"""Corrects a pose by a scan and the wall segments of a map, with quality measures."""

@@ -1,4 +1,4 @@
-"""Scan, segment map, rough pose -> corrected pose, and how well it fits: Emse, Ecf and both together.
+"""Corrects a rough pose by a scan and wall segments, and measures the fit: Emse, Ecf and both combined.
 
 Seed document segment_localization.txt, after MacKenzie and Dudek, Precise positioning using model-based maps (ICRA
 1994). Each end point of a beam belongs to the nearest segment and pulls the robot perpendicular to that segment's

@@ -1,4 +1,4 @@
-"""One scan, rough pose -> corrected pose, by the beams that ended at walls: corrections and cases alternate.
+"""Corrects a rough pose by the beams of a scan that ended at walls: corrections and cases alternate.
 
 Beams are classified at a pose (case_votes.py), and a pose is corrected by beams of known case (segment_correction.py),
 so each needs the other. First all beams pull, from the rough pose and others around it, and the result with the most
@@ -117,16 +117,16 @@ def refusal(scan: Scan, located: Located, rough: np.ndarray) -> Optional[str]:
     share = float(at_walls / max(np.count_nonzero(scan.answered), 1))
     if share < MIN_SHARE:
         return (
-            f"the scan fits nowhere near the pose: {share:.0%} of its answering beams end at walls, "
+            f"the scan fits nowhere near the pose: {share:.0%} of its returned beams end at walls, "
             f"at least {MIN_SHARE:.0%} must"
         )
     moved = located.correction.map_from_base - rough
     distance_m, turn_rad = float(np.hypot(moved[0], moved[1])), float(abs(angles.wrap(moved[2])))
     if distance_m > MAX_M or turn_rad > MAX_RAD:
         return (
-            f"the scan fits nowhere near the pose: the correction led {distance_m:.2f} m and "
-            f"{np.degrees(turn_rad):.0f} deg away, at most {MAX_M:g} m and {np.degrees(MAX_RAD):.0f} "
-            f"deg are no chance"
+            f"the scan fits nowhere near the pose: the correction moved it by {distance_m:.2f} m and "
+            f"{np.degrees(turn_rad):.0f} deg; beyond {MAX_M:g} m or "
+            f"{np.degrees(MAX_RAD):.0f} deg a fit may be chance"
         )
     return None
 
@@ -134,7 +134,7 @@ def refusal(scan: Scan, located: Located, rough: np.ndarray) -> Optional[str]:
 def free_in_words(found: SegmentCorrection) -> str:
     """Which directions the walls do not constrain: the document's hallway effect."""
     if not len(found.free):
-        return "nothing: the walls constrain x, y and yaw"
+        return "none: the walls constrain x, y and yaw"
     if len(found.free) == 3:
         return "x, y and yaw: no wall constrains them"
     heading = found.free_heading_rad

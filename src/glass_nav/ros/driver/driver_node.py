@@ -1,7 +1,7 @@
-"""driver_node: drives along edges of the Voronoi graph without a map, and to places of the map.
+"""driver_node: drives along edges of the Voronoi graph without a map, and to goals in the map.
 
-Wiring only; driving/driver.py decides. Callbacks store, one loop works: it takes in scans as they come, and at each
-control step asks the driver what to do. Without a task it is silent, so that others may steer.
+Wiring only: driving/driver.py decides. Callbacks store messages; one loop passes on scans as they come, and executes
+the driver's decisions at each control step. Without a task nothing is published on cmd_vel, so that others may steer.
 
 Subscribes: scan (LaserScan); scan_surfaces (LaserScan), in its place while the localization is LOCALIZED; turn_choice
     (TurnChoice), the answer to the last meetpoint; topology_status (TopologyStatus) and localization_status
@@ -9,8 +9,7 @@ Subscribes: scan (LaserScan); scan_surfaces (LaserScan), in its place while the 
     free to drive straight to the nearest edge; tf odom <- base <- laser, and map <- odom for goals in the map.
 Publishes: cmd_vel (Twist); meetpoint (Meetpoint) and edge_traversal (EdgeTraversal) with the same stamp; node_visits
     (NodeVisits) at the end of a goal of goto_node; ~status (DriverStatus, latched); ~markers (MarkerArray): see driver_displays.py; /diagnostics.
-Actions: traverse_edge (TraverseEdge), goto_node (GotoNode). There is one robot: a goal of either ends what is on, and a
-    turn_choice waits for neither.
+Actions: traverse_edge (TraverseEdge), goto_node (GotoNode). A goal of either ends the current task.
 Parameters: DriverParams, read once; explained in config/driver.yaml.
 """
 

@@ -1,6 +1,6 @@
-"""landmarks_node: where is a robot that sees landmarks in these directions?
+"""landmarks_node: computes the pose from bearings to landmarks.
 
-Wiring only; triangulation computes the answer. Callbacks only store, one loop works.
+Wiring only: triangulation computes the pose. Callbacks store messages; one loop processes them.
 
 Bearings come as the sensor turns; a sweep takes up to a minute. The newest bearing of each landmark within ~window_s is
 kept. Each message, once odometry is available for all of its stamps, gives a fix at the stamp of its last bearing;

@@ -1,7 +1,7 @@
-"""scanner_node: a turning emitter on a serial port and the tags that answer it -> landmark_bearings.
+"""scanner_node: searches for tags with a rotating emitter on a serial port, and publishes landmark_bearings.
 
-Wiring only; sensing/emitter_search.py is the procedure, sensing/serial_emitter.py the device. The emitter is turned over
-its span again and again, there and back.
+Wiring only; sensing/emitter_search.py is the procedure, sensing/serial_emitter.py the device. The emitter searches
+its span again and again, in alternating directions.
 
 Publishes: landmark_bearings (LandmarkBearings, at the end of each search, with the tags that were found), frame ~frame_id.
 Parameters: ScannerNodeParams, read once; explained in config/scanner.yaml.

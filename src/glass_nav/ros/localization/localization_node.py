@@ -1,6 +1,6 @@
-"""localization_node: where is the robot in a map of walls and glass? Also startable as `amcl`.
+"""localization_node: localizes a robot in a map with walls and glass. Also startable as `amcl`.
 
-Wiring only; the Localizer computes the answer. Callbacks only store, and send tf again; one loop alone touches the filter.
+Wiring only: the Localizer computes the pose. Callbacks store messages and send tf again; only one loop uses the filter.
 
 Subscribes: scan (LaserScan; or each of ~scan_topics), initialpose (PoseWithCovarianceStamped), map (OccupancyGrid, if
     ~use_map_topic), global_localization_area (PolygonStamped in the map's frame: where to search for the robot),
@@ -11,7 +11,7 @@ Publishes: amcl_pose (PoseWithCovarianceStamped, latched), particlecloud (PoseAr
     ~status (LocalizationStatus, latched), ~beam_cases (BeamCases), /diagnostics;
     scan_surfaces (LaserScan): the scan for a costmap, with each beam cut at the first surface of the map that it
     passed or was mirrored at. Stamp, frame and beams are the scan's; its `intensities` are 0 as measured, 1 cut,
-    and -1 for all beams while the pose is not trusted: the scan is then passed on raw. One for every scan that is
+    and -1 for all beams while the state is not LOCALIZED: then it is the raw scan. One for every scan that is
     used; none for a scan that is rejected or has no transforms, because it is unknown where to cut it;
     ~glass_map (OccupancyGrid, latched): probability of glass by wall cell [percent], -1 where unknown, with the cells
     of panes that were found and that the map lacks;

@@ -9,8 +9,8 @@ import rospy
 from geometry_msgs.msg import PoseStamped
 
 from glass_nav.localization.localizer import Estimate
+from glass_nav.localization.segments.pose_locator import LocateAnswer, PoseLocator
 from glass_nav.localization.segments.segment_correction import SegmentQuality
-from glass_nav.localization.segments.segment_desk import LocateAnswer, SegmentDesk
 from glass_nav.msg import SegmentQuality as SegmentQualityMsg
 from glass_nav.ros import conversions
 from glass_nav.sensing.scan import Scan
@@ -28,7 +28,7 @@ class SegmentService:
             scan_and_map: the scan of a request, or the last one, and the map; ValueError if there is none.
         """
         self._frame, self._scan_and_map = frame, scan_and_map
-        self._desk = SegmentDesk()
+        self._locator = PoseLocator()
         self._quality = rospy.Publisher("~segment_quality", SegmentQualityMsg, queue_size=2)
         rospy.Service("~locate", Locate, self._serve)
 
@@ -36,7 +36,7 @@ class SegmentService:
         """The measures of one scan at the pose of the filter."""
         if not self._quality.get_num_connections():
             return
-        quality = self._desk.quality(grid_map, scan, estimate.cases.case, estimate.map_from_base)
+        quality = self._locator.quality(grid_map, scan, estimate.cases.case, estimate.map_from_base)
         if quality is not None:
             self._quality.publish(_quality_msg(quality, estimate.stamp_ns, self._frame))
 
@@ -44,7 +44,7 @@ class SegmentService:
         try:
             rough = _rough_pose(request, self._frame)
             scan, grid_map = self._scan_and_map(request)
-            answer = self._desk.locate(grid_map, scan, rough)
+            answer = self._locator.locate(grid_map, scan, rough)
         except (ValueError, TimeoutError) as err:
             rospy.logwarn(f"locate refused: {err}")
             raise rospy.ServiceException(str(err)) from err

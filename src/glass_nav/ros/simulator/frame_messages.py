@@ -1,4 +1,4 @@
-"""Simulator frames -> ROS messages. B beams."""
+"""Converts frames of the simulator to ROS messages. B beams."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """simulator_node: a robot in a building of walls and glass, in simulated time, with the ground truth of every beam.
 
-Wiring only; the robot is simulation.Simulation. One loop moves it; callbacks only store.
+Wiring only: the robot is simulation.Simulation. One loop moves it; callbacks store messages.
 
 Subscribes: cmd_vel (Twist; takes precedence over the path), tf map -> odom (only to know whether the localization
     runs and keeps up).

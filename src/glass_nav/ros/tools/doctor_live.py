@@ -104,7 +104,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     """Listen, examine, print.
 
     Returns:
-        0 nothing found, 1 findings, 3 no roscore or no map that can be read.
+        0 no fault found, 1 faults found, 3 no roscore or no map that can be read.
     """
     parser = argparse.ArgumentParser(prog="glass_nav doctor --live")
     parser.add_argument("--seconds", type=float, required=True)

@@ -26,7 +26,7 @@ from nav_msgs.msg import OccupancyGrid
 from std_srvs.srv import Trigger
 
 from glass_nav import params
-from glass_nav.demo.heard import Candidates, Heard, SearchNews
+from glass_nav.demo.reports import Candidates, Reports, SearchNews
 from glass_nav.demo.wake_up_demo import Arrival, WakeUpDemo, WakeUpDemoParams
 from glass_nav.msg import (
     EdgeTraversal,
@@ -49,10 +49,10 @@ SERVER_LIMIT_S = 10.0
 
 
 class RobotOnTopics:
-    """The robot of the demo, as topics and an action show it; what is heard goes into `heard`."""
+    """The robot of the demo, as topics and an action show it; its reports are kept in `reports`."""
 
     def __init__(self, ending: threading.Event) -> None:
-        self.heard = Heard()
+        self.reports = Reports()
         self._ending = ending
         self._inbox = Mailbox(events=1000)
         self._client = actionlib.SimpleActionClient("goto_node", GotoNodeAction)
@@ -107,45 +107,45 @@ class RobotOnTopics:
     def stop(self) -> None:
         self._client.cancel_goal()
 
-    # -- what is heard
+    # -- callbacks
 
     def _put(self, msg: Any, take: Any) -> None:
         self._inbox.put("events", (take, msg))
 
     def _take_truth(self, msg: PoseStamped) -> None:
-        self.heard.truth[_stamp_ns(msg)] = conversions.planar_from_pose(msg.pose)
+        self.reports.truth[_stamp_ns(msg)] = conversions.planar_from_pose(msg.pose)
 
     def _take_pose(self, msg: PoseWithCovarianceStamped) -> None:
-        self.heard.poses[_stamp_ns(msg)] = conversions.planar_from_pose(msg.pose.pose)
+        self.reports.poses[_stamp_ns(msg)] = conversions.planar_from_pose(msg.pose.pose)
 
     def _take_meetpoint(self, msg: Meetpoint) -> None:
         try:
-            self.heard.meetpoints[_stamp_ns(msg)] = topology_messages.meetpoint_from_msg(msg)
+            self.reports.meetpoints[_stamp_ns(msg)] = topology_messages.meetpoint_from_msg(msg)
         except ObservationError:  # refused by the topology node as well, which says so
             return
 
     def _take_traversal(self, msg: EdgeTraversal) -> None:
         try:
-            self.heard.traversals[_stamp_ns(msg)] = topology_messages.traversal_from_msg(msg, None)
+            self.reports.traversals[_stamp_ns(msg)] = topology_messages.traversal_from_msg(msg, None)
         except ObservationError:
             return
 
     def _take_candidates(self, msg: TopologyCandidates) -> None:
         poses = np.array([conversions.planar_from_pose(pose) for pose in msg.poses]).reshape(-1, 3)
-        self.heard.candidates[_stamp_ns(msg)] = Candidates(msg.total, list(msg.nodes), list(msg.edges), poses)
+        self.reports.candidates[_stamp_ns(msg)] = Candidates(msg.total, list(msg.nodes), list(msg.edges), poses)
 
     def _take_search(self, msg: TopologyStatus) -> None:
         state = SearchState(msg.state_name)
-        self.heard.take_search(SearchNews(_stamp_ns(msg), state, msg.reason, msg.depth, msg.candidates, msg.turn))
+        self.reports.take_search(SearchNews(_stamp_ns(msg), state, msg.reason, msg.depth, msg.candidates, msg.turn))
 
     def _take_localization(self, msg: LocalizationStatus) -> None:
-        self.heard.localization = LocalizationState(msg.state_name)
+        self.reports.localization = LocalizationState(msg.state_name)
 
     def _take_initial_pose(self, msg: PoseWithCovarianceStamped) -> None:
-        self.heard.initial_pose = _stamp_ns(msg), conversions.planar_from_pose(msg.pose.pose)
+        self.reports.initial_pose = _stamp_ns(msg), conversions.planar_from_pose(msg.pose.pose)
 
     def _take_map(self, msg: OccupancyGrid) -> None:
-        self.heard.grid_map = conversions.map_from_msg(msg)
+        self.reports.grid_map = conversions.map_from_msg(msg)
 
 
 def _stamp_ns(msg: Any) -> int:
@@ -167,7 +167,7 @@ def main() -> None:
     robot = RobotOnTopics(ending)
     succeeded = False
     try:
-        succeeded = WakeUpDemo(atlas, p, robot.heard, robot).run()
+        succeeded = WakeUpDemo(atlas, p, robot.reports, robot).run()
     finally:
         rospy.signal_shutdown("ended")
     sys.exit(0 if succeeded else 1)

@@ -1,16 +1,16 @@
-"""topology_node: where in the atlas is a robot that woke up somewhere?
+"""topology_node: finds out where in an atlas a robot woke up.
 
-Wiring only: SearchSession decides. Callbacks store, one loop works: nothing else touches the session.
+Wiring only: SearchSession decides. Callbacks store messages; only one loop uses the session.
 
 Subscribes: meetpoint (Meetpoint), edge_traversal (EdgeTraversal): of the driver, or by hand; in either order, the
     traversal and the meetpoint at its end belong together. map (OccupancyGrid, if ~check_map): the atlas must be made
     from it. scan (LaserScan), tf ~odom_frame_id <- ~base_frame_id <- laser, and map, if ~use_scans: scans from
     anywhere, at meetpoints and between them, are evidence. node_visits (NodeVisits): for the statistics of the atlas.
-Publishes: turn_choice (TurnChoice): the answer to each meetpoint while there is something to find out;
+Publishes: turn_choice (TurnChoice): the answer to each meetpoint during a search;
     initialpose (PoseWithCovarianceStamped) once when CONFIRMED, with the stamp of the meetpoint or scan;
     ~candidates (TopologyCandidates, latched), ~status (TopologyStatus, latched), ~markers (MarkerArray, latched):
     see topology_displays.py for the namespaces; tf map -> map_atlas (static, the same frame): rviz knows the frame map
-    before the pose is known; legend (Image, latched): what the marks in rviz mean.
+    before the pose is known; legend (Image, latched): the legend of the markers.
 Action: localize_globally (LocalizeGlobally): begins a search; feedback is ~status; succeeds when CONFIRMED, is aborted
     when AMBIGUOUS or LOST, and when preempted the search is over.
 Services: ~restart (Trigger): forget the search, the next meetpoint begins one; ~reload_atlas (Trigger): read the file

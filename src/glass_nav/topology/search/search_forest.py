@@ -1,4 +1,4 @@
-"""Observations -> candidates: which darts are still possible?
+"""The search forest: which darts of the atlas are still possible after the observations.
 
 The document's forest has a row of search nodes for each depth; a search node is a node of the atlas with the search
 edge that leads there. Here a candidate is that edge's dart at the node, the arrival dart, which identifies both. A

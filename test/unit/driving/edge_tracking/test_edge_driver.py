@@ -296,7 +296,7 @@ def test_what_bars_the_edge_ends_it_as_blocked_in_front_of_it_and_there_is_a_way
 
 @pytest.mark.long_run
 @pytest.mark.parametrize("way_m", [[[11.0, 0.3], [9.0, 0.3]], [[10.0, 0.2], [14.0, 0.2]]], ids=["here", "away"])
-def test_somebody_who_walks_at_a_decimetre_a_second_is_no_meetpoint(way_m):
+def test_a_person_who_walks_at_a_decimetre_a_second_is_no_meetpoint(way_m):
     faces = np.array([[0.0, -1.25], [16.0, -1.25], [16.0, 1.25], [0.0, 1.25]])
     walker = Person(np.array(way_m), speed_m_s=0.1)
     drive = Drive(Building(walled(faces).walls, people=(walker,)), (8.0, 0.0, 0.0))

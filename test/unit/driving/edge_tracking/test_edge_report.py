@@ -76,7 +76,7 @@ def test_ranks_begin_with_the_way_back_and_run_clockwise():
     assert edge_report.ranked(around, -3.1)[0] is around[0]  # across the seam
 
 
-def test_a_meetpoint_is_told_in_the_frame_of_the_robot():
+def test_a_meetpoint_is_reported_in_the_frame_of_the_robot():
     node = Node(np.array([3.0, 1.0]), 1.2, 0.03, edge_report.ranked(branches(math.pi / 2, 0.0, -math.pi / 2), 3.0))
     pose = np.array([3.0, 0.5, math.pi / 2])  # half a metre south of it, looking north
     seen = edge_report.meetpoint(node, pose, 77)

@@ -26,7 +26,7 @@ def scans(person_m: "np.ndarray | list[float]", wall_m: float = 4.0) -> List[Sca
 
 
 @pytest.mark.parametrize("step_m", [0.01, -0.01], ids=["away", "here"])
-def test_somebody_who_walks_at_a_decimetre_a_second_moves_and_the_wall_does_not(step_m: float) -> None:
+def test_a_person_who_walks_at_a_decimetre_a_second_moves_and_the_wall_does_not(step_m: float) -> None:
     seen = scans(2.0 + step_m * np.arange(12))
     moved = moving_things.moved_m(seen)
     np.testing.assert_allclose(moved, seen[-1].points_in_base()[PERSON])

@@ -99,7 +99,7 @@ def test_without_a_ground_truth_they_are_only_measured_against_each_other():
     assert found.interval("one", MEAN) is None and found.difference("two", MEAN) is None
 
 
-def test_a_filter_that_diverged_is_infinitely_far_off_and_no_interval_is_told():
+def test_a_filter_that_diverged_is_infinitely_far_off_and_no_interval_is_reported():
     runs = [run("one", 0, 0.1), run("two", 0, math.nan)]
     found = comparison.of(runs, ["one", "two"], ["a.bag"])
     assert found.interval("two", MEAN).mean == math.inf

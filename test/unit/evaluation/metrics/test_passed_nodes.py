@@ -113,7 +113,7 @@ def test_a_node_seen_from_further_away_than_near_is_not_invented():
     assert INVENTED in [each.verdict for each in verdicts([seen(7.5, away_m=0.4)])]
 
 
-def test_why_a_node_is_missed_is_told():
+def test_why_a_node_is_missed_is_reported():
     meetings = verdicts([seen(0.0, doubtful=True), seen(5.0, steady=False), seen(10.0, y_m=2.0, steady=False)])
     assert [(each.verdict, each.why) for each in meetings] == [
         (MISSED, DOUBTFUL),

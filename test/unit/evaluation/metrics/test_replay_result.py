@@ -150,7 +150,7 @@ def test_the_scores_are_among_the_metrics_and_the_true_cases_among_the_files(tmp
     assert a_result().metrics()["scans_with_true_cases"] is None
 
 
-def test_beams_have_the_colours_of_their_true_and_of_their_told_cases(tmp_path):
+def test_beams_have_the_colours_of_their_true_and_of_their_reported_cases(tmp_path):
     from PIL import Image
 
     ends = np.array([[3.0, 0.0], [0.0, 3.0], [np.nan, np.nan]])

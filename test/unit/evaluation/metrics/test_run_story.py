@@ -58,7 +58,7 @@ def off_by(metres, first, end):
     return poses
 
 
-def test_a_good_run_is_told_as_one():
+def test_a_good_run_is_reported_as_one():
     story = run_story.of(a_run())
     assert (story.grade, story.headline) == ("good", "The robot knew where it was, and it was right")
     assert story.sentences == [
@@ -139,7 +139,7 @@ def test_doubts_are_counted_with_what_was_true_of_them():
     assert story.sentences[1].endswith("for 20.0 % of the scans it was more than 0.5 m off, at most 3.00 m.")
 
 
-def test_a_start_without_a_guess_is_told_and_its_errors_count_from_when_it_was_found():
+def test_a_start_without_a_guess_is_reported_and_its_errors_count_from_when_it_was_found():
     places = np.ones(SCANS, int)
     places[:10] = [500, 300, 200, 90, 40, 9, 7, 5, 3, 2]
     poses = off_by(20.0, 0, 10)

@@ -334,7 +334,7 @@ def test_a_beam_along_a_wall_ends_where_the_cells_begin():
 # -- sides that nobody saw
 
 
-def test_a_wall_met_from_a_side_that_is_unknown_is_told():
+def test_a_wall_met_from_a_side_that_is_unknown_is_reported():
     """A building as a mapper draws it: free inside, unknown outside; seen from a room through a pane, and back."""
     grid_map = ROW.grid_map()
     occupancy = grid_map.occupancy.copy()

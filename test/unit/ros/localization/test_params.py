@@ -173,7 +173,7 @@ def test_the_start_is_given_as_pose_and_covariance():
     assert np.diag(p.start.covariance)[1] == 4.0
 
 
-def test_names_that_nobody_knows_are_taken_off_and_said():
+def test_names_that_nobody_knows_are_taken_off_and_reported():
     ours, lines = without_unknown({"receive_map_topic": True, "max_particles": 5, "laser_z_short": 0.1}, "/amcl")
     assert ours == {"max_particles": 5, "laser_z_short": 0.1}
     assert lines == ["/amcl: unknown parameter ~receive_map_topic; did you mean ~use_map_topic?; not used, as by amcl"]

@@ -90,7 +90,7 @@ def test_numbers_without_a_stamp_are_of_the_time_at_which_they_come(monkeypatch)
     np.testing.assert_allclose(one_each.odom_from_base(6_000 * MS), [0.5, 0.0, 0.0])
 
 
-def test_what_cannot_be_used_is_said(monkeypatch):
+def test_what_cannot_be_used_is_reported(monkeypatch):
     log = Log()
     robot = wheels(monkeypatch, log, wheel_topics=("joint_states",))
     robot._take(0, packed(String(data="fast"), "std_msgs/String"))

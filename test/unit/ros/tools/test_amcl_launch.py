@@ -79,7 +79,7 @@ def test_every_parameter_of_amcl_is_taken_or_has_a_reason():
     assert all(amcl_launch.WHY_UNUSED.values())
 
 
-def test_a_default_that_the_file_contradicts_gives_way_and_is_told():
+def test_a_default_that_the_file_contradicts_gives_way_and_is_reported():
     node = amcl_launch.AmclNode("/amcl", "amcl/amcl", {"max_particles": 100}, [])
     assert yaml.safe_load(amcl_launch.explained(node, "x.launch")) == {"max_particles": 100, "min_particles": 100}
     assert "min_particles: 100  # not in the file; the default would contradict" in amcl_launch.explained(node, "x")

@@ -37,7 +37,7 @@ class Candidates:
     poses: np.ndarray  # (K, 3)
 
 
-class Heard:
+class Reports:
     """Filled by a listener, read by the demo."""
 
     def __init__(self) -> None:
@@ -60,7 +60,7 @@ class Heard:
 
     @property
     def simulated_s(self) -> float:
-        """Time of the newest truth: the clock may come later than what is heard."""
+        """Time of the newest truth: the clock may be later than the reports."""
         return max(self.truth, default=0) * 1e-9
 
     @property

@@ -29,7 +29,7 @@ class LocateAnswer:
         return self.refusal or f"free: {segment_locator.free_in_words(self.correction)}"
 
 
-class SegmentDesk:
+class PoseLocator:
     """Answers requests on the map that is in use. Safe to call from several threads."""
 
     def __init__(self) -> None:
