@@ -15,7 +15,7 @@ class UpdateSchedule:
     """Remembers when each lidar had its last update, and where odometry was then."""
 
     def __init__(self) -> None:
-        self.period_s = 0.0  # from the scan before to the last one, of whatever lidars; 0: there is only one
+        self.period_s: Optional[float] = None  # between the last two scans, of any lidar; None: there was only one
         self._stamps_ns: Dict[str, int] = {}  # of the last scan of each lidar
         self._odom_from_base: Optional[np.ndarray] = None  # at the last update
         self._up_to_date: Set[str] = set()  # lidars that had an update since the robot moved
