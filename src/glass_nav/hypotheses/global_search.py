@@ -294,4 +294,5 @@ def fit(field: DistanceField, points_m: np.ndarray, poses: np.ndarray, area: Opt
     ends_m = se2.transform_points(poses[:, None], points_m)
     distance_m = field.distance(ends_m[..., 0], ends_m[..., 1])
     fits = _EVIDENCE_SCALE_M**2 / (_EVIDENCE_SCALE_M**2 + distance_m**2)
-    return np.mean(np.where(area.contains(ends_m), fits, _UNKNOWN_FIT), axis=1)
+    unknown = np.where(area.is_unmapped(poses[:, :2]), 0.0, _UNKNOWN_FIT)  # nobody can tell whether a robot is there
+    return np.mean(np.where(area.contains(ends_m), fits, unknown[:, None]), axis=1)

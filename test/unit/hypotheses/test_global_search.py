@@ -155,6 +155,14 @@ def test_a_place_from_which_the_lidar_would_see_what_the_map_does_not_know_is_no
         assert bool(len(drive(search, SQUARE, [IN_SQUARE] * 2, [IN_SQUARE] * 2)[-1].poses)) == places
 
 
+def test_what_the_map_does_not_know_supports_no_place_outside_of_it():
+    grid_map = SQUARE.grid_map()
+    points = global_search.evidence_points(SQUARE.scan(IN_SQUARE))
+    poses = np.array([IN_SQUARE, IN_SQUARE + [100.0, 0.0, 0.0]])
+    inside, outside = global_search.fit(DistanceField(grid_map), points, poses, KnownArea(grid_map))
+    assert inside > 0.9 and outside == 0.0
+
+
 def test_the_covariance_is_of_all_places():
     room = Building([(0, 0), (6, 0), (6, 6), (0, 6)])
     told = search_in(room).update(room.scan(np.array([1.0, 3.0, 0.0])), np.zeros(3))

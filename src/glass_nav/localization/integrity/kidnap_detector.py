@@ -87,9 +87,13 @@ class Verdict:
     def contested(self) -> bool:
         """The scans fit worse than they used to, or the robot was moved, and they fit about as well or better elsewhere.
 
-        A given pose is contested by any place that has overtaken it.
+        A given pose is contested once scans have cost it half of its head start over another place.
         """
-        return self.moved or (self.doubted and self.log_ratio > _CLOSE) or (self.given and self.log_ratio > 0.0)
+        return (
+            self.moved
+            or (self.doubted and self.log_ratio > _CLOSE)
+            or (self.given and self.log_ratio > -0.5 * _HEAD_START)
+        )
 
 
 class KidnapDetector:
@@ -166,9 +170,10 @@ class KidnapDetector:
         if points is None:
             return self._verdict
         fit = self._fit_at(points, map_from_base)
-        if fit is None:  # what ends where the map knows nothing agrees with every pose
+        if fit is not None:
+            self._fit = fit if np.isnan(self._fit) else self._fit + (fit - self._fit) * -np.expm1(-step_m / _FORGET_M)
+        elif self._search is None:  # what ends where the map knows nothing agrees with every pose
             return self._verdict
-        self._fit = fit if np.isnan(self._fit) else self._fit + (fit - self._fit) * -np.expm1(-step_m / _FORGET_M)
         doubted = self._usual - self._fit > self._tolerance
         matcher = self._matcher if self._params.recover_when_lost else None
         if matcher is not None and self._continuity.observe(scan, odom_from_base, map_from_base):
@@ -181,7 +186,7 @@ class KidnapDetector:
         if matcher is not None and self._search is None and (doubted or self._moved or self._given):
             self._begin_search(matcher, map_from_base, dead_reckoning)
         if self._search is None:
-            if not doubted:
+            if not doubted and fit is not None:
                 self._learn(fit, step_m)
             self._verdict = Verdict(
                 self._fit,
@@ -195,11 +200,13 @@ class KidnapDetector:
             )
         else:
             self._search_m += step_m
-            self._search_fit_m += step_m * fit
+            self._search_fit_m += step_m * (self._fit if fit is None else fit)
             self._calm_m = 0.0 if doubted else self._calm_m + step_m
             prior = None if dead_reckoning is None else partial(dead_reckoning.log_likelihood, least=_CARRIED_AWAY)
             candidates = self._search.update(scan, odom_from_base, log_prior=prior, period_s=period_s)
-            self._verdict = self._compare(candidates, points, map_from_base, doubted, dead_reckoning, kept)
+            self._verdict = self._compare(
+                candidates, points, map_from_base, doubted, dead_reckoning, kept, fit is not None
+            )
             if self._search is not None:
                 self._search.correct(map_from_base)
         return self._verdict
@@ -225,6 +232,7 @@ class KidnapDetector:
         doubted: bool,
         dead_reckoning: Optional[DeadReckoning],
         kept: bool,
+        on_map: bool,
     ) -> Verdict:
         """The tracked pose with the best place elsewhere."""
         if np.isnan(candidates.fit):  # the first scan has not been matched everywhere yet
@@ -255,12 +263,14 @@ class KidnapDetector:
             self._search = None
             self._moved = self._given = False
         found = (
-            candidates.poses[0] if candidates.found and not here[0] and self.is_fit_for(candidates, points) else None
+            candidates.poses[0]
+            if candidates.found and not here[0] and self.is_fit_for(candidates, points, on_map)
+            else None
         )
         there = None if elsewhere is None else candidates.poses[elsewhere]
         return Verdict(self._fit, self._usual, log_ratio, doubted, found, candidates, there, contested, kept, given)
 
-    def is_fit_for(self, candidates: Candidates, points: np.ndarray) -> bool:
+    def is_fit_for(self, candidates: Candidates, points: np.ndarray, on_map: bool = True) -> bool:
         """Scans fit at the best place as they did before, or no other comes near it.
 
         Where they fit worse, the map lacks a part of what there is to see: the right place may be none of the candidates.
@@ -268,10 +278,12 @@ class KidnapDetector:
         Args:
             candidates: the best of them first.
             points: (B, 2) end points [m] of the present scan, in the robot's frame.
+            on_map: the map knows something where the beams end at the tracked pose; else the robot may have left it, and
+                no lead over that pose counts.
         """
         fit = self._fit_at(points, candidates.poses[0])
         usual = fit is not None and fit >= self._usual - self._tolerance
-        return usual or candidates.lead > _POOR_LEAD * self._params.search_margin
+        return usual or (on_map and candidates.lead > _POOR_LEAD * self._params.search_margin)
 
     def _fit_at(self, points: np.ndarray, map_from_base: np.ndarray) -> Optional[float]:
         """Fit of the points (B, 2) that end in mapped space, at a pose (3,); None: too few points."""

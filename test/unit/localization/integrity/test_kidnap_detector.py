@@ -16,6 +16,7 @@ from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.localization.integrity.dead_reckoning import DeadReckoning
 from glass_nav.localization.integrity.kidnap_detector import KidnapDetector
 from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.known_area import KnownArea
 
 CLOSE = np.diag([0.2, 0.2, 0.05]) ** 2
 SQUARE = Building([(0, 0), (6, 0), (6, 6), (0, 6)])
@@ -24,11 +25,14 @@ SQUARE = Building([(0, 0), (6, 0), (6, 6), (0, 6)])
 class Watched:
     """A robot, the pose that is believed, and what the watch says of it after each step."""
 
-    def __init__(self, building=L_ROOM, usual_fit=None, seed=0, given=False, **values):
+    def __init__(self, building=L_ROOM, usual_fit=None, seed=0, given=False, edge=False, **values):
+        """edge: the map ends somewhere."""
         self.building, self.rng = building, np.random.default_rng(seed)
         grid_map = building.grid_map()
         field = DistanceField(grid_map)
-        self.watch = KidnapDetector(field, ScanMatcher(grid_map, field), SearchParams(**values), usual_fit, given=given)
+        area = KnownArea(grid_map) if edge else None
+        matcher = ScanMatcher(grid_map, field)
+        self.watch = KidnapDetector(field, matcher, SearchParams(**values), usual_fit, area, given)
         self.stamp_ns = 0
         self.searches, self._searching = 0, False
 
@@ -128,6 +132,34 @@ def test_where_scans_fit_worse_than_they_did_a_place_needs_twice_the_margin(move
     points = global_search.evidence_points(L_ROOM.scan(pose))
     best = Candidates(pose[None] + [moved_m, moved_m, 0.0], np.ones(1), 0.8, lead, True)
     assert Watched(usual_fit=0.95).watch.is_fit_for(best, points) == accepted
+
+
+def test_a_robot_that_may_have_left_the_map_is_not_placed_where_scans_fit_worse_than_they_did():
+    pose = loop_drive(1)[0]
+    points = global_search.evidence_points(L_ROOM.scan(pose))
+    poor, good = (Candidates(pose[None] + [off_m, off_m, 0.0], np.ones(1), 0.8, 99.0, True) for off_m in (0.4, 0.0))
+    watch = Watched(usual_fit=0.95).watch
+    assert not watch.is_fit_for(poor, points, on_map=False)
+    assert watch.is_fit_for(good, points, on_map=False)
+
+
+def test_a_search_goes_on_though_the_wrong_pose_leads_off_the_map():
+    watched = Watched(edge=True)
+    watched.drive(loop_drive(10))
+    true, wrong = carried(30)
+    odom = odometry(true, watched.rng)
+    assert watched.drive(true[:4], wrong[:4], odom=odom[:4])[-1].candidates is not None
+    outside = [pose + [100.0, 0.0, 0.0] for pose in wrong[4:]]
+    verdicts = watched.drive(true[4:], outside, odom=odom[4:])
+    found = next(index for index, verdict in enumerate(verdicts) if verdict.found is not None)
+    assert off(verdicts[found].found, true[4 + found])[0] < 0.1
+
+
+def test_off_the_map_nothing_is_doubted_that_was_not_before():
+    watched = Watched(edge=True)
+    before = watched.drive(loop_drive(10))[-1]
+    outside = [pose + [100.0, 0.0, 0.0] for pose in loop_drive(5)]
+    assert watched.drive(loop_drive(5), outside)[-1] == before
 
 
 def test_dead_reckoning_vouches_for_no_pose_away_from_it():

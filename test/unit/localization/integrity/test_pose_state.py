@@ -117,10 +117,12 @@ def test_a_given_pose_that_was_not_compared_with_other_places_must_be_rather_rig
     assert judgement([0.9] * 3, best(0.05), given=True).state == "LOCALIZED"
 
 
-def test_a_place_that_overtook_a_given_pose_contests_it():
+def test_a_place_that_gains_on_a_given_pose_contests_it():
+    """A given pose starts ahead by 3."""
     places = dict(candidates=candidates(), elsewhere=np.array([5.0, 1.0, 0.0]))
     assert judgement([0.9] * 3, given=True, log_ratio=0.5, **places).state == "UNCERTAIN"
-    assert judgement([0.9] * 3, given=True, log_ratio=-0.5, **places).state == "LOCALIZED"
+    assert judgement([0.9] * 3, given=True, log_ratio=-1.0, **places).state == "UNCERTAIN"
+    assert judgement([0.9] * 3, given=True, log_ratio=-2.0, **places).state == "LOCALIZED"
     assert judgement([0.9] * 3, log_ratio=0.5, **places).state == "LOCALIZED"
 
 
