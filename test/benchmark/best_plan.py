@@ -99,7 +99,7 @@ class BestPlan:
         if (place, dart) not in self._apart:
             there = np.repeat(self._views.at(np.array([dart])), len(self._poses), axis=0)
             here = np.broadcast_to(self._poses[place], there.shape)
-            self._views.arrive(np.zeros((0, 3)))  # as many comparisons as it takes
+            self._views.arrive(np.zeros(3))  # as many comparisons as it takes
             differs = self._views.differ(there, vote.carried(here, there, self._poses))
             self._apart[place, dart] = differs & self._views.has_room(np.array([dart]))
         return self._apart[place, dart]

@@ -8,11 +8,11 @@ of poses.
 
 from __future__ import annotations
 
-from typing import Dict, List, Tuple
+from typing import Dict, List, Optional, Tuple
 
 import numpy as np
 
-from glass_nav.geometry import angles
+from glass_nav.geometry import angles, se2
 from glass_nav.hypotheses import pose_belief
 from glass_nav.hypotheses.pose_belief import MapScans
 from glass_nav.topology.atlas.atlas import Atlas
@@ -34,42 +34,48 @@ class ExpectedViews:
     def __init__(self, atlas: Atlas, scans: MapScans) -> None:
         self._atlas, self._scans = atlas, scans
         self._known: Dict[Tuple[Pose, Pose], float] = {}
-        self._seen: List[np.ndarray] = []  # (C, 2) where the robot would have been, at each arrival
-        self._aimed = np.zeros((0, 3))  # where the robot will have been at its next arrival
+        self._odom_from_base = np.zeros(3)  # at the last arrival
+        self._been: List[np.ndarray] = []  # (3,) the same, at each arrival
+        self._aimed: List[np.ndarray] = []  # (3,) the same, where the robot will have been at its next arrival
         self._left = _COMPARED
 
     def forget(self) -> None:
         """Start over for another search."""
-        self._seen.clear()
-        self._aimed = np.zeros((0, 3))
+        self._been.clear()
+        self._aimed.clear()
 
-    def arrive(self, poses: np.ndarray) -> None:
-        """The robot is at one of poses (C, 3): what is seen there is known now, and told them apart or not."""
-        self._seen.append(np.concatenate([poses, self._aimed])[:, :2])
-        self._aimed = np.zeros((0, 3))
+    def arrive(self, odom_from_base: np.ndarray) -> None:
+        """The robot is at a meetpoint, at odometry (3,): what is seen there is known now, and told places apart or not."""
+        self._odom_from_base = odom_from_base
+        self._been += [odom_from_base, *self._aimed]
+        self._aimed.clear()
         self._left = _COMPARED  # pairs for the next step
         if len(self._known) > _MAX_KEPT:
             self._known.clear()
 
-    def aim(self, poses: np.ndarray) -> None:
-        """The robot drives to one of poses (C, 3), and sees at its next arrival what it can see there: it may find the way
-        blocked, or its graph drawn otherwise than the atlas, and is not to try again for ever.
+    def aim(self, base_from_there: np.ndarray) -> None:
+        """The robot drives to a pose (3,) in its frame, and sees at its next arrival what it can see there: it may find
+        the way blocked, or its graph drawn otherwise than the atlas, and is not to try again for ever.
         """
-        self._aimed = poses
+        self._aimed.append(se2.compose(self._odom_from_base, base_from_there))
 
     @property
     def is_exhausted(self) -> bool:
         """Whether pairs of this step were not compared, and so passed for alike."""
         return self._left < 0
 
-    def nats(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    def nats(self, first: np.ndarray, second: np.ndarray, here: Optional[np.ndarray] = None) -> np.ndarray:
         """(P,) log likelihood ratios of poses first (P, 3) to second (P, 3), by a scan seen at the first.
 
         0 for pairs that hardly differ or that there was no time to compare, and where the robot has been.
+
+        Args:
+            first, second: poses.
+            here: (P, 3) of the robot now, if it will be at the first poses; None: it has been nowhere.
         """
+        been = np.zeros(len(first), bool) if here is None else self._has_been(first, here).any(axis=1)
         first, second = _facing_east(first, second)
         pairs = [(_rounded(a), _rounded(b)) for a, b in zip(first, second)]
-        been = self._has_been(first, second)
         new: Dict[Pose, Dict[Pose, int]] = {}
         for index, (a, b) in enumerate(pairs):
             if a != b and not been[index] and (a, b) not in self._known and b not in new.get(a, {}):
@@ -83,10 +89,19 @@ class ExpectedViews:
             self._known.update(zip(((a, b) for b in others), found.tolist()))
         return np.where(been, 0.0, np.array([self._known.get(pair, 0.0) for pair in pairs]))
 
-    def alike(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """(P,) bool: neither of arrival darts (P,) would look different from the other."""
+    def alike(self, first: np.ndarray, second: np.ndarray, here: Optional[np.ndarray] = None) -> np.ndarray:
+        """(P,) bool: neither of arrival darts (P,) would look different from the other.
+
+        Args:
+            first, second: darts of two places, in either order.
+            here: (2, 3) poses of the robot now at the two places; None: it has been nowhere.
+        """
         a, b = self.at(first), self.at(second)
-        return np.maximum(self.nats(a, b), self.nats(b, a)) < _DIFFERENT
+        alike = np.maximum(self.nats(a, b), self.nats(b, a)) < _DIFFERENT
+        if here is not None:
+            at = [[self._has_been(poses, np.broadcast_to(each, poses.shape)) for each in here] for poses in (a, b)]
+            alike |= ((at[0][0] & at[1][1]) | (at[0][1] & at[1][0])).any(axis=1)
+        return alike
 
     def differ(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """(P,) bool: a scan at poses first (P, 3) would tell for certain that the robot is not at second (P, 3)."""
@@ -102,16 +117,13 @@ class ExpectedViews:
         poses[:, 2] += np.pi
         return poses
 
-    def _has_been(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """(P,) bool: the robot was at the first pose if the one hypothesis is right, at the second if the other is."""
-        been = np.zeros(len(first), bool)
-        for places in self._seen:
-            near = [
-                (np.hypot(*(poses[:, None, :2] - places).transpose(2, 0, 1)) < _SAME_M).any(axis=1)
-                for poses in (first, second)
-            ]
-            been |= near[0] & near[1]
-        return been
+    def _has_been(self, there: np.ndarray, here: np.ndarray) -> np.ndarray:
+        """(P, A) bool: at which of its A arrivals a robot that is here (P, 3) now was there (P, 3)."""
+        if not self._been:
+            return np.zeros((len(there), 0), bool)
+        base_from_been = se2.compose(se2.inverse(self._odom_from_base), np.array(self._been))
+        off = se2.transform_points(here[:, None], base_from_been[:, :2]) - there[:, None, :2]
+        return np.hypot(off[..., 0], off[..., 1]) < _SAME_M
 
 
 def _facing_east(first: np.ndarray, second: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:

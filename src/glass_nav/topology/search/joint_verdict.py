@@ -91,8 +91,8 @@ class JointVerdict:
             reason = f"{places}; next a new edge, to see more walls"
             return self._estimate(state, reason, depth, dart, choice)
         poses, share = belief.poses[known], belief.share[known]
-        if self._views is not None:
-            self._views.arrive(belief.poses[left])
+        if self._views is not None and belief.odom_from_base is not None:
+            self._views.arrive(belief.odom_from_base)
         voted, ranks = None, None
         if len(dart) > 1:
             voted = vote.expected(self._matcher, dart, share, self._views, poses)
@@ -103,13 +103,13 @@ class JointVerdict:
             if difference is not None:
                 ranks = difference.ranks
                 if len(ranks) == 1:
-                    self._views.aim(difference.poses)
+                    self._views.aim(difference.base_from_there)
         if ranks is None and voted is not None and voted.splits and (self._views is None or voted.removed >= _WORTH):
             reason = f"{places}; next the turn that leaves the least doubt per metre"
             return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(voted.rank, here.degree))
         proof = None
         if ranks is None and len(dart) > 1:
-            proof = ambiguity.prove(self._matcher, dart, views=self._views)
+            proof = ambiguity.prove(self._matcher, dart, views=self._views, poses=poses)
             ranks = proof.ranks if self._views is None else None
         if ranks is not None:
             reason = f"{places}; next towards the nearest difference, {len(ranks)} edge{'s' * (len(ranks) != 1)} away"

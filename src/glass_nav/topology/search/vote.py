@@ -94,7 +94,7 @@ def expected(
             assert poses is not None
             first, second = np.nonzero(np.ones_like(likelihood))
             there = views.at(departure ^ 1)[first]
-            nats = views.nats(there, carried(poses[first], there, poses[second]))
+            nats = views.nats(there, carried(poses[first], there, poses[second]), poses[first])
             nats = np.where(views.has_room(departure[first] ^ 1), nats, 0.0)
             likelihood = np.maximum(likelihood, _BY_GRAPH_ALONE) * np.exp(-nats.reshape(likelihood.shape))
         left = (likelihood * share).max(axis=1) / (likelihood @ share)
@@ -117,7 +117,7 @@ class Difference:
     """A meetpoint from which places look different."""
 
     ranks: List[int]  # turns that lead there
-    poses: np.ndarray  # (1 + C, 3) of the robot there, if the leading place is right, and if one of the C others is
+    base_from_there: np.ndarray  # (3,) where the robot will be
 
 
 def towards_difference(
@@ -155,12 +155,13 @@ def towards_difference(
         looks = np.flatnonzero(views.has_room(arrivals))
         there = np.repeat(views.at(arrivals[looks]), len(others), axis=0)
         of_others = np.tile(others, (len(looks), 1))
-        nats = views.nats(there, carried(np.broadcast_to(pose, there.shape), there, of_others))
+        here = np.broadcast_to(pose, there.shape)
+        nats = views.nats(there, carried(here, there, of_others), here)
         nats = nats.reshape(len(looks), len(others)).max(axis=1, initial=0.0)
         if nats.max(initial=0.0) >= (DECISIVE if hint is not None else _EQUAL):
             arrival, ranks = following[int(looks[nats.argmax()])]
-            there_if_right = views.at(np.array([arrival]))
-            found = Difference(ranks, np.concatenate([there_if_right, carried(pose, there_if_right, others)]))
+            (map_from_there,) = views.at(np.array([arrival]))
+            found = Difference(ranks, se2.compose(se2.inverse(pose), map_from_there))
             if nats.max() >= DECISIVE:
                 return found
             hint = found

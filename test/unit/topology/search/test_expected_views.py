@@ -50,7 +50,7 @@ def test_the_nearest_difference_is_found_by_where_the_robot_would_stand(differ: 
     assert (found is not None) == differ
     if found is not None:
         assert found.ranks == [0, 1]  # back, then straight on
-        np.testing.assert_allclose(found.poses[:, 0], [12.0, 112.0])
+        np.testing.assert_allclose(found.base_from_there[:2], [-12.0, 0.0], atol=1e-9)  # it looks west
 
 
 def test_a_difference_that_is_not_decisive_is_a_goal_where_there_is_no_better_one(
@@ -67,32 +67,37 @@ def test_what_was_seen_once_is_expected_to_tell_nothing_more_until_another_searc
     _, views = rows(True)
     first, second = views.at(np.array([3])), views.at(np.array([7]))
     assert views.differ(first, second).all()
-    views.arrive(np.concatenate([first, second]))
-    assert views.nats(first, second).tolist() == [0.0]
+    views.arrive(np.array([5.0, 0.0, 0.0]))
+    here = views.at(np.array([1])) + [6.0, 0.0, 0.0]  # of the robot there, if it is in the first row
+    assert views.nats(first, second, here).tolist() == [0.0] and views.nats(first, second, here + 1.0).tolist() != [0.0]
+    both = np.concatenate([here, here + [100.0, 0.0, 0.0]])
+    assert views.alike(np.array([3]), np.array([7]), both).tolist() == [True]
+    assert views.alike(np.array([7]), np.array([3]), both).tolist() == [True]
+    assert views.alike(np.array([3]), np.array([7]), both + [0.0, 9.0, 0.0]).tolist() == [False]
     views.forget()
-    assert views.differ(first, second).all()
+    assert views.nats(first, second, here).tolist() != [0.0]
 
 
 def test_where_a_robot_wanted_to_look_it_has_looked_at_its_next_arrival_wherever_that_is() -> None:
     _, views = rows(True)
-    first, second = views.at(np.array([3])), views.at(np.array([7]))
-    views.aim(np.concatenate([first, second]))
-    assert views.differ(first, second).all()  # it is on its way
-    views.arrive(np.array([[50.0, 50.0, 0.0]]))
-    assert not views.differ(first, second).any()
+    first, second, here = views.at(np.array([3])), views.at(np.array([7])), np.array([[6.0, 0.0, 0.0]])
+    views.arrive(np.zeros(3))
+    views.aim(np.array([6.0, 0.0, 0.0]))
+    assert views.nats(first, second, here)[0] > 0.0  # it is on its way
+    views.arrive(np.array([0.0, 3.0, 0.0]))
+    assert views.nats(first, second, here + [0.0, 3.0, 0.0])[0] == 0.0
+    views.aim(np.array([6.0, 0.0, 0.0]))
     views.forget()
-    views.aim(np.concatenate([first, second]))
-    views.forget()
-    views.arrive(np.zeros((0, 3)))
-    assert views.differ(first, second).all()
+    views.arrive(np.zeros(3))
+    assert views.nats(first, second, here)[0] > 0.0
 
 
 def test_nothing_is_proved_where_there_was_no_time_to_compare_all(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(expected_views, "_COMPARED", 1)
     matcher, views = rows(False)
-    views.arrive(np.zeros((0, 3)))
+    views.arrive(np.zeros(3))
     assert not ambiguity.prove(matcher, AT_THE_MIDDLE, views=views).indistinguishable and views.is_exhausted
     for _ in range(20):  # the next steps go on
-        views.arrive(np.zeros((0, 3)))
+        views.arrive(np.zeros(3))
         proved = ambiguity.prove(matcher, AT_THE_MIDDLE, views=views).indistinguishable
     assert proved and not views.is_exhausted
