@@ -28,7 +28,7 @@ from glass_nav.geometry import se2
 from glass_nav.localization.localizer import Localizer
 from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.simulation import building_file, building_map, erased_glass, lidar, shipped_buildings
-from glass_nav.simulation.simulation import Simulation
+from glass_nav.simulation.simulation import Simulation, SimulationError
 from glass_nav.vocabulary import LocalizationState
 
 ALLOWED_M, ALLOWED_SHARE = 0.3, 0.02  # farther off than dead reckoning, and of the distance driven
@@ -93,7 +93,11 @@ def main() -> int:
         for erased in options.erased:
             for preset in options.lidars:
                 for seed in range(options.first_seed, options.first_seed + options.seeds):
-                    row = drive(building, erased, preset, seed, options.most_m)
+                    try:
+                        row = drive(building, erased, preset, seed, options.most_m)
+                    except SimulationError as err:  # furniture in the way of a random path
+                        print(f"| {building} | {erased:g} | {preset} | {seed} | not driven: {err} |||||")
+                        continue
                     runs, missed = runs + 1, missed + (row.excess_m > 0.0)
                     bar = "kept" if row.excess_m <= 0.0 else f"MISSED by {row.excess_m:.2f} m"
                     print(
