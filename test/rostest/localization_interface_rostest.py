@@ -138,7 +138,7 @@ class LocalizationInterface(RoomTest):
         maps.publish(self.map_msg)
         heard = wait_until(lambda: len(poses), 30.0)
         maps.publish(self.map_msg)
-        same = wait_until(lambda: self.lines.having("is the one that is in use"), 30.0)
+        same = wait_until(lambda: self.lines.having("is already in use"), 30.0)
         kept = self.stays_right_on(maps, poses, self.graded_map())
         code, printed = node.end()
         self.assertTrue(

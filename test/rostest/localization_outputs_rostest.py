@@ -309,7 +309,7 @@ class LocalizationOutputs(unittest.TestCase):
         for scan in (LaserScan(), self.scans.last):
             answer = locate(scan, self.rough_pose([0.2, -0.1, 0.05]))
             self.assertTrue(answer.success, answer.message)
-            self.assertTrue(answer.message.startswith("free: nothing"), answer.message)
+            self.assertTrue(answer.message.startswith("free: none"), answer.message)
             left = conversions.planar_from_pose(answer.pose.pose) - self.robot.map_from_base()
             self.assertLess(np.hypot(left[0], left[1]), 0.05)
             self.assertLess(abs(angles.wrap(left[2])), 0.01)

@@ -18,7 +18,8 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence, Set, Tuple, Union
 
-CONNECT_S, WORKER_S = 10.0, 60.0
+CONNECT_S, JOIN_S = 10.0, 60.0  # that a scheduler, and its first worker, may take
+CHECK_S = 60.0  # between two looks whether it still has a worker
 REPORT_S = 0.2  # between two reports of a worker on how far it is
 TOPIC = "glass_nav_steps"
 ATTEMPTS = 2  # at a job whose process ends
@@ -166,9 +167,9 @@ def _on_scheduler(jobs: Sequence[Any], work: Work, step_done: Callable[[int], No
         raise EngineError(f"no Dask scheduler answers at {address}: {_line(err)}") from err
     with client:
         try:
-            client.wait_for_workers(1, timeout=WORKER_S)
+            client.wait_for_workers(1, timeout=JOIN_S)
         except (OSError, distributed.TimeoutError) as err:
-            raise EngineError(f"no worker has joined the Dask scheduler at {address} within {WORKER_S:g} s") from err
+            raise EngineError(f"no worker has joined the Dask scheduler at {address} within {JOIN_S:g} s") from err
         try:
             return _gathered(distributed, client, jobs, work, step_done, address)
         except (distributed.CancelledError, OSError) as err:
@@ -204,7 +205,7 @@ def _done(distributed: Any, client: Any, futures: "Set[Any]", address: str) -> "
     """Waits until one of the futures or more are done, as long as the scheduler has a worker."""
     while True:
         try:
-            return set(distributed.wait(futures, timeout=WORKER_S, return_when="FIRST_COMPLETED").done)
+            return set(distributed.wait(futures, timeout=CHECK_S, return_when="FIRST_COMPLETED").done)
         except distributed.TimeoutError:
             if not client.scheduler_info()["workers"]:
                 raise EngineError(f"the Dask scheduler at {address} has lost its last worker") from None

@@ -126,7 +126,7 @@ def test_what_a_worker_of_the_cluster_cannot_do_stops_no_other(scheduler):
 
 def test_a_scheduler_without_workers_is_reported(monkeypatch):
     distributed = pytest.importorskip("distributed", reason=WHY)
-    monkeypatch.setattr(engine, "WORKER_S", 0.5)
+    monkeypatch.setattr(engine, "JOIN_S", 0.5)
     with distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0", scheduler_port=0) as cluster:
         address = cluster.scheduler_address
         with pytest.raises(EngineError) as caught:
@@ -135,7 +135,7 @@ def test_a_scheduler_without_workers_is_reported(monkeypatch):
 
 
 def test_a_scheduler_that_loses_its_last_worker_is_reported(monkeypatch, tmp_path):
-    monkeypatch.setattr(engine, "WORKER_S", 1.0)
+    monkeypatch.setattr(engine, "CHECK_S", 1.0)
     with dask_scheduler(tmp_path) as (address, _):
         with pytest.raises(EngineError) as caught:
             engine.run(["end"], engine_jobs.squared_or_ended, lambda count: None, scheduler=address)

@@ -61,10 +61,9 @@ py::array_t<double> distance(const DistanceField& field, const Array<double>& x_
   double* to = result.mutable_data();
   const auto points = static_cast<std::size_t>(result.size());
   py::gil_scoped_release unlocked;
-  for_each_block(field, x, y, points,
-                 [to](std::size_t first, std::size_t count, const DistanceField::Slopes& found) {
-                   std::copy_n(found.distance.begin(), count, to + first);
-                 });
+  for_each_block(field, x, y, points, [to](std::size_t first, std::size_t count, const DistanceField::Slopes& found) {
+    std::copy_n(found.distance.begin(), count, to + first);
+  });
   return result;
 }
 

@@ -26,7 +26,8 @@ class FirstHits {
 
   /// @param t_max     t_max(beam): how far to follow a ray
   /// @param rays      next() and at_new_origin(), see RayStream
-  /// @param found     found(i, t, cell, search): for i < count, in any order; cell -1: nothing up to t_max; search(): the
+  /// @param found     found(i, t, cell, search): for i < count, in any order; cell -1: nothing up to t_max; search():
+  /// the
   ///                  Search with which to go on from a cell
   /// @param doubtful  doubtful(DoubtfulRay): for every other i
   template <class Reach, class Rays, class Found, class Doubt>

@@ -70,7 +70,8 @@ class SquareMarcher {
   ///
   /// @param start    start(i), called once for every i < count in order: the Search to go on with
   /// @param ignored  ignored(i, cell): cells that ray i passes
-  /// @param found    found(i, walk, cell): where that walk ended, and the cell it met; -1 if the ray ends before one, or
+  /// @param found    found(i, walk, cell): where that walk ended, and the cell it met; -1 if the ray ends before one,
+  /// or
   ///                 the walk has become doubtful
   template <class Start, class Ignored, class Found>
   void march_all(std::size_t count, const Start& start, const Ignored& ignored, const Found& found) const {

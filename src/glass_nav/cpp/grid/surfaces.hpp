@@ -302,9 +302,8 @@ class ExactSurfaceFinder {
     finder_.along_all(count, t_max, choice, rays, found, [&](const DoubtfulRay& ray) { left.push_back(ray); });
     ListedRays again{left};
     corner_finder_.along_all(
-        left.size(), [&](std::size_t j) { return left[j].t_max; },
-        [&](std::size_t j) { return choice(left[j].index); }, again,
-        [&](std::size_t j, const Surfaces& surfaces, const Ray& ray) { found(left[j].index, surfaces, ray); });
+        left.size(), [&](std::size_t j) { return left[j].t_max; }, [&](std::size_t j) { return choice(left[j].index); },
+        again, [&](std::size_t j, const Surfaces& surfaces, const Ray& ray) { found(left[j].index, surfaces, ray); });
   }
 
   Incidences incidences(const Surfaces& at, const Ray& ray) const { return finder_.incidences(at, ray); }

@@ -194,7 +194,7 @@ class SimulatorNode:
         if wait_s > 0.0:
             ending.wait(wait_s)
         elif wait_s < 0.0:
-            self._log.warn(f"slower than ~speed_factor {factor:g} asks for: behind by {-wait_s:.1f} s", 30.0)
+            self._log.warn(f"slower than ~speed_factor {factor:g}: behind by {-wait_s:.1f} s", 30.0)
 
     # -- callbacks of other threads: they only store
 
