@@ -84,16 +84,17 @@ class Verdict:
         return self.fit < _POOR * self.usual and not self.kept
 
     @property
+    def losing(self) -> bool:
+        """Scans have cost a given pose a third of its head start over another place."""
+        return self.given and self.log_ratio > -2.0 / 3.0 * _HEAD_START
+
+    @property
     def contested(self) -> bool:
         """The scans fit worse than they used to, or the robot was moved, and they fit about as well or better elsewhere.
 
-        A given pose is contested once scans have cost it half of its head start over another place.
+        A given pose is contested by any place that has overtaken it.
         """
-        return (
-            self.moved
-            or (self.doubted and self.log_ratio > _CLOSE)
-            or (self.given and self.log_ratio > -0.5 * _HEAD_START)
-        )
+        return self.moved or (self.doubted and self.log_ratio > _CLOSE) or (self.given and self.log_ratio > 0.0)
 
 
 class KidnapDetector:

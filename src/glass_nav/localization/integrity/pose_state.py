@@ -149,9 +149,9 @@ class PoseQuality:
     def _least_confidence(self) -> float:
         """Smallest confidence of a pose that is reported as LOCALIZED."""
         verdict = self._verdict
-        if verdict is not None and verdict.given:
+        if verdict is not None and verdict.given and not verdict.losing:
             return min(_MIN_GIVEN, self._limits.localized_min_reliability)
-        if verdict is not None and verdict.doubted:
+        if verdict is not None and (verdict.losing or verdict.doubted):
             return self._limits.localized_min_reliability
         return _MIN_RELIABILITY
 

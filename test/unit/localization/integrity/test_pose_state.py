@@ -117,13 +117,19 @@ def test_a_given_pose_that_was_not_compared_with_other_places_must_be_rather_rig
     assert judgement([0.9] * 3, best(0.05), given=True).state == "LOCALIZED"
 
 
-def test_a_place_that_gains_on_a_given_pose_contests_it():
-    """A given pose starts ahead by 3."""
+def test_a_place_that_overtook_a_given_pose_contests_it():
     places = dict(candidates=candidates(), elsewhere=np.array([5.0, 1.0, 0.0]))
     assert judgement([0.9] * 3, given=True, log_ratio=0.5, **places).state == "UNCERTAIN"
-    assert judgement([0.9] * 3, given=True, log_ratio=-1.0, **places).state == "UNCERTAIN"
-    assert judgement([0.9] * 3, given=True, log_ratio=-2.0, **places).state == "LOCALIZED"
+    assert judgement([0.9] * 3, given=True, log_ratio=-0.5, **places).state == "LOCALIZED"
     assert judgement([0.9] * 3, log_ratio=0.5, **places).state == "LOCALIZED"
+
+
+@pytest.mark.parametrize(("share", "state"), [(0.45, "UNCERTAIN"), (0.65, "LOCALIZED")])
+def test_a_given_pose_that_loses_its_lead_needs_the_usual_reliability(share, state):
+    """It starts ahead by 3, and a reliability of 0.5 is enough only while it stays ahead by two thirds of that."""
+    judged = judgement([share] * 3, given=True, log_ratio=-1.0, candidates=candidates())
+    assert judged.confidence > 0.5
+    assert judged.state == state
 
 
 def test_the_fewer_beams_say_something_the_less_a_scan_counts():
