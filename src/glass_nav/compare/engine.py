@@ -207,6 +207,8 @@ def _done(distributed: Any, client: Any, futures: "Set[Any]", address: str) -> "
         try:
             return set(distributed.wait(futures, timeout=CHECK_S, return_when="FIRST_COMPLETED").done)
         except distributed.TimeoutError:
+            if client.status != "running":
+                raise OSError("connection lost") from None
             if not client.scheduler_info()["workers"]:
                 raise EngineError(f"the Dask scheduler at {address} has lost its last worker") from None
 

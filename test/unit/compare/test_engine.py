@@ -142,7 +142,8 @@ def test_a_scheduler_that_loses_its_last_worker_is_reported(monkeypatch, tmp_pat
     assert str(caught.value) == f"the Dask scheduler at {address} has lost its last worker"
 
 
-def test_a_scheduler_that_ends_is_reported(tmp_path):
+def test_a_scheduler_that_ends_is_reported(monkeypatch, tmp_path):
+    monkeypatch.setattr(engine, "CHECK_S", 1.0)
     with dask_scheduler(tmp_path) as (address, process):
         with pytest.raises(EngineError) as caught:
             engine.run([process.pid], engine_jobs.killed, lambda count: None, scheduler=address)
