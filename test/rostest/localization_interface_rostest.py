@@ -362,9 +362,12 @@ class LocalizationInterface(RoomTest):
         code, printed = self.start("written", "_initial_cov_xx:='0.5*0.5'").wait(30.0)
         self.assertEqual(code, 2, printed)
         self.assertIn("~initial_cov_xx must be float, got '0.5*0.5'", printed)
-        self.start("copied", "_initial_cov_xx:='0.5*0.5'", "_tf_broadcast:=1", script="amcl")
-        self.expect_line("/copied: ~initial_cov_xx must be float, got '0.5*0.5'; not used, as by amcl")
-        self.expect_line("/copied: ~tf_broadcast must be bool, got 1; not used, as by amcl")
+        node = self.start("copied", "_initial_cov_xx:='0.5*0.5'", "_tf_broadcast:=1", script="amcl")
+        has_map = wait_until(lambda: any(m.name == "/copied" and "map of" in m.msg for m in self.lines.all), 30.0)
+        _, printed = node.end()  # /rosout may lack what a node says before the first subscriber is there
+        self.assertTrue(has_map, printed)
+        self.assertIn("/copied: ~initial_cov_xx must be float, got '0.5*0.5'; not used, as by amcl", printed)
+        self.assertIn("/copied: ~tf_broadcast must be bool, got 1; not used, as by amcl", printed)
 
     def test_a_bag_is_not_for_the_node(self) -> None:
         code, printed = Process("amcl", "__name:=with_a_bag", "--run-from-bag", "run.bag").wait(30.0)

@@ -115,7 +115,7 @@ def test_an_edge_that_there_is_not_and_a_meetpoint_that_it_is_not_at_are_refused
     with pytest.raises(ObservationError, match="^turn of rank 5: the meetpoint it left has degree 3, allowed 0 to 2$"):
         EdgeTask(drive.driver, QUICK, LIMITS, 5)
     drive.driver.stop()
-    with pytest.raises(ValueError, match="^it stands at no meetpoint"):
+    with pytest.raises(ValueError, match="^the robot is not at a meetpoint that it could leave"):
         EdgeTask(drive.driver, QUICK, LIMITS, 1)
 
 

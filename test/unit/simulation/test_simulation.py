@@ -140,7 +140,7 @@ def test_neither_walls_nor_panes_are_driven_through(path):
     wall_m = 6.0 if path == "into the wall" else 3.0
     assert seen[-1].map_from_base[0] == pytest.approx(wall_m - 0.22, abs=0.01)
     assert str(caught.value).startswith(f"hall: the robot is stuck at x {wall_m - 0.22:.2f} m, y ")
-    assert str(caught.value).endswith("something is in the way of the path")
+    assert str(caught.value).endswith("something stands in the way of the path")
 
 
 def test_a_step_moves_and_looks():

@@ -241,7 +241,7 @@ def test_what_it_cannot_do_it_says_and_changes_nothing():
         drive.driver.resume()
     assert drive.driver.progress.phase == DriverPhase.ARRIVED
     drive.driver.leave(1)
-    with pytest.raises(ValueError, match="it is FOLLOWING$"):
+    with pytest.raises(ValueError, match="the driver is FOLLOWING$"):
         drive.driver.leave(1)
 
 
