@@ -119,7 +119,7 @@ class JointVerdict:
                 reason = f"{len(dart)} places match, and no turn can tell them apart"
                 return self._estimate(SearchState.AMBIGUOUS, reason, depth, dart, None)
             if self._views is not None and not self._views.is_exhausted and self._has_passed_all(here):
-                reason = f"{len(dart)} places match, and nothing that is left to see tells them apart"
+                reason = f"{len(dart)} places match, and no meetpoint where the robot has not been tells them apart"
                 return self._estimate(SearchState.AMBIGUOUS, reason, depth, dart, None)
         reason = f"{places}; no turn is known to tell them apart; next a new edge"
         return self._estimate(
