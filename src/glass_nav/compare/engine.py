@@ -92,11 +92,13 @@ def _on_cores(jobs: Sequence[Any], work: Work, step_done: Callable[[int], None],
                     steps.reached(number, report.steps, last=True)
                     answers[number] = report.answer
                 else:
-                    process = stack.enter_context(_Process(work))
                     if attempts[number] < ATTEMPTS:
                         waiting.appendleft(number)
                     else:
                         answers[number] = Failed(jobs[number], DIED)
+                    if not waiting:
+                        continue
+                    process = stack.enter_context(_Process(work))
                 start_next(process)
     return [answers[number] for number in range(len(jobs))]
 

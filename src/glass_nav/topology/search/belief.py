@@ -10,9 +10,7 @@ import numpy as np
 from glass_nav.hypotheses import pose_tracker
 
 NO_DART = -1
-_MOST_BY_GRAPH = (
-    2.0  # nats of the lead of a place over another one that meetpoints may give: as for one that is missing
-)
+_MOST_BY_GRAPH = 2.0  # nats by which meetpoints may put one place ahead of another: as many as a missing one takes
 
 
 @dataclass(frozen=True)
