@@ -251,13 +251,28 @@ Matrix3 ScanFit::spread_of(const std::vector<Beam>& beams, const std::vector<Pie
   return spread;
 }
 
-/// Adds to a covariance, in metres, what the loss along its longest axis adds to its linearization there.
+/// Adds to a covariance, in metres, what the loss along two axes adds to its linearization there: along its longest one,
+/// and where the walls hold a robot that keeps its heading least.
 void ScanFit::widen(const DistanceField& field, const Vector3& pose, const std::vector<Beam>& beams,
                     const Matrix3& information, double lever_m, double worth_of_beam, Matrix3& covariance) const {
   const Eigen3 found = eigen(covariance);
   const auto longest =
       static_cast<std::size_t>(std::max_element(found.values.begin(), found.values.end()) - found.values.begin());
   const Vector3 axis{found.axes(0, longest), found.axes(1, longest), found.axes(2, longest)};
+  const double across_rad =
+      0.5 * std::atan2(2.0 * information(0, 1), information(0, 0) - information(1, 1));  // where they hold it most
+  const Vector3 slide{-std::sin(across_rad), std::cos(across_rad), 0.0};
+  for (const Vector3& along : {axis, slide}) {
+    const double added = added_variance(field, pose, beams, information, lever_m, worth_of_beam, along,
+                                        dot(along, covariance * along));
+    covariance.add_outer(along, std::max(0.0, added));
+  }
+}
+
+/// [m2] along an axis, beyond its linearization and the variance there.
+double ScanFit::added_variance(const DistanceField& field, const Vector3& pose, const std::vector<Beam>& beams,
+                               const Matrix3& information, double lever_m, double worth_of_beam, const Vector3& axis,
+                               double variance) const {
   const double kernel = square(kKernelScales * scale_m_);
   const double share = 0.5 * square(kKernelScales) * worth_of_beam;
   const double curvature = share * dot(axis, information * axis) / kernel;
@@ -274,8 +289,7 @@ void ScanFit::widen(const DistanceField& field, const Vector3& pose, const std::
     loss[static_cast<std::size_t>(i + kSteps)] = share * total;
     linearized[static_cast<std::size_t>(i + kSteps)] = curvature * square(step);
   }
-  const double added = variance_of(loss) - std::max(variance_of(linearized), found.values[longest]);
-  covariance.add_outer(axis, std::max(0.0, added));
+  return variance_of(loss) - std::max(variance_of(linearized), variance);
 }
 
 double ScanFit::variance(Size size) const {

@@ -49,6 +49,9 @@ class ScanFit {
   Matrix3 spread_of(const std::vector<Beam>& beams, const std::vector<Piece>& pieces, double beam_share) const;
   void widen(const DistanceField& field, const Vector3& map_from_base, const std::vector<Beam>& beams,
              const Matrix3& information, double lever_m, double worth_of_beam, Matrix3& covariance) const;
+  double added_variance(const DistanceField& field, const Vector3& map_from_base, const std::vector<Beam>& beams,
+                        const Matrix3& information, double lever_m, double worth_of_beam, const Vector3& axis,
+                        double variance) const;
 
   double edge_m_, scale_m_;               // the scale is that of what is left between beams and walls
   std::array<double, kSizes> squares_{};  // what fits left, by the size of what errs together

@@ -18,6 +18,7 @@ from glass_nav.localization.integrity.pose_covariance import PoseCovariance, wid
 from glass_nav.localization.particle_filter.motion import OdometryNoise
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.scan import Scan, spread_evenly
+from glass_nav.sensing.wall_backs import WallBacks
 
 _BEAMS = 90  # looked at
 _MIN_BEAMS = 10
@@ -29,12 +30,14 @@ _LESS = 0.15  # share of the beams at walls, below that at the last update: the 
 class IntegrityMonitor:
     """Follows one tracked pose in one map."""
 
-    def __init__(self, field: DistanceField, resolution_m: float) -> None:
+    def __init__(self, field: DistanceField, resolution_m: float, backs: WallBacks) -> None:
         """
         Args:
             field: distances to the walls of the map.
             resolution_m: of its cells.
+            backs: of its walls.
         """
+        self._backs = backs
         self._fit = ScanFit(field, resolution_m)
         self._covariance: Optional[PoseCovariance] = None
         self._at_update: Dict[str, Tuple[float, float]] = {}  # of each lidar's last update: beside_of() and share then
@@ -126,10 +129,11 @@ class IntegrityMonitor:
         return covariance
 
     def _look(self, scan: Scan, map_from_base: np.ndarray, worth: float) -> Optional[FitInformation]:
-        beams = spread_evenly(scan.answered, _BEAMS)
+        chosen = spread_evenly(scan.answered, _BEAMS)
+        share = len(chosen) / max(int(np.count_nonzero(scan.answered)), 1)
+        beams = self._backs.without(scan, chosen, map_from_base)
         if len(beams) < _MIN_BEAMS:
             return None
-        share = len(beams) / max(int(np.count_nonzero(scan.answered)), 1)
         return self._fit.of(scan.points_in_base()[beams], scan.base_from_laser[:2], map_from_base, share, worth)
 
 
