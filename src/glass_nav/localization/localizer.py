@@ -366,14 +366,16 @@ class Localizer:
         if registration.worth < 1.0:
             self._keep_to_odometry(step, _UNSURE_M * registration.worth)
         suspect = self._filter.suspect
-        self._integrity.update(
+        held = self._integrity.update(
             scan,
             self._filter.best.map_from_base,
             step,
             self._params.odometry,
             registration.worth if registration.fits else 0.0,
             None if suspect is None else se2.compose(suspect, odom_from_base),
+            registration.contradicts_odometry,
         )
+        self._filter.move_to(held)
         return cases
 
     def _reckoned(self, reckoned: DeadReckoning, step: np.ndarray) -> DeadReckoning:

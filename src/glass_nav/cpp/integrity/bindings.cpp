@@ -76,6 +76,12 @@ PYBIND11_MODULE(_integrity, module) {
       },
       py::arg("covariance"), py::arg("spread"));
   module.def(
+      "share_of_second",
+      [](const Array& first, const Array& second) {
+        return array_of(share_of_second(matrix_of(first), matrix_of(second)));
+      },
+      py::arg("first"), py::arg("second"));
+  module.def(
       "carried",
       [](double yaw_rad, const Array& covariance, const Array& step, const Array& noise, const Array& noise_scale) {
         return array_of(

@@ -6,7 +6,6 @@
 namespace glass_nav {
 namespace {
 
-constexpr double kAlike = 1.5;       // ratio of variances up to which the scan is as good as the carried pose
 constexpr double kFar = 4.0;         // ratio of variances from which the spread of the particles counts
 constexpr double kSmallest = 1e-12;  // variance that keeps a matrix definite
 
@@ -23,11 +22,33 @@ Matrix3 mixed(const Matrix3& first, const Matrix3& second, const Ratio& ratio) {
   return result;
 }
 
+/// Of the second of two estimates, by the ratio of its variance to that of the first: close to a choice between them, since
+/// errors that are correlated do not average out.
+double share_by(double ratio) {
+  const double squared = ratio * ratio;
+  return 1.0 / (1.0 + squared * squared);
+}
+
 }  // namespace
+
+Matrix3 share_of_second(const Matrix3& first, const Matrix3& second) {
+  const Matrix3 root = cholesky(first + Matrix3::diagonal(kSmallest));
+  const Eigen3 of_second = eigen(whitened(root, second));
+  const Matrix3 axes = root * of_second.axes;
+  Matrix3 along;  // of a difference, along the axes
+  for (std::size_t j = 0; j < 3; ++j) {
+    Vector3 unit{};
+    unit[j] = 1.0;
+    const Vector3 column = transposed(of_second.axes) * solved(root, unit);
+    for (std::size_t k = 0; k < 3; ++k) along(k, j) = share_by(of_second.values[k]) * column[k];
+  }
+  return axes * along;
+}
 
 Matrix3 better_of(const Matrix3& first, const Matrix3& second) {
   return mixed(first, second, [](double value) {
-    return value > 1.0 ? 1.0 + (value - 1.0) * std::exp(-(value - 1.0) / kAlike) : value;
+    const double share = share_by(value), deviation = 1.0 - share + share * std::sqrt(value);
+    return deviation * deviation;
   });
 }
 

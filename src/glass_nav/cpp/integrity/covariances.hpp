@@ -6,7 +6,11 @@
 
 namespace glass_nav {
 
-/// In each direction the smaller of two covariances.
+/// Share of the second of two estimates, as a matrix: in each direction nearly all of it where its covariance is the
+/// smaller one, nearly nothing where it is the larger one.
+Matrix3 share_of_second(const Matrix3& first, const Matrix3& second);
+
+/// Covariance of the first estimate with that share of the second, however their errors are correlated.
 Matrix3 better_of(const Matrix3& first, const Matrix3& second);
 
 /// A covariance, in directions in which a spread is far larger that spread.

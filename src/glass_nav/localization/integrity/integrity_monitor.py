@@ -7,6 +7,7 @@ scan fits best beside the pose, or at a place that a second scan has to confirm.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Dict, Optional, Tuple
 
 import numpy as np
@@ -71,7 +72,8 @@ class IntegrityMonitor:
         noise: OdometryNoise,
         worth: float,
         suspect: Optional[np.ndarray],
-    ) -> None:
+        slipped: bool = False,
+    ) -> np.ndarray:
         """A scan moved the particles.
 
         Args:
@@ -81,18 +83,26 @@ class IntegrityMonitor:
             noise: of odometry.
             worth: of its fit there as evidence, 0..1; 0: it does not fit as scans usually do.
             suspect: (3,) pose where it fits instead, and another scan has to confirm it; None: there is none.
+            slipped: the scan contradicts odometry.
+
+        Returns:
+            (3,) the pose, with odometry in directions that the scan determines far worse.
         """
         if self._covariance is None:
-            return
+            return map_from_base
         self._now = self._look(scan, map_from_base, worth)
-        self._covariance.update(step, map_from_base, self._now if worth > 0.0 else None, noise, worth)
+        pose = self._covariance.update(step, map_from_base, self._now if worth > 0.0 else None, noise, worth, slipped)
         if self._now is not None:
+            back = pose - map_from_base
+            back[2] = angles.wrap(back[2])
+            self._now = replace(self._now, offset=self._now.offset + back)
             beside = _beside(self._now, self._covariance.carried(None, noise))
             self._at_update[scan.lidar] = beside, self._now.share
         self._other = None
         if suspect is not None:
-            self._other = suspect - map_from_base
+            self._other = suspect - pose
             self._other[2] = angles.wrap(self._other[2])
+        return pose
 
     def carried(self, step: Optional[np.ndarray], noise: OdometryNoise) -> Optional[np.ndarray]:
         """(3, 3) covariance after a step (3,) of odometry since the last update, before a scan; None: unknown."""

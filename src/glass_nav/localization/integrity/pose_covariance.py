@@ -24,6 +24,7 @@ from glass_nav.localization.particle_filter.motion import OdometryNoise
 
 _MEMORY = 0.95  # weight of the past per update, of the scale of odometry's noise
 _MIN_SCALE = 0.01  # of the variances of the model of odometry
+_EVERYTHING = np.eye(3)  # share of a scan in the pose
 _VIEW_M = 2.0  # after this distance the surroundings are seen anew
 _MAX_CORRECTION = 6.0  # deviations: a larger one is an event of its own
 
@@ -48,7 +49,8 @@ class PoseCovariance:
         fit: Optional[FitInformation],
         noise: OdometryNoise,
         worth: float = 1.0,
-    ) -> None:
+        slipped: bool = False,
+    ) -> np.ndarray:
         """The particles were moved.
 
         Args:
@@ -57,15 +59,27 @@ class PoseCovariance:
             fit: of the scan there; None: the scan says nothing about the pose.
             noise: of odometry.
             worth: of the fit as evidence about odometry, 0..1.
+            slipped: the scan contradicts odometry, which does not hold the pose then.
+
+        Returns:
+            (3,) the pose: as odometry has it in directions that the scan determines worse.
         """
+        pose = np.array(map_from_base, float)
         if step is not None and self._last is not None:
-            self._unproven = (self._unproven + self._correction(step, map_from_base)[:2]) * _doubt(worth, step)
+            carried = self.carried(step, noise)
+            correction = self._correction(step, pose)
             if fit is not None:
-                self._learn(step, map_from_base, noise, 1.0 - worth * (1.0 - _MEMORY))
-            self._at_update = self.carried(step, noise)
+                share = _EVERYTHING if slipped else _integrity.share_of_second(carried, fit.covariance)
+                pose += share @ correction - correction
+                pose[2] = angles.wrap(pose[2])
+                correction = share @ correction
+                self._learn(step, correction, noise, worth, share)
+            self._unproven = (self._unproven + correction[:2]) * _doubt(worth, step)
+            self._at_update = carried
         if fit is not None:
             self._at_update = better_of(self._at_update, fit.covariance)
-        self._last = np.array(map_from_base, float)
+        self._last = pose
+        return pose
 
     @property
     def unproven(self) -> np.ndarray:
@@ -91,16 +105,18 @@ class PoseCovariance:
         off[2] = angles.wrap(off[2])
         return off
 
-    def _learn(self, step: np.ndarray, map_from_base: np.ndarray, noise: OdometryNoise, memory: float) -> None:
-        """How large this correction is in the model of odometry."""
+    def _learn(
+        self, step: np.ndarray, correction: np.ndarray, noise: OdometryNoise, worth: float, share: np.ndarray
+    ) -> None:
+        """How large a correction (3,) is in the model of odometry, by a scan that had that share (3, 3) in the pose."""
         assert self._last is not None
         predicted = DeadReckoning(self._last, np.zeros((3, 3))).carried(step, noise)
         turned = _turned(self._last[2])
-        off = self._correction(step, map_from_base)
         variance = np.diag(turned.T @ predicted.covariance @ turned)
         known = variance > 1e-10
-        squared = np.minimum((turned.T @ off)[known] ** 2 / variance[known], _MAX_CORRECTION**2)
-        scale = memory * self.noise_scale[known] + (1.0 - memory) * squared
+        squared = np.minimum((turned.T @ correction)[known] ** 2 / variance[known], _MAX_CORRECTION**2)
+        learnt = worth * (1.0 - _MEMORY) * np.clip(np.diag(turned.T @ share @ turned)[known], 0.0, 1.0)
+        scale = self.noise_scale[known] + learnt * (squared - self.noise_scale[known])
         self.noise_scale[known] = np.maximum(scale, _MIN_SCALE)
 
 
