@@ -153,7 +153,8 @@ class SlowScanFit:
         lever_m: float,
         pieces: int,
     ) -> np.ndarray:
-        """Covariance (3, 3), in metres, with what the loss along its longest axis adds to its linearization there.
+        """Covariance (3, 3), in metres, with what the loss along its longest axis adds to its linearization there, and
+        along the direction in which the walls hold a robot that keeps its heading least.
 
         Args:
             covariance: (3, 3) of the linearized fit.
@@ -163,21 +164,22 @@ class SlowScanFit:
             lever_m: a turn by 1 rad is as long as this.
             pieces: of walls that the beams ended at.
         """
-        variances, axes = np.linalg.eigh(covariance)
-        axis = axes[:, 2]
-        cos, sin = angles.cos_sin(_STEPS_M[:, None] * (axis[2] / lever_m))
-        x, y = arms_m[:, 0], arms_m[:, 1]
-        distance_m = self._field.distance(
-            map_from_base[0] + _STEPS_M[:, None] * axis[0] + cos * x - sin * y,
-            map_from_base[1] + _STEPS_M[:, None] * axis[1] + sin * x + cos * y,
-        )
-        squared = distance_m**2
-        kernel = (_KERNEL_SCALES * self._scale_m) ** 2
-        share = 0.5 * _KERNEL_SCALES**2 * pieces / len(arms_m)
-        loss = share * np.sum(squared / (squared + kernel), axis=1)
-        linearized = share * float(axis @ information @ axis) / kernel * _STEPS_M**2
-        added = _variance_of(loss) - max(_variance_of(linearized), variances[2])
-        return covariance + max(0.0, added) * np.outer(axis, axis)
+        slide = np.append(np.linalg.eigh(information[:2, :2])[1][:, 0], 0.0)
+        for axis in (np.linalg.eigh(covariance)[1][:, 2], slide):
+            cos, sin = angles.cos_sin(_STEPS_M[:, None] * (axis[2] / lever_m))
+            x, y = arms_m[:, 0], arms_m[:, 1]
+            distance_m = self._field.distance(
+                map_from_base[0] + _STEPS_M[:, None] * axis[0] + cos * x - sin * y,
+                map_from_base[1] + _STEPS_M[:, None] * axis[1] + sin * x + cos * y,
+            )
+            squared = distance_m**2
+            kernel = (_KERNEL_SCALES * self._scale_m) ** 2
+            share = 0.5 * _KERNEL_SCALES**2 * pieces / len(arms_m)
+            loss = share * np.sum(squared / (squared + kernel), axis=1)
+            linearized = share * float(axis @ information @ axis) / kernel * _STEPS_M**2
+            added = _variance_of(loss) - max(_variance_of(linearized), float(axis @ covariance @ axis))
+            covariance = covariance + max(0.0, added) * np.outer(axis, axis)
+        return covariance
 
 
 def _variance_of(loss: np.ndarray) -> float:

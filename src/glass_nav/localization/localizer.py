@@ -37,7 +37,6 @@ from glass_nav.localization.update_schedule import UpdateSchedule
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.scan import Scan
-from glass_nav.sensing.wall_backs import WallBacks
 from glass_nav.vocabulary import LocalizationState
 from glass_nav.world.grid_map import GridMap
 from glass_nav.world.landmark_map import LandmarkMap
@@ -178,8 +177,7 @@ class Localizer:
         self._known_area = self._classifier.known_area
         self._panes = UnmappedPanes(grid_map, self._params.pane_use, self._params.panes)
         self._kidnap_detector = self._new_kidnap_detector()
-        self._wall_backs = WallBacks(field, self._known_area, grid_map.resolution_m)
-        self._integrity = IntegrityMonitor(field, grid_map.resolution_m, self._wall_backs)
+        self._integrity = IntegrityMonitor(field, self._known_area)
 
     def reconfigure(self, params: LocalizerParams) -> None:
         """Use other parameters from the next scan on; particles, glass map and all that was learnt stay."""
@@ -356,7 +354,7 @@ class Localizer:
     def _correct(self, scan: Scan, odom_from_base: np.ndarray, step: Optional[np.ndarray]) -> BeamCases:
         """The scan draws and weighs the particles, and the best cluster of them is the pose."""
         carried = self._integrity.carried(step, self._params.odometry)
-        registration = self._filter.register(scan, odom_from_base, self._classifier, self._wall_backs, carried)
+        registration = self._filter.register(scan, odom_from_base, self._classifier, carried)
         cases, expected = self._classifier.classify(scan, registration.map_from_base, registration.covariance)
         if registration.fits:
             self._classifier.learn(scan, expected)
@@ -375,7 +373,8 @@ class Localizer:
             None if suspect is None else se2.compose(suspect, odom_from_base),
             registration.contradicts_odometry,
         )
-        self._filter.move_to(held)
+        if not np.array_equal(held, self._filter.best.map_from_base):
+            self._filter.move_to(held)
         return cases
 
     def _reckoned(self, reckoned: DeadReckoning, step: np.ndarray) -> DeadReckoning:

@@ -23,6 +23,7 @@ class KnownArea:
 
     def __init__(self, grid_map: GridMap) -> None:
         self._grid_map = grid_map
+        self.resolution_m = grid_map.resolution_m
         near = int(round(_NEAR_WALL_M / grid_map.resolution_m))
         self._border = near + 1  # cells around the grid
         unknown = np.pad(grid_map.occupancy == UNKNOWN, self._border, constant_values=True)

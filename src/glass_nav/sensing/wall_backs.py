@@ -14,32 +14,29 @@ from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.known_area import KnownArea
 from glass_nav.sensing.scan import Scan
 
-_BEFORE_M = 0.25  # the end of a beam: where the field tells from which side it came
+_BEFORE_M = 0.25  # the end of a beam: there the field shows the side from which the beam came
 _THICKEST_M = 0.75  # from there to the face that is drawn: farther walls attract no beam
 _SIDE_M, _SIDE_CELLS = 0.15, 2.5  # from that face, to both sides: what the mapper saw
 
 
-class WallBacks:
-    """Knows which sides of the walls of one map the mapper saw."""
+def without(
+    scan: Scan, beams: np.ndarray, map_from_base: np.ndarray, field: DistanceField, known_area: KnownArea
+) -> np.ndarray:
+    """The beams that ended at no back of a wall.
 
-    def __init__(self, field: DistanceField, known_area: KnownArea, resolution_m: float) -> None:
-        """
-        Args:
-            field, known_area: of the map.
-            resolution_m: of its cells.
-        """
-        self._field, self._known_area = field, known_area
-        self._side_m = max(_SIDE_M, _SIDE_CELLS * resolution_m)
-
-    def without(self, scan: Scan, beams: np.ndarray, map_from_base: np.ndarray) -> np.ndarray:
-        """The beams (B,), indices, of a scan from a pose (3,) that ended at no back of a wall."""
-        bearing = scan.angles_rad[beams] + (map_from_base[2] + scan.base_from_laser[2])
-        ahead = np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
-        before = se2.transform_points(map_from_base, scan.points_in_base()[beams]) - _BEFORE_M * ahead
-        distance_m, along_x, along_y = self._field.at(before[:, 0], before[:, 1])
-        away = np.stack([along_x, along_y], axis=-1)  # from the wall
-        wall = before - distance_m[:, None] * away
-        met = (distance_m < _THICKEST_M) & (np.sum(away * ahead, axis=1) < 0.0)
-        side = self._side_m * away
-        met &= self._known_area.is_unmapped(wall + side) & self._known_area.is_free(wall - side)
-        return beams[~met]
+    Args:
+        scan: one revolution of a lidar.
+        beams: (B,) indices of beams that returned.
+        map_from_base: (3,) pose.
+        field, known_area: of the map.
+    """
+    bearing = scan.angles_rad[beams] + (map_from_base[2] + scan.base_from_laser[2])
+    ahead = np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
+    before = se2.transform_points(map_from_base, scan.points_in_base()[beams]) - _BEFORE_M * ahead
+    distance_m, along_x, along_y = field.at(before[:, 0], before[:, 1])
+    away = np.stack([along_x, along_y], axis=-1)  # from the wall
+    wall = before - distance_m[:, None] * away
+    side = max(_SIDE_M, _SIDE_CELLS * known_area.resolution_m) * away
+    met = (distance_m < _THICKEST_M) & (np.sum(away * ahead, axis=1) < 0.0)
+    met &= known_area.is_unmapped(wall + side) & known_area.is_free(wall - side)
+    return beams[~met]

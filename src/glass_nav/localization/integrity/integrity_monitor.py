@@ -17,9 +17,10 @@ from glass_nav.geometry import angles
 from glass_nav.localization.integrity.fit_information import FitInformation, ScanFit
 from glass_nav.localization.integrity.pose_covariance import PoseCovariance, widened_by
 from glass_nav.localization.particle_filter.motion import OdometryNoise
+from glass_nav.sensing import wall_backs
 from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.known_area import KnownArea
 from glass_nav.sensing.scan import Scan, spread_evenly
-from glass_nav.sensing.wall_backs import WallBacks
 
 _BEAMS = 90  # looked at
 _MIN_BEAMS = 10
@@ -31,15 +32,13 @@ _LESS = 0.15  # share of the beams at walls, below that at the last update: the 
 class IntegrityMonitor:
     """Follows one tracked pose in one map."""
 
-    def __init__(self, field: DistanceField, resolution_m: float, backs: WallBacks) -> None:
+    def __init__(self, field: DistanceField, known_area: KnownArea) -> None:
         """
         Args:
-            field: distances to the walls of the map.
-            resolution_m: of its cells.
-            backs: of its walls.
+            field, known_area: of the map.
         """
-        self._backs = backs
-        self._fit = ScanFit(field, resolution_m)
+        self._field, self._known_area = field, known_area
+        self._fit = ScanFit(field, known_area.resolution_m)
         self._covariance: Optional[PoseCovariance] = None
         self._at_update: Dict[str, Tuple[float, float]] = {}  # of each lidar's last update: beside_of() and share then
         self._other: Optional[np.ndarray] = None  # (3,) how far off another possible place is, in map
@@ -141,7 +140,7 @@ class IntegrityMonitor:
     def _look(self, scan: Scan, map_from_base: np.ndarray, worth: float) -> Optional[FitInformation]:
         chosen = spread_evenly(scan.answered, _BEAMS)
         share = len(chosen) / max(int(np.count_nonzero(scan.answered)), 1)
-        beams = self._backs.without(scan, chosen, map_from_base)
+        beams = wall_backs.without(scan, chosen, map_from_base, self._field, self._known_area)
         if len(beams) < _MIN_BEAMS:
             return None
         return self._fit.of(scan.points_in_base()[beams], scan.base_from_laser[:2], map_from_base, share, worth)

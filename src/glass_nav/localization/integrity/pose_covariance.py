@@ -25,6 +25,9 @@ from glass_nav.localization.particle_filter.motion import OdometryNoise
 _MEMORY = 0.95  # weight of the past per update, of the scale of odometry's noise
 _MIN_SCALE = 0.01  # of the variances of the model of odometry
 _EVERYTHING = np.eye(3)  # share of a scan in the pose
+_WIDER = 2.0  # times the deviations of odometry, which errs alike in step after step
+_AMBIGUOUS = np.diag(np.square([0.2, 0.2, np.radians(4.0)]))  # covariance of a scan from which odometry holds the pose
+_CLEAR = 0.1  # of that: it does not
 _VIEW_M = 2.0  # after this distance the surroundings are seen anew
 _MAX_CORRECTION = 6.0  # deviations: a larger one is an event of its own
 
@@ -69,10 +72,11 @@ class PoseCovariance:
             carried = self.carried(step, noise)
             correction = self._correction(step, pose)
             if fit is not None:
-                share = _EVERYTHING if slipped else _integrity.share_of_second(carried, fit.covariance)
-                pose += share @ correction - correction
-                pose[2] = angles.wrap(pose[2])
-                correction = share @ correction
+                share = _EVERYTHING if slipped else self._share(carried, fit.covariance)
+                if share is not _EVERYTHING:
+                    pose += share @ correction - correction
+                    pose[2] = angles.wrap(pose[2])
+                    correction = share @ correction
                 self._learn(step, correction, noise, worth, share)
             self._unproven = (self._unproven + correction[:2]) * _doubt(worth, step)
             self._at_update = carried
@@ -80,6 +84,14 @@ class PoseCovariance:
             self._at_update = better_of(self._at_update, fit.covariance)
         self._last = pose
         return pose
+
+    @staticmethod
+    def _share(carried: np.ndarray, of_scan: np.ndarray) -> np.ndarray:
+        """(3, 3) share of a scan with that covariance in a pose that odometry carried, with that covariance."""
+        wide = _WIDER**2 * carried + _AMBIGUOUS
+        if np.all(np.diag(of_scan) < _CLEAR * np.diag(_AMBIGUOUS)):
+            return _EVERYTHING
+        return np.array(_integrity.share_of_second(wide, of_scan))
 
     @property
     def unproven(self) -> np.ndarray:

@@ -33,10 +33,10 @@ from glass_nav.localization.particle_filter.pose_estimate import PoseEstimate
 from glass_nav.localization.particle_filter.proposal import Proposal
 from glass_nav.localization.particle_filter.resampling import ParticleCount
 from glass_nav.localization.particle_filter.scan_registration import ScanRegistration
+from glass_nav.sensing import wall_backs
 from glass_nav.sensing.bearings import LandmarkBearings
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.scan import Scan, spread_evenly
-from glass_nav.sensing.wall_backs import WallBacks
 from glass_nav.world.grid_map import GridMap
 from glass_nav.world.landmark_map import LandmarkMap
 
@@ -185,7 +185,6 @@ class ParticleFilter:
         scan: Scan,
         odom_from_base: np.ndarray,
         classifier: BeamClassifier,
-        backs: WallBacks,
         covariance: Optional[np.ndarray] = None,
     ) -> Registration:
         """Align the scan from the best cluster; a cloud that is no single place is weighed by how the scan fits.
@@ -193,13 +192,13 @@ class ParticleFilter:
         Args:
             scan: one revolution of a lidar.
             odom_from_base: (3,) odometry at its stamp.
-            classifier, backs: of the map.
+            classifier: of the map.
             covariance: (3, 3) of the pose that odometry led to; None: the spread of the particles.
         """
         self.fits = False
         best = pose_estimate.of(self.particles, self._weights)
         beams = spread_evenly(scan.answered, self._params.proposal.proposal_max_beams)
-        beams = backs.without(scan, beams, best.map_from_base)
+        beams = wall_backs.without(scan, beams, best.map_from_base, self._field, classifier.known_area)
         points = scan.points_in_base()[beams]
         if not len(beams):
             return Registration(best.map_from_base, best.covariance, best, None, 0, False)

@@ -12,6 +12,7 @@ from glass_nav.geometry import se2
 from glass_nav.localization.integrity.integrity_monitor import IntegrityMonitor
 from glass_nav.localization.particle_filter.motion import OdometryNoise
 from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.known_area import KnownArea
 
 GRID = L_ROOM.grid_map()
 FIELD = DistanceField(GRID)
@@ -26,7 +27,7 @@ def scan_at(pose, index=0, lidar=""):
 
 def followed(scans=5, suspect=None):
     """A robot that stands, tracked for some scans."""
-    monitor = IntegrityMonitor(FIELD, GRID.resolution_m)
+    monitor = IntegrityMonitor(FIELD, KnownArea(GRID))
     monitor.start(np.diag([0.25, 0.25, 0.07]))
     for index in range(scans):
         monitor.update(scan_at(HERE, index), HERE, None, NOISE, True, suspect)
@@ -84,7 +85,7 @@ def test_each_lidar_is_compared_with_itself():
 
 
 def test_without_a_tracked_pose_it_says_nothing_of_its_own():
-    monitor = IntegrityMonitor(FIELD, GRID.resolution_m)
+    monitor = IntegrityMonitor(FIELD, KnownArea(GRID))
     monitor.update(scan_at(HERE), HERE, None, NOISE, True, None)
     monitor.narrow(NO_SPREAD)
     assert monitor.fits(scan_at(HERE, 1), HERE, np.zeros(3), NOISE)

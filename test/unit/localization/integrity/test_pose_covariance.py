@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from glass_nav import _integrity
 from glass_nav.geometry import se2
 from glass_nav.localization.integrity import pose_covariance
 from glass_nav.localization.integrity.fit_information import FitInformation
@@ -70,7 +71,7 @@ def test_odometry_that_was_often_wrong_is_trusted_less(axis):
 def test_other_evidence_narrows_the_pose():
     pose = PoseCovariance(np.eye(3))
     pose.narrow(np.diag([100.0, 0.01, 100.0]))
-    np.testing.assert_allclose(np.diag(pose.carried(None, NOISE))[[0, 2]], 1.0)
+    np.testing.assert_allclose(np.diag(pose.carried(None, NOISE))[[0, 2]], 1.0, rtol=1e-6)
     assert pose.carried(None, NOISE)[1, 1] == pytest.approx(0.01)
 
 
@@ -99,10 +100,15 @@ def test_the_spread_of_the_particles_counts_in_directions_in_which_it_is_far_lar
     np.testing.assert_allclose(pose_covariance.widened_by(first, 400.0 * first), 400.0 * first, rtol=1e-6)
 
 
-def test_of_two_alike_the_scan_holds():
-    better = pose_covariance.better_of(np.eye(3), 1.5 * np.eye(3))
-    assert 1.2 < better[0, 0] < 1.5
-    np.testing.assert_allclose(pose_covariance.better_of(np.eye(3), 100.0 * np.eye(3)), np.eye(3), atol=1e-9)
+def test_of_two_the_one_with_the_smaller_variance_holds():
+    for ratio, least, most in ((0.25, 0.25, 0.26), (1.0, 1.0, 1.0), (1.5, 1.0, 1.1), (4.0, 1.0, 1.02)):
+        better = pose_covariance.better_of(np.eye(3), ratio * np.eye(3))
+        assert least - 1e-9 <= better[0, 0] <= most + 1e-9
+    np.testing.assert_allclose(pose_covariance.better_of(np.eye(3), 100.0 * np.eye(3)), np.eye(3), atol=1e-6)
+
+
+def share(ratio):
+    return 1.0 / (1.0 + ratio**4)
 
 
 def mixed(first, second, ratio):
@@ -118,11 +124,14 @@ def test_the_compiled_covariances_agree_with_numpy(seed):
     rng = np.random.default_rng(seed)
     roots = rng.normal(0.0, 1.0, (2, 3, 3)) * 10.0 ** rng.uniform(-3.0, 1.0, (2, 1, 3))
     first, second = roots @ roots.transpose(0, 2, 1)
-    better = mixed(first, second, lambda v: np.where(v > 1.0, 1.0 + (v - 1.0) * np.exp(-(v - 1.0) / 1.5), v))
+    better = mixed(first, second, lambda v: (1.0 - share(v) + share(v) * np.sqrt(v)) ** 2)
     wider = mixed(first, second, lambda v: np.maximum(v * -np.expm1(-((v / 4.0) ** 2)), 1.0))
     scale = np.sqrt(np.outer(np.diag(first), np.diag(first)))
     np.testing.assert_allclose(pose_covariance.better_of(first, second) / scale, better / scale, atol=1e-6)
     np.testing.assert_allclose(pose_covariance.widened_by(first, second), wider, rtol=1e-6, atol=1e-6 * wider.max())
+    root = np.linalg.cholesky(first + 1e-12 * np.eye(3))
+    of_second = mixed(first, second, share) @ np.linalg.inv(root @ root.T)
+    np.testing.assert_allclose(_integrity.share_of_second(first, second), of_second, rtol=1e-4, atol=1e-4)
 
 
 def test_a_covariance_that_is_not_definite_is_refused():
