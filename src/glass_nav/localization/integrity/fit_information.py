@@ -7,8 +7,8 @@ Biometrika 73, 1986) at two levels: each piece of wall has its own error, and al
 common one. The size of both is learnt from the residuals after each fit.
 
 A linearized fit does not know other places where the scan would fit as well, such as farther along a corridor with
-equal doors. So the loss is also evaluated along the direction that the walls constrain least. The sums over the beams
-are computed in the compiled module _integrity. B beams.
+equal doors. So the loss is also evaluated along the axis that is constrained least, and along the direction in which a
+robot that keeps its heading is. The sums over the beams are computed in the compiled module _integrity. B beams.
 """
 
 from __future__ import annotations

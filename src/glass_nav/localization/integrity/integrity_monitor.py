@@ -85,7 +85,7 @@ class IntegrityMonitor:
             slipped: the scan contradicts odometry.
 
         Returns:
-            (3,) the pose, with odometry in directions that the scan determines far worse.
+            (3,) the pose, as odometry has it in directions in which the scan is ambiguous.
         """
         if self._covariance is None:
             return map_from_base

@@ -6,6 +6,9 @@ direction, the better of the predicted pose and the present scan determines the 
 intersection of Sijs et al., State fusion with unknown correlation, Proc. European Control Conf. (2010), without its
 mutual mean.
 
+The same holds for the pose: where a scan fits in part and at other poses as well, such as along a bridge whose panes the
+map lacks, it fits best at one of them by chance. In such directions odometry keeps the pose.
+
 Between two fits the covariance grows by the odometry noise of the filter, scaled by the size of the last corrections
 relative to that noise. All covariances are over x [m], y [m], yaw [rad] in map.
 """
@@ -26,8 +29,8 @@ _MEMORY = 0.95  # weight of the past per update, of the scale of odometry's nois
 _MIN_SCALE = 0.01  # of the variances of the model of odometry
 _EVERYTHING = np.eye(3)  # share of a scan in the pose
 _WIDER = 2.0  # times the deviations of odometry, which errs alike in step after step
-_AMBIGUOUS = np.diag(np.square([0.2, 0.2, np.radians(4.0)]))  # covariance of a scan from which odometry holds the pose
-_CLEAR = 0.1  # of that: it does not
+_AMBIGUOUS = np.diag(np.square([0.1, 0.1, np.radians(2.0)]))  # least covariance of a scan whose pose odometry keeps
+_CLEAR = 0.1  # of that: of a scan that is not ambiguous in any direction
 _VIEW_M = 2.0  # after this distance the surroundings are seen anew
 _MAX_CORRECTION = 6.0  # deviations: a larger one is an event of its own
 
@@ -65,14 +68,14 @@ class PoseCovariance:
             slipped: the scan contradicts odometry, which does not hold the pose then.
 
         Returns:
-            (3,) the pose: as odometry has it in directions that the scan determines worse.
+            (3,) the pose, as odometry has it in directions in which the scan is ambiguous.
         """
         pose = np.array(map_from_base, float)
         if step is not None and self._last is not None:
             carried = self.carried(step, noise)
             correction = self._correction(step, pose)
             if fit is not None:
-                share = _EVERYTHING if slipped else self._share(carried, fit.covariance)
+                share = _EVERYTHING if slipped else self._share(carried, fit.covariance, worth)
                 if share is not _EVERYTHING:
                     pose += share @ correction - correction
                     pose[2] = angles.wrap(pose[2])
@@ -86,12 +89,18 @@ class PoseCovariance:
         return pose
 
     @staticmethod
-    def _share(carried: np.ndarray, of_scan: np.ndarray) -> np.ndarray:
-        """(3, 3) share of a scan with that covariance in a pose that odometry carried, with that covariance."""
-        wide = _WIDER**2 * carried + _AMBIGUOUS
-        if np.all(np.diag(of_scan) < _CLEAR * np.diag(_AMBIGUOUS)):
+    def _share(carried: np.ndarray, of_scan: np.ndarray, worth: float) -> np.ndarray:
+        """(3, 3) share of a scan in the pose.
+
+        Args:
+            carried: (3, 3) covariance of the pose that odometry carried.
+            of_scan: (3, 3) covariance of the scan's fit.
+            worth: of the fit, 0..1.
+        """
+        ambiguous = _AMBIGUOUS / max(1.0 - worth, 1e-6)
+        if np.all(np.diag(of_scan) < _CLEAR * np.diag(ambiguous)):
             return _EVERYTHING
-        return np.array(_integrity.share_of_second(wide, of_scan))
+        return np.array(_integrity.share_of_second(_WIDER**2 * carried + ambiguous, of_scan))
 
     @property
     def unproven(self) -> np.ndarray:

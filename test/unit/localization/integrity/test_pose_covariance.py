@@ -174,3 +174,37 @@ def test_odometry_is_judged_only_by_scans_that_fit():
         return pose.carried(np.array([1.0, 0.0, 0.0]), NOISE)[0, 0]
 
     assert scale(0.0) < scale(0.3) < scale(1.0)
+
+
+def kept(found, worth=0.3, slipped=False, off=0.3):
+    """Errors along and across of a pose that odometry knew and a scan of such worth led 0.3 m off, along and across."""
+    pose = PoseCovariance(np.diag(np.square([0.02, 0.02, 0.005])))
+    pose.update(None, np.zeros(3), fit(0.02, 0.02, 0.005), NOISE)
+    after = pose.update(STEP, STEP + [off, off, 0.0], found, NOISE, worth, slipped)
+    return (after - STEP)[:2], pose
+
+
+def test_odometry_keeps_the_pose_where_a_scan_is_ambiguous():
+    error, pose = kept(fit(0.5, 0.02, 0.005))
+    assert abs(error[0]) < 0.01 and error[1] == pytest.approx(0.3, abs=0.01)
+    assert np.sqrt(pose.carried(None, NOISE)[0, 0]) < 0.1
+    assert pose.noise_scale[0] == pytest.approx(1.0, abs=0.05)  # odometry was not judged by it
+
+
+@pytest.mark.parametrize(
+    ("found", "worth", "slipped"),
+    [
+        pytest.param(fit(0.03, 0.02, 0.005), 0.3, False, id="a scan that is clear"),
+        pytest.param(fit(0.5, 0.02, 0.005), 1.0, False, id="a scan that fits as a whole"),
+        pytest.param(fit(0.5, 0.02, 0.005), 0.3, True, id="wheels that slipped"),
+    ],
+)
+def test_else_the_scan_moves_it(found, worth, slipped):
+    np.testing.assert_allclose(kept(found, worth, slipped)[0], 0.3, atol=1e-3)
+
+
+def test_a_heading_stays_wrapped():
+    pose = PoseCovariance(np.eye(3) * 1e-4)
+    pose.update(None, np.array([0.0, 0.0, np.pi - 0.01]), fit(0.02, 0.02, 0.005), NOISE)
+    turned = pose.update(np.array([0.0, 0.0, 0.02]), np.array([0.0, 0.0, -np.pi + 0.3]), fit(0.5, 0.5, 0.5), NOISE, 0.3)
+    assert turned[2] == pytest.approx(-np.pi + 0.01, abs=0.02)
