@@ -178,7 +178,7 @@ def _tags(document: Item, placed: np.ndarray) -> LandmarkMap:
 
 
 def _made(noun: str, number: int, item: Item, make: Callable[[str, Item], T]) -> T:
-    """Call make() and add the item's number to its errors."""
+    """Call make(); its errors get the number of the item."""
     try:
         return make(noun, item)
     except ValueError as err:
@@ -219,7 +219,7 @@ def _number(what: str, value: Any) -> float:
 
 
 def _numbers(noun: str, item: Item, *keys: str) -> Dict[str, Any]:
-    """The part's arguments for the keys that are given."""
+    """Keyword arguments of the part, for the keys that are given."""
     given: Dict[str, Any] = {}
     for key in keys:
         if key not in item:
@@ -285,7 +285,7 @@ def _outline(noun: str, item: Item) -> np.ndarray:
 
 
 def _mullions(noun: str, item: Item, placed: np.ndarray) -> List[Thing]:
-    """Square posts: along a line from end to end, or at points."""
+    """Square posts along a line from end to end, or at given points."""
     numbers = {key: _number(f"{noun} {key}", item[key]) for key in ("every", "size", "yaw_deg") if key in item}
     size, every = numbers.get("size", MULLION_M), numbers.get("every", 1.0)
     for key, value in (("size", size), ("every", every)):
