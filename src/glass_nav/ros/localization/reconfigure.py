@@ -70,7 +70,7 @@ class ReconfigureServer:
             return ReconfigureResponse(self._publish())
 
     def _change(self, wanted: Dict[str, Any]) -> None:
-        """Apply the changed values and return them; ValueError, and no change, if one is invalid."""
+        """Apply the changed values; ValueError, and no change, if one is invalid."""
         values = dict(self._started_with if wanted.pop(RESTORE, False) else self._values)
         unused = sorted(amcl_parameters.NAMES.intersection(wanted).difference(values))
         if unused:
