@@ -142,7 +142,9 @@ class GlobalSearch:
             if self._searched and len(self._tracker):
                 self._judge(points, self._view(scan))
             if self._places is None and (not self._searched or self._is_due(points)):
-                self._places = PlaceSearch(self._matcher, self._field, points, odom_from_base)
+                # What is further behind, the best place beats by the whole margin in its first view.
+                max_behind = self._params.search_margin / _FULL_FIT
+                self._places = PlaceSearch(self._matcher, self._field, points, odom_from_base, max_behind)
                 self._since_places = np.zeros(2)
             if self._places is not None and self._places.advance(period_s):
                 self._take_in(self._places.places(odom_from_base), points)
