@@ -34,7 +34,11 @@ from glass_nav.hypotheses.scan_explanation import BeamsExplained
 from glass_nav.sensing.scan import Scan
 
 _NEAR_MISS = 0.5  # of the evidence of a piece that is given back between two poses: the map is drawn to a few cells
-_THING, _UNCHANGED = 2.0, 9.0  # pieces of one thing that was moved; things that were not, for one that was, by the prior
+_THING, _UNCHANGED = (
+    2.0,
+    9.0,
+)  # pieces of one thing that was moved; things that were not, for one that was, by the prior
+_TYPICAL = 100.0  # pieces seen by the time that a robot has come to where places differ
 _NATS = 0.5  # of a piece of wall that the map explains, to one that it does not; see above
 _CHANCE, _MAX_CHANCE = 0.7, 0.9  # share that is explained elsewhere: at least, at most
 _UNCHOSEN = 0.05  # less is explained by chance in a scan that did not choose the pose
@@ -150,13 +154,9 @@ class Evidence:
     def between_nats(self) -> np.ndarray:
         """(K,) log likelihood ratios of the poses to each other, to be added to those to elsewhere.
 
-        What the map contradicts tells more than a near miss. How much depends on how often that happens: where nothing
-        was moved one cupboard in the wrong place says much, where many things were moved it says little. The rate of a
-        pose is unknown, but has a prior; its likelihood is integrated over all rates.
+        What the map contradicts tells more than a near miss.
         """
-        things, seen = self.contradicted / _THING, self.seen / _THING
-        rates = special.betaln(1.0 + things, _UNCHANGED + np.maximum(seen - things, 0.0))
-        return _NEAR_MISS * _NATS * self.missed + rates - special.betaln(1.0, _UNCHANGED + seen)
+        return _NEAR_MISS * _NATS * self.missed + _surprise(self.contradicted, self.seen)
 
     @property
     def share(self) -> np.ndarray:
@@ -432,8 +432,29 @@ def expected_nats(scans: MapScans, map_from_base: np.ndarray, others: np.ndarray
     if beams is None:
         return np.zeros(len(others))
     pieces = new_walls.pieces(beams.ends_m)
-    unexplained = (beams.known & ~beams.explained) @ pieces
-    return _NATS * np.maximum(unexplained[1:] - unexplained[0], 0.0)
+    missed = (beams.known & ~beams.explained & ~beams.contradicted) @ pieces
+    contradicted = np.array([_pieces_at(beams, at) for at in beams.contradicted_at])
+    nats = -_NATS * ((1.0 - _NEAR_MISS) * missed + contradicted) + _surprise(
+        contradicted, np.full(len(missed), _TYPICAL)
+    )
+    return np.maximum(nats[0] - nats[1:], 0.0)
+
+
+def _pieces_at(beams: BeamsExplained, at: np.ndarray) -> float:
+    """Pieces of wall that the beams show at these shares (B,) of their lengths; NaN: nothing."""
+    shown = ~np.isnan(at)
+    return float(new_walls.pieces(beams.ends_m[shown] * at[shown, None]).sum())
+
+
+def _surprise(contradicted: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """(K,) log likelihood that the map contradicts so many (K,) of the pieces seen (K,), to that of none.
+
+    It depends on how often that happens: where nothing was moved one cupboard in the wrong place says much, where many
+    things were moved it says little. The rate is unknown, but has a prior; the likelihood is integrated over all rates.
+    """
+    things, all_things = contradicted / _THING, seen / _THING
+    rates = special.betaln(1.0 + things, _UNCHANGED + np.maximum(all_things - things, 0.0))
+    return rates - special.betaln(1.0, _UNCHANGED + all_things)
 
 
 def _of_view(beams: BeamsExplained, view: _View) -> OfView:
