@@ -21,7 +21,7 @@ from glass_nav.hypotheses.place_search import PlaceSearch
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.known_area import KnownArea
-from glass_nav.sensing.raycast import RayCaster
+from glass_nav.sensing.raycast import RayCaster, SurfaceHits
 from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import GridMap
 
@@ -31,6 +31,7 @@ _MAX_THICK_M = 0.3  # a thicker wall is no glass
 _FAR_M = 0.3  # from a wall: not where it was drawn a little otherwise
 _TURNED = 0.01  # rad by which a pose may be off
 _DEEP_M = 0.08  # in a thing: not where its outline was drawn a cell off
+_THING_M = 1.5  # depth of furniture, at most
 _INSIDE_M = 0.25  # behind the face of a thing, where only its outline is drawn: the rest of it is unknown
 _BACK_M = 0.5  # from the back of a wall, which was not seen, to the face that was
 _SLIDES_M, _SLIDES_RAD = 0.5, np.radians(15.0)  # a pose that would slide further stays where it was given
@@ -164,7 +165,7 @@ class ScanExplanation:
         offered = np.stack([hits.first_m, hits.second_m, hits.third_m, hits.mirrored_m])  # (4, P, B)
         stopped = (hits.first_m < measured) & (hits.first_thickness_m > _MAX_THICK_M)  # it went through no glass
         ends = se2.transform_points(poses[:, None], points_m)
-        through = _beside_another(self._crossed(poses, scan, ends, measured, hits.first_m, stopped))
+        through = _beside_another(self._crossed(poses, scan, ends, hits, stopped))
         explained = (np.abs(offered - measured) <= self._near_m).any(axis=0)
         ahead_m = offered[:3] - measured
         near = np.abs(ahead_m) < _BACK_M
@@ -181,22 +182,24 @@ class ScanExplanation:
         poses: np.ndarray,
         scan: Scan,
         ends_m: np.ndarray,
-        measured_m: np.ndarray,
-        first_m: np.ndarray,
+        hits: SurfaceHits,
         stopped: np.ndarray,
     ) -> np.ndarray:
         """(P, B) bool: beams that went into something solid, and ended where the map knows something.
 
-        There is space behind a pane. Of a cupboard only the outline is drawn, and the inside is unknown. A beam that
-        grazes a wall, or cuts a corner, is never far from the outline.
+        Behind a pane there is free space, or a yard that the mapper did not see. Of a cupboard only the outline is
+        drawn, and the inside is unknown. A beam that grazes a wall, or cuts a corner, is never far from the outline.
         """
-        crossed = first_m < measured_m - _FAR_M - _INSIDE_M
+        origin_m = se2.transform_points(poses, scan.base_from_laser[:2])[:, None]
+        measured_m = np.hypot(*np.moveaxis(ends_m - origin_m, -1, 0))
+        in_wall_m = np.minimum(hits.second_m, measured_m) - hits.first_m
+        crossed = (hits.first_m < measured_m - _FAR_M - _INSIDE_M) & (in_wall_m < _THING_M)
         pose, beam = np.nonzero(crossed)
-        origin_m = se2.transform_points(poses, scan.base_from_laser[:2])[pose]
-        along = (ends_m[pose, beam] - origin_m) / measured_m[beam, None]
-        inside = origin_m + (first_m[pose, beam, None] + _INSIDE_M) * along
+        first_m = hits.first_m[pose, beam]
+        along = (ends_m - origin_m)[pose, beam] / measured_m[pose, beam, None]
+        inside = origin_m[pose, 0] + (first_m + _INSIDE_M)[:, None] * along
         solid = stopped[pose, beam] | self._known_area.is_unmapped(inside)
-        deep = self._field.distance(inside[:, 0], inside[:, 1]) > _DEEP_M + _TURNED * first_m[pose, beam]
+        deep = self._field.distance(inside[:, 0], inside[:, 1]) > _DEEP_M + _TURNED * first_m
         crossed[pose, beam] = solid & deep
         return crossed & self._known_area.contains(ends_m)
 
