@@ -115,7 +115,7 @@ class GlobalSearch:
         self._driven_m = 0.0  # since the first scan
         self._counted_at_m: Dict[str, float] = {}  # id of a landmark -> distance driven when its bearing last counted
 
-    def decide_by(self, params: SearchParams) -> None:
+    def reconfigure(self, params: SearchParams) -> None:
         """Use other limits from the next scan on."""
         self._params = params
 

@@ -65,7 +65,7 @@ class DocumentLocalizer:
         """Use other parameters from the next scan on; the particles stay."""
         self._params = _plain(params)
         self._classifier.reconfigure(self._params.classifier)
-        self._quality.limit_by(params.quality)
+        self._quality.reconfigure(params.quality)
 
     @property
     def glass_map(self) -> GlassMap:

@@ -184,10 +184,10 @@ class Localizer:
         self._classifier.reconfigure(params.classifier)
         self._panes.reconfigure(params.pane_use)
         self._filter.reconfigure(params.particle_filter)
-        self._quality.limit_by(params.quality)
-        self._kidnap_detector.decide_by(params.search)
+        self._quality.reconfigure(params.quality)
+        self._kidnap_detector.reconfigure(params.search)
         if self._search is not None:
-            self._search.decide_by(params.search)
+            self._search.reconfigure(params.search)
         self._params = params
 
     @property

@@ -109,7 +109,7 @@ class Surroundings:
 
 
 def _steady_points(scan: Scan, local_from_base: np.ndarray) -> np.ndarray:
-    """(K, 2) end points of the beams, without single ones that stick out."""
+    """(K, 2) end points of the beams, without isolated ones."""
     ranges_m = np.where(scan.answered, scan.ranges_m, np.inf)
     points = replace(scan, ranges_m=ndimage.median_filter(ranges_m, 3, mode="nearest")).points_in_base()
     return se2.transform_points(local_from_base, points[np.isfinite(points).all(axis=1)])

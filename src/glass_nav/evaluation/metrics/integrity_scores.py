@@ -167,7 +167,7 @@ def summary(claims: IntegrityTrace) -> Dict[str, Optional[float]]:
 
 
 def _rounded(value: float) -> Optional[float]:
-    """To 12 digits, the last ones of a sum depend on where its terms lie in memory; None: infinite or NaN."""
+    """The value to 12 digits (the order of summation changes later ones); None if inf or NaN."""
     return float(f"{value:.12g}") if math.isfinite(value) else None
 
 
@@ -183,7 +183,7 @@ def _until_next(values: np.ndarray, run: Tuple[int, int]) -> float:
 
 
 def _delays(seconds: np.ndarray, wrong: np.ndarray, localized: np.ndarray) -> Tuple[float, float]:
-    """The longest time until an alarm and until the pose is right again; infinite: not before the end."""
+    """Longest time until an alarm, and until the pose is right again; inf: not before the end of the log."""
     to_alarm = back = 0.0
     for first, last in rows_of(wrong):
         over = np.nonzero(~localized[first : last + 1])[0]

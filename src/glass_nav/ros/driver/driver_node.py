@@ -210,7 +210,7 @@ class DriverNode:
         self._do(self._driver.turn_choice(msg.rank, msg.name, conversions.ns_from_stamp(msg.header.stamp)))
 
     def _see(self, mail: "Dict[str, List[Any]]") -> None:
-        """Scans that have their transforms, of whichever of the two topics the driver prefers now."""
+        """Pass on the scans that have their transforms, from the topic that the driver prefers now."""
         for lane, source in (("scans", self._scans), ("surfaces", self._surfaces)):
             for msg in mail[lane]:
                 stale = source.receive(msg, self._clock.now_s, None)
@@ -313,7 +313,7 @@ class DriverNode:
         )
 
     def _report(self) -> None:
-        """/diagnostics, once a second."""
+        """Publish /diagnostics, once a second."""
         if time.monotonic() < self._next_report_s:
             return
         self._next_report_s = time.monotonic() + 1.0

@@ -83,7 +83,7 @@ def contradiction(seen_m: np.ndarray, atlas_m: np.ndarray, path_m: np.ndarray, r
 
 
 class _Pieces:
-    """Segments in short pieces."""
+    """Segments cut into short pieces."""
 
     def __init__(self, segments_m: np.ndarray) -> None:
         along = segments_m[:, 2:] - segments_m[:, :2]
@@ -107,7 +107,7 @@ class _Pieces:
 
 
 class _Walls:
-    """Segments of a candidate."""
+    """Wall segments along the edge of a candidate."""
 
     def __init__(self, segments_m: np.ndarray) -> None:
         self._start = segments_m[:, :2]
