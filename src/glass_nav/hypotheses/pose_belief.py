@@ -2,7 +2,7 @@
 
 The first scan is matched against every pose of the map. The poses where it fits move with odometry, are registered to
 later scans, and gather evidence from the walls seen, each piece of wall once (new_walls.py): a piece supports the
-pose if the map explains it, glass included, and contradicts it otherwise. From time to time a scan is matched
+pose if the map explains it, glass included, and opposes it otherwise. From time to time a scan is matched
 everywhere again, because the true pose may have been missed. A new pose is traced back to the earlier scans, so that
 all poses are judged by the same evidence.
 
@@ -12,6 +12,9 @@ parallel walls fit everywhere), so it is measured: it is what the tenth best of 
 explains. The tenth and not the second, because places that look alike are no evidence for elsewhere. The ratio of one
 piece is bounded, since the pieces of one moved object are wrong together. A pose whose path crosses walls loses, too
 (driven_path.py).
+
+Between two poses of the map, what one of them contradicts says more: the beam went through furniture, or ended far
+from all walls (scan_explanation.py). A near miss says less, since the map is drawn to a few cells.
 
 The formulation is ours; the document (seed document global_localization_procedure.txt) has no scans. Multi-hypothesis
 tracking: Jensfelt, Kristensen, Active global localization for a mobile robot using multiple hypothesis tracking
@@ -120,7 +123,8 @@ class Evidence:
     @classmethod
     def none(cls, count: int) -> Evidence:
         nothing = np.zeros(count)
-        return cls(*[nothing] * 7, np.full(count, NEW, np.int64))
+        label = np.full(count, NEW, np.int64)
+        return cls(nothing, nothing, nothing, nothing, nothing, nothing, nothing, label)
 
     def __getitem__(self, chosen: np.ndarray) -> Evidence:
         return Evidence(*(values[chosen] for values in vars(self).values()))
