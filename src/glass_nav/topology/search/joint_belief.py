@@ -151,7 +151,7 @@ class JointBelief:
 
     def _made(self) -> Belief:
         evidence, poses = self._poses.evidence, self._poses.poses
-        first, share, elsewhere = belief.places(poses, evidence.nats, evidence.other_nats)
+        first, share, elsewhere = belief.places(poses, evidence.nats, evidence.other_nats, evidence.between_nats)
         return Belief(
             self._poses.odom_from_base,
             poses[first],
