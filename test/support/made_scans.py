@@ -55,7 +55,8 @@ class MadeScans:
         ends_m = np.column_stack([np.arange(BEAMS) // 2 - 0.25 * BEAMS, 3.0 * side])
         order = (np.arange(BEAMS) * 7) % BEAMS  # what is explained is spread over the walls
         explained = order < np.rint(self.share(map_from_base) * BEAMS)[:, None]
-        return BeamsExplained(np.array(map_from_base), ends_m, explained, np.ones_like(explained), ~explained)
+        contradicted_at = np.where(explained, np.nan, 1.0)
+        return BeamsExplained(np.array(map_from_base), ends_m, explained, np.ones_like(explained), contradicted_at)
 
     def is_free(self, points_m: np.ndarray) -> np.ndarray:
         return self.free(points_m)

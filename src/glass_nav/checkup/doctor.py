@@ -242,7 +242,7 @@ def _check_motion_and_map(
 
 
 def _check_glass(grid_map: GridMap, robot: _Robot) -> Iterator[Finding]:
-    """Panes that the map lacks and walls that are gone, by each lidar; only for a robot without other faults."""
+    """Look for panes that the map lacks, and for walls that are gone, with each lidar."""
     for placed in robot.placed.values():
         known = [(scan, odom_from_laser) for scan, odom_from_laser in placed if np.isfinite(odom_from_laser).all()]
         if known:
@@ -267,7 +267,7 @@ def _opposite(with_map: bool, lidar: str, link: str) -> Finding:
 
 
 def _points(scan: Scan) -> np.ndarray:
-    """(B, 2) finite end points in the lidar's frame, of those that are not too far."""
+    """(B, 2) end points of the finite ranges up to a limit, in the lidar's frame."""
     near = scan.answered & (np.where(scan.answered, scan.ranges_m, np.inf) < FARTHEST_M)
     ranges_m, bearing = scan.ranges_m[near], scan.angles_rad[near]
     return np.stack([ranges_m * np.cos(bearing), ranges_m * np.sin(bearing)], axis=-1)

@@ -71,7 +71,7 @@ def _parents(transforms: Sequence[HeardTransform]) -> Iterator[Finding]:
 
 
 def _contradictions(transforms: Sequence[HeardTransform]) -> Iterator[Finding]:
-    """Two values of one link at one stamp: two nodes send it."""
+    """Report links with two different values at one stamp: two nodes send them."""
     by_stamp: Dict[Tuple[str, str, int], HeardTransform] = {}
     odd: Dict[Tuple[str, str], List[HeardTransform]] = {}
     for each in transforms:

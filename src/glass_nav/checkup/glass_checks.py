@@ -94,7 +94,7 @@ def follow(grid_map: GridMap, scans: Sequence[Scan], odom_from_base: np.ndarray)
 def _found(
     matcher: ScanMatcher, field: DistanceField, scans: Sequence[Scan], odom_from_base: np.ndarray, begin: int
 ) -> Optional[Tuple[int, np.ndarray]]:
-    """Which scan from the given one on decides where the robot is, and its pose there (3,); None: none does."""
+    """The first scan from `begin` on that determines the pose, with that pose (3,); None if no scan does."""
     search = GlobalSearch(matcher, field, SearchParams())
     for index in range(begin, len(scans)):
         candidates = search.update(scans[index], odom_from_base[index])
@@ -106,7 +106,7 @@ def _found(
 def _align(
     field: DistanceField, scans: Sequence[Scan], odom_from_base: np.ndarray, poses: np.ndarray, order: range
 ) -> None:
-    """Fill in the poses (N, 3) of scans in an order that begins with a known one, until too many do not fit."""
+    """Fill in the poses (N, 3) of scans in the given order, from a known pose on, until too many do not fit."""
     pose, before, lost = poses[order[0]], odom_from_base[order[0]], 0
     for index in order[1:]:
         pose = se2.compose(pose, se2.compose(se2.inverse(before), odom_from_base[index]))
@@ -122,7 +122,7 @@ def _align(
 
 
 def _spread(odom_from_base: np.ndarray) -> np.ndarray:
-    """Indices of scans a step apart, from the first on."""
+    """Indices of scans that are at least a step of odometry apart, beginning with the first."""
     chosen = [0]
     for index in range(1, len(odom_from_base)):
         step = se2.compose(se2.inverse(odom_from_base[chosen[-1]]), odom_from_base[index])

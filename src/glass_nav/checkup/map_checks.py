@@ -117,7 +117,7 @@ def check(scans: ScansOnMap, turns_opposite: bool) -> Iterator[Finding]:
 
 
 def _best_factor(scans: ScansOnMap) -> Tuple[float, float]:
-    """The factor on the scans with which they fit best, and how well."""
+    """The scale factor with which the scans fit the map best, and how well they then fit."""
     best = _best_of(scans, np.array(_SCALES), every=4)[0]
     return _best_of(scans, best * _FINE, every=2)
 

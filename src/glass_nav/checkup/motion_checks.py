@@ -62,7 +62,7 @@ def _far_apart(count: int) -> List[Tuple[int, int]]:
 
 
 def _pairs(odom_from_laser: np.ndarray) -> List[Tuple[int, int]]:
-    """Some pairs with a turn, and some without, spread over the log."""
+    """Pairs of scans with and without a turn between them, spread over the log."""
     turning: List[Tuple[int, int]] = []
     straight: List[Tuple[int, int]] = []
     for first in range(0, len(odom_from_laser) - 1, max(1, len(odom_from_laser) // 1500)):

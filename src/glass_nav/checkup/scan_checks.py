@@ -74,7 +74,7 @@ def describe(topic: str, scans: Sequence[HeardScan]) -> str:
 
 
 def _codes(scans: Sequence[HeardScan]) -> str:
-    """How often beams did not answer, by what the driver wrote for it."""
+    """Share of beams without a return, by the value that the driver writes for them."""
     some = [scan for scan in scans[:: max(1, -(-len(scans) // MAX_SCANS))] if len(scan.ranges_m)]
     if not some:
         return "nothing"
@@ -161,7 +161,7 @@ def _limits(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
 
 
 def _repeats(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
-    """Exactly the same ranges again, which noise does not produce."""
+    """Report ranges that repeat exactly: noise never does that."""
     same = [
         bool(np.isfinite(now.ranges_m).any()) and before.ranges_m.tobytes() == now.ranges_m.tobytes()
         for before, now in zip(scans[:-1], scans[1:])
@@ -211,7 +211,7 @@ def _ranges(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
 
 
 def _piled(scans: Sequence[HeardScan]) -> Optional[float]:
-    """The range that stands for "nothing met" though it lies between the limits; None if none does."""
+    """The finite range that stands for "no return", although it is within the limits; None if there is none."""
     inside = np.concatenate(
         [
             scan.ranges_m[
@@ -231,7 +231,7 @@ def _piled(scans: Sequence[HeardScan]) -> Optional[float]:
 
 
 def _robot_in_view(topic: str, scans: Sequence[HeardScan]) -> Iterator[Finding]:
-    """Beams that end on the robot itself stay where they are while all others change."""
+    """Report beams that end on the robot itself: they stay constant while all others change."""
     width = Counter(len(scan.ranges_m) for scan in scans).most_common(1)[0][0]
     rows = np.array([scan.ranges_m for scan in scans if len(scan.ranges_m) == width], float)
     if len(rows) < _MIN_SCANS:

@@ -57,7 +57,7 @@ def _fixed_and_moving(heard: Sequence[HeardTransform]) -> bool:
 
 
 def _contradicting(heard: Sequence[HeardTransform]) -> List[str]:
-    """Names of the nodes, sorted, that send this link at the same time, and not the same."""
+    """Sorted names of the nodes that send different values of this link at the same time."""
     by_sender: Dict[str, List[HeardTransform]] = {}
     for each in heard:
         if each.sender:
@@ -75,7 +75,7 @@ def _contradicting(heard: Sequence[HeardTransform]) -> List[str]:
 
 
 def _overlap(one: Sequence[HeardTransform], other: Sequence[HeardTransform]) -> bool:
-    """Whether both send at the same time; a static transform holds for ever."""
+    """Whether both send at the same time; a static transform is valid at any time."""
     if one[0].static or other[0].static:
         return True
     begin = max(one[0].heard_ns, other[0].heard_ns)
@@ -100,7 +100,7 @@ def _differ(one: Sequence[HeardTransform], other: Sequence[HeardTransform]) -> b
 
 
 def _there_and_back(heard: Sequence[HeardTransform]) -> bool:
-    """Whether the values jump away and back again, over and over: no robot does."""
+    """Whether the values repeatedly jump away and back, which no robot can do."""
     if len(heard) < 2 * _JUMPS:
         return False
     step = np.diff(_values(heard), axis=0)

@@ -153,7 +153,7 @@ def verdict(atlas: Atlas, found: Distinguishability) -> List[str]:
 
 
 def _places(atlas: Atlas, alike: FrozenSet[int]) -> str:
-    """Nodes with the directions of the darts in question."""
+    """Text: the nodes, each with the directions of the darts in question."""
     darts = np.array(sorted(alike))
     shown = [
         f"node {atlas.darts.node[dart]} looking {np.degrees(atlas.darts.bearing_rad[dart]):.0f} deg"

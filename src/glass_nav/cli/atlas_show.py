@@ -78,7 +78,7 @@ def main(arguments: argparse.Namespace) -> None:
 
 
 def _map(atlas: Atlas, path: Optional[Path]) -> Optional[GridMap]:
-    """The map that was given, or the one of the package that has the fingerprint of the atlas' map, or none."""
+    """The given map, else the shipped map with the fingerprint that the atlas names, else None."""
     if path is not None:
         grid_map = map_file.load(path)
         try:

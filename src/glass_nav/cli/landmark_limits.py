@@ -110,7 +110,7 @@ def table(limits_m: np.ndarray, between_deg: np.ndarray, step_deg: float) -> Lis
 
 
 def _geometry(arguments: argparse.Namespace) -> Tuple[np.ndarray, np.ndarray]:
-    """Landmarks (3, 2) and the robot (2,) [m]."""
+    """Positions of the landmarks (3, 2) and of the robot (2,) [m]."""
     if arguments.ranges is not None:
         direction = np.radians([0.0, arguments.between[0], sum(arguments.between)])
         return np.array(arguments.ranges)[:, None] * np.column_stack([np.cos(direction), np.sin(direction)]), np.zeros(

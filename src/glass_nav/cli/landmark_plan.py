@@ -168,7 +168,7 @@ def _see_through(grid_map: GridMap, path: Optional[Path]) -> GridMap:
 
 
 def _line(sigma_m: np.ndarray, seen: np.ndarray) -> str:
-    """How much of the map has a position, and how good it is."""
+    """One line: the share of the map where a position can be computed, and its accuracy."""
     good, known = np.mean(sigma_m <= GOOD_M), np.isfinite(sigma_m)
     median = f", median sigma {np.median(sigma_m[known]):.2f} m" if known.any() else ""
     return (

@@ -106,7 +106,7 @@ def _replay(options: ReplayOptions, search: PaneSearch) -> None:
 
 
 def _chosen(arguments: argparse.Namespace, candidates: List[Pane]) -> List[int]:
-    """Numbers from 1 of the panes to be drawn."""
+    """Numbers, from 1, of the panes to draw."""
     keep, drop = _numbers("--keep", arguments.keep), _numbers("--drop", arguments.drop)
     for number in keep + drop:
         if number > len(candidates):

@@ -89,7 +89,7 @@ def main(arguments: argparse.Namespace) -> None:
 
 
 def _is_results(path: Path) -> bool:
-    """A ROS 2 bag is a folder as well, with another file in it."""
+    """Whether the path is a folder of results; a ROS 2 bag is a folder too, with other files."""
     return path.is_dir() and not (path / "metadata.yaml").exists()
 
 
@@ -104,7 +104,7 @@ def _options(arguments: argparse.Namespace) -> ReplayOptions:
 
 
 def _glass(folder: Path, shape: "tuple[int, ...]") -> Optional[np.ndarray]:
-    """The probability of glass of each wall cell after that run; None: not known, or of another map."""
+    """(H, W) probability of glass of each wall cell after that run; None if unknown, or of another map."""
     if not (folder / "glass_map.yaml").exists():
         return None
     glass = map_file.load(folder / "glass_map.yaml").occupancy

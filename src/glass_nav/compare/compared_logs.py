@@ -80,6 +80,6 @@ def _listed(listing: Path, number: int, item: Any) -> _Listed:
 
 
 def _names(paths: "Sequence[Tuple[Path, ...]]") -> List[str]:
-    """Names of the logs: the name of the file, or its whole path if names collide."""
+    """Names for the logs: the file name, or the whole path where file names are equal."""
     short = [each[0].name for each in paths]
     return [name if short.count(name) == 1 else str(each[0]) for name, each in zip(short, paths)]

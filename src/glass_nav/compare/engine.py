@@ -112,7 +112,7 @@ class _Ended:
 
 
 class _Process:
-    """A process of this machine; a context that ends it. It does one job after the other."""
+    """A worker process that does one job after the other; as a context manager it ends the process."""
 
     def __init__(self, work: Work) -> None:
         context = multiprocessing.get_context("spawn")
@@ -143,7 +143,7 @@ class _Process:
 
 
 def _serve(connection: "Connection", work: Work) -> None:
-    """In a process of its own: does the jobs that the connection brings."""
+    """Main function of a worker process: do the jobs that arrive on the connection."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started this one
     while True:
         try:
@@ -204,7 +204,7 @@ def _gathered(
 
 
 def _done(distributed: Any, client: Any, futures: "Set[Any]", address: str) -> "Set[Any]":
-    """Waits until one of the futures or more are done, as long as the scheduler has a worker."""
+    """Wait until at least one future is done; fail when the scheduler has no worker left."""
     while True:
         try:
             return set(distributed.wait(futures, timeout=CHECK_S, return_when="FIRST_COMPLETED").done)
@@ -254,7 +254,7 @@ class _Counter:
 
 
 def _counted(work: Work, job: Any, number: int) -> "Tuple[Any, int]":
-    """On a worker of Dask: the answer, and how many steps it took."""
+    """Run a job on a Dask worker; returns its answer and the number of its steps."""
     from distributed import get_worker
 
     worker = get_worker()

@@ -78,7 +78,7 @@ def drive(seed: int, max_scans: Optional[int] = None) -> Dict[str, Tracked]:
 
 
 def _off(tracker: _Tracker, scan: Scan, odom_from_base: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """(2,) error of the position [m] and of the heading [rad]."""
+    """Error of the position [m] and of the heading [rad], as (2,)."""
     off = tracker.update(scan, odom_from_base).map_from_base - truth
     return np.array([np.hypot(off[0], off[1]), abs(angles.wrap(off[2]))])
 

@@ -41,7 +41,7 @@ def nodes(atlas: Atlas, here_m: np.ndarray, count: int, rng: np.random.Generator
 
 
 def _nearest(atlas: Atlas, here_m: np.ndarray) -> int:
-    """The node at the end of the edge that passes nearest: the nearest node may be behind a wall."""
+    """The nearer end of the nearest edge; the node nearest to the robot may be behind a wall."""
     off_m = np.full(len(atlas.edges), np.inf)
     for edge in range(len(atlas.edges)):
         line = atlas.edges.polyline_m[edge]

@@ -144,7 +144,7 @@ class WakeUpDemo:
         return None if self._reports.search is None else self._reports.search.state
 
     def _search_again(self) -> bool:
-        """Whether there will be another search, from the meetpoint where the robot stands."""
+        """Begin another search at the present meetpoint; whether one began."""
         why_not = self._robot.restart_search()
         if why_not:
             self._robot.say(f"no new search: {why_not}")
@@ -155,7 +155,7 @@ class WakeUpDemo:
         return True
 
     def _is_right(self, found: SearchNews) -> bool:
-        """Whether the place is known, and right."""
+        """Whether the search ended with a place, and it is the true one."""
         if found.state != SearchState.CONFIRMED:
             self._robot.say(f"{found.state}: {found.reason}")
             candidates = self._reports.candidates.get(found.stamp_ns)
@@ -218,7 +218,7 @@ class WakeUpDemo:
     # -- the tour
 
     def _drive_tour(self, found: SearchNews) -> bool:
-        """Whether every node was reached."""
+        """Drive to the nodes of the tour; whether all were reached."""
         reports, robot = self._reports, self._robot
         self._confirmed_ns = found.stamp_ns
         if not self._wait(

@@ -135,7 +135,7 @@ class WiredRobot:
         return self.simulation.stamp_ns * 1e-9
 
     def _localize(self, frame: Frame) -> Scan:
-        """Pass a scan to the localization; returns the scan for the driver."""
+        """Pass a scan to the localization; returns it as the driver sees it."""
         if self._localizer is None:
             return frame.scan
         self.estimate = estimate = self._localizer.update(frame.scan, frame.odom_from_base)

@@ -56,7 +56,7 @@ IN_SEARCH = (SearchState.SEARCHING, SearchState.TENTATIVE)
 
 @dataclass
 class _Job:
-    """The task that is on, and who waits for it."""
+    """The current task and the client that waits for its result."""
 
     task: Task
     name: str  # in words
@@ -303,7 +303,7 @@ class Driver:
 
     @property
     def _arrival(self) -> Optional[Arrival]:
-        """The meetpoint where the robot stands; None: it stands at none."""
+        """The meetpoint at which the robot stands; None if it stands elsewhere."""
         return self._stay.arrival if self._edge.progress.phase == DriverPhase.ARRIVED else None
 
     def _turn_fault(self, stamp_ns: int) -> Optional[str]:
@@ -345,7 +345,7 @@ class Driver:
         self._say(job.task.phase, job.task.reason, job.name)
 
     def _step(self, job: _Job, trouble: Optional[str], dt_s: float) -> None:
-        """A command, or a halt."""
+        """The task's next command, or zero velocity while there is trouble."""
         outcome = Outcome.NO_INPUT
         if trouble is None and job.task.needs_pose:
             trouble, outcome = self._inputs.no_pose(self._now_s), Outcome.NOT_LOCALIZED
@@ -377,7 +377,7 @@ class Driver:
             self._finish(job, Ending(ending.outcome, f"{ending.reason}, for {halted_s:.0f} s"))
 
     def _finish(self, job: _Job, ending: Ending) -> None:
-        """The task is over: the robot stops, and the client gets a result."""
+        """End the task: stop the robot and send the client its result."""
         self._job = None
         arrival = job.task.arrival if isinstance(job.task, EdgeTask) else None
         if ending.outcome != Outcome.SUCCEEDED:
@@ -427,11 +427,11 @@ class Driver:
         self._stay.reported(self._now_s)
 
     def _search_is(self, *states: SearchState) -> bool:
-        """Whether there is a search that the robot drives for, in one of these states."""
+        """Whether the robot drives for a search that is in one of these states."""
         return self._rules.follow_turn_choice and self._search in states
 
     def _decide_alone(self) -> None:
-        """Decides without a task: seek a meetpoint if a search waits for it, or if the last edge led nowhere."""
+        """Choose a task without a client: seek a meetpoint if a search waits for one, or if the last edge failed."""
         waits = self._search_is(SearchState.WAITING)
         if self._stay.was_left(self._inputs.odom_from_base):
             self._edge.stop()
@@ -466,7 +466,7 @@ class Driver:
         self._decisions.append(Command(velocity))
 
     def _say(self, phase: DriverPhase, reason: str, task: str = "") -> None:
-        """The status, if it changed; while a task is on its reason may change with every step."""
+        """Set phase, reason and task, and send the status if they changed; during a task, not for a new reason alone."""
         before_phase, before_reason, before_task = self._said
         self._said = phase, reason, task
         if before_phase != phase or before_task != task or (self._job is None and before_reason != reason):

@@ -77,7 +77,7 @@ class VisitWatch:
             self._visits += self._visit(observer, node, self._near.pop(node))
 
     def _note_seen(self, observer: PassingObserver) -> None:
-        """Assigns what the observer has seen since the last scan to the nodes."""
+        """Assign the observer's meetpoints since the last scan to nodes of the atlas."""
         new = observer.passed[self._taken :]
         self._taken += len(new)
         for each in new:
@@ -91,7 +91,7 @@ class VisitWatch:
                 self._near[nodes[int(off_m.argmin())]].append(each)
 
     def _visit(self, observer: PassingObserver, node: int, seen: List[PassedNode]) -> List[NodeVisit]:
-        """None where something was seen that is not surely the node."""
+        """The visit: r is NaN if nothing was seen there; empty if what was seen is not certainly the node."""
         if not seen:
             return [NodeVisit(node, math.nan)]
         degree = int(self._atlas.degree[node])

@@ -118,7 +118,7 @@ class PlaceTasks:
             raise ValueError(self._map_fault)
 
     def _target(self, goal: PlaceGoal, yaw_rad: Optional[float], map_from_base: Optional[np.ndarray]) -> np.ndarray:
-        """(3,) for the backend, which needs a heading in any case."""
+        """(3,) goal pose; without a heading of its own it gets the robot's present one."""
         if goal.node < 0 and goal.pose is not None:
             return goal.pose
         assert self._atlas is not None  # a goal by node was refused without one

@@ -113,7 +113,7 @@ class RoutePlanner:
     def _way(
         self, start: _Joint, end: Optional[_Joint], node: int, avoided: Collection[int]
     ) -> "Tuple[Optional[List[int]], List[np.ndarray]]":
-        """Darts and their points from a joint to another one or to a node; None: there is none."""
+        """Darts and points from a joint to another joint or to a node; None if they are not connected."""
         from scipy.sparse import csgraph, csr_matrix  # slow to import
 
         count = len(self.atlas.nodes)
@@ -159,7 +159,7 @@ class RoutePlanner:
         ]
 
     def _is_passable(self, edge: int, avoided: Collection[int]) -> bool:
-        """Wide enough; one that ends in a corner is, up to there. Clearance 0 is not known."""
+        """Whether the edge is wide enough; clearance 0 means unknown. An edge into a dead end counts as passable."""
         if edge in avoided:
             return False
         clearance_m = float(self.atlas.edges.clearance_m[edge])
@@ -187,7 +187,7 @@ class RoutePlanner:
         )
 
     def _without_narrow_end(self, points_m: np.ndarray) -> np.ndarray:
-        """(n, 2) the path (M, 2) up to where the robot stands free for the last time."""
+        """(n, 2) the path (M, 2) up to the last point at which the robot fits."""
         if self._room_m is None or len(points_m) < 2:
             return points_m
         line = Polyline(points_m)
@@ -204,7 +204,7 @@ class RoutePlanner:
         return np.where(inside, self._room_m[np.where(inside, rows, 0), np.where(inside, columns, 0)], 0.0)
 
     def _is_open(self, from_m: np.ndarray, to_m: np.ndarray) -> bool:
-        """A robot fits along the straight line; near its start it need not, for there it stands already."""
+        """Whether the robot fits along the straight line; not checked near its start, where the robot already stands."""
         if self._grid_map is None or self._room_m is None:
             return True
         steps = max(int(math.ceil(float(np.hypot(*(to_m - from_m))) / STEP_M)), 1)
@@ -233,7 +233,7 @@ def _room(grid_map: GridMap) -> np.ndarray:
 
 
 def _joined(points_m: np.ndarray) -> np.ndarray:
-    """(n, 2) points (M, 2) without those that are next to the one before; the last one stays."""
+    """(n, 2) points (M, 2) without repeated neighbours; the last point is kept."""
     kept = polyline.distinct(points_m, JOINED_M)
     kept[-1] = points_m[-1]
     return kept

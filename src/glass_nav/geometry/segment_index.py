@@ -115,7 +115,7 @@ class SegmentIndex:
         self._first = np.searchsorted(place[order], np.arange(int(self._shape.prod()) + 1))
 
     def _first_candidates(self, corner: np.ndarray, edge: float) -> Tuple[np.ndarray, np.ndarray]:
-        """Pairs (K,), (K,) of a square and a segment that may be the nearest to a point in it."""
+        """Pairs of a square (K,) and a segment (K,) that may be nearest to some point of the square."""
         each = max(1, _MAX_PAIRS // len(self.segments))
         of, candidate = [], []
         for begin in range(0, len(corner), each):
@@ -155,7 +155,7 @@ def nearest_of_all(points: np.ndarray, segments: np.ndarray) -> Tuple[np.ndarray
 
 
 def _squared(points: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """(...) squared distance of points (..., 2) from segments, rows (..., 5) of start, direction and length."""
+    """(...) squared distance of points (..., 2) from segments; rows (..., 5): start, direction, length."""
     x, y = points[..., 0] - rows[..., 0], points[..., 1] - rows[..., 1]
     along = x * rows[..., 2] + y * rows[..., 3]
     across = y * rows[..., 2] - x * rows[..., 3]

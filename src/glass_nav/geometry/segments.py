@@ -89,7 +89,7 @@ def weighted_fit(points: np.ndarray, variance: np.ndarray) -> Tuple[np.ndarray, 
 
 
 def _line(points: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """A point (2,) and the direction (2,) of the line through points, from the first to the last."""
+    """Line through the points: a point (2,) on it, and its direction (2,) from the first to the last."""
     centre = points.mean(axis=0)
     x, y = (points - centre).T
     angle = 0.5 * np.arctan2(2.0 * (x @ y), x @ x - y @ y)
@@ -104,7 +104,7 @@ def _away_from_line(points: np.ndarray) -> np.ndarray:
 
 
 def _away_from_chord(points: np.ndarray) -> np.ndarray:
-    """(N,) distance of points from the segment between the first and the last of them."""
+    """(N,) distances of the points from the segment between the first and the last."""
     chord = points[-1] - points[0]
     offset = points - points[0]
     length_squared = float(chord @ chord)

@@ -2,7 +2,7 @@
 
 The first scan is matched against every pose of the map. The poses where it fits move with odometry, are registered to
 later scans, and gather evidence from the walls seen, each piece of wall once (new_walls.py): a piece supports the
-pose if the map explains it, glass included, and contradicts it otherwise. From time to time a scan is matched
+pose if the map explains it, glass included, and opposes it otherwise. From time to time a scan is matched
 everywhere again, because the true pose may have been missed. A new pose is traced back to the earlier scans, so that
 all poses are judged by the same evidence.
 
@@ -13,6 +13,9 @@ explains. The tenth and not the second, because places that look alike are no ev
 piece is bounded, since the pieces of one moved object are wrong together. A pose whose path crosses walls loses, too
 (driven_path.py).
 
+Between two poses of the map, what one of them contradicts says more: the beam went through furniture, or ended far
+from all walls (scan_explanation.py). A near miss says less, since the map is drawn to a few cells.
+
 The formulation is ours; the document (seed document global_localization_procedure.txt) has no scans. Multi-hypothesis
 tracking: Jensfelt, Kristensen, Active global localization for a mobile robot using multiple hypothesis tracking
 (2001). K poses, B beams, V views (scans that showed new walls).
@@ -21,9 +24,10 @@ tracking: Jensfelt, Kristensen, Active global localization for a mobile robot us
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import List, Optional, Protocol, Tuple
+from typing import List, NamedTuple, Optional, Protocol, Tuple
 
 import numpy as np
+from scipy import special
 
 from glass_nav.geometry import se2
 from glass_nav.hypotheses import new_walls, pose_tracker
@@ -32,6 +36,12 @@ from glass_nav.hypotheses.new_walls import NewWalls
 from glass_nav.hypotheses.scan_explanation import BeamsExplained
 from glass_nav.sensing.scan import Scan
 
+_NEAR_MISS = 0.5  # of the evidence of a piece that is given back between two poses: the map is drawn to a few cells
+_THING, _UNCHANGED = (
+    2.0,
+    9.0,
+)  # pieces of one thing that was moved; things that were not, for one that was, by the prior
+_TYPICAL = 100.0  # pieces seen by the time that a robot has come to where places differ
 _NATS = 0.5  # of a piece of wall that the map explains, to one that it does not; see above
 _CHANCE, _MAX_CHANCE = 0.7, 0.9  # share that is explained elsewhere: at least, at most
 _UNCHOSEN = 0.05  # less is explained by chance in a scan that did not choose the pose
@@ -105,13 +115,16 @@ class Evidence:
     checked_nats: np.ndarray  # (K,) the part of them by scans that did not choose the pose
     explained: np.ndarray  # (K,) pieces of wall that the map explains
     seen: np.ndarray  # (K,) pieces of wall that it should
+    missed: np.ndarray  # (K,) pieces of wall that it neither explains nor contradicts: near misses
+    contradicted: np.ndarray  # (K,) pieces of wall that it contradicts
     other_nats: np.ndarray  # (K,) log likelihood ratios by what is not a scan
     label: np.ndarray  # (K,) int, given by the caller; NEW: not weighted yet
 
     @classmethod
     def none(cls, count: int) -> Evidence:
         nothing = np.zeros(count)
-        return cls(nothing, nothing, nothing, nothing, nothing, np.full(count, NEW, np.int64))
+        label = np.full(count, NEW, np.int64)
+        return cls(nothing, nothing, nothing, nothing, nothing, nothing, nothing, label)
 
     def __getitem__(self, chosen: np.ndarray) -> Evidence:
         return Evidence(*(values[chosen] for values in vars(self).values()))
@@ -120,13 +133,15 @@ class Evidence:
         """The evidence for these poses and for more of them."""
         return Evidence(*map(np.concatenate, zip(vars(self).values(), vars(more).values())))
 
-    def with_view(self, nats: np.ndarray, explained: np.ndarray, seen: np.ndarray) -> Evidence:
+    def with_view(self, view: OfView) -> Evidence:
         return replace(
             self,
-            nats=self.nats + nats,
-            checked_nats=self.checked_nats + nats,
-            explained=self.explained + explained,
-            seen=self.seen + seen,
+            nats=self.nats + view.nats,
+            checked_nats=self.checked_nats + view.nats,
+            explained=self.explained + view.explained,
+            seen=self.seen + view.seen,
+            missed=self.missed + view.missed,
+            contradicted=self.contradicted + view.contradicted,
         )
 
     def with_path(self, blocked: np.ndarray) -> Evidence:
@@ -140,9 +155,27 @@ class Evidence:
         return self.nats + self.other_nats
 
     @property
+    def between_nats(self) -> np.ndarray:
+        """(K,) log likelihood ratios of the poses to each other, to be added to those to elsewhere.
+
+        What the map contradicts tells more than a near miss.
+        """
+        return _NEAR_MISS * _NATS * self.missed + _surprise(self.contradicted, self.seen)
+
+    @property
     def share(self) -> np.ndarray:
         """(K,) of the walls seen that the map explains; NaN: nothing was seen that it knows."""
         return np.where(self.seen > 0.0, self.explained / np.where(self.seen > 0.0, self.seen, 1.0), np.nan)
+
+
+class OfView(NamedTuple):
+    """What one view says of K poses; as of Evidence."""
+
+    nats: np.ndarray
+    explained: np.ndarray
+    seen: np.ndarray
+    missed: np.ndarray
+    contradicted: np.ndarray
 
 
 class PoseBelief:
@@ -242,7 +275,7 @@ class PoseBelief:
         self._tracker.poses = beams.poses
         if view is not None:
             self._views.append(view)
-            self.evidence = self.evidence.with_view(*_of_view(beams, view))
+            self.evidence = self.evidence.with_view(_of_view(beams, view))
         self._judge_path()
         self._keep_distinct()
         hopeless = self.evidence.total.max(initial=-np.inf) < _HOPELESS
@@ -269,13 +302,14 @@ class PoseBelief:
         total = self.evidence.total
         likely = total >= total.max() - _BY_SCANS
         pieces = _counted(beams, new, likely)
-        at = np.flatnonzero(_disputed(beams, likely))
+        disputed_m = _disputed(beams, likely)
+        at = np.flatnonzero(~np.isnan(disputed_m[:, 0]))
         disputed = np.zeros(len(pieces))
-        disputed[at] = self._disputed.of(beams.ends_m[at], self._odom_from_base, self.driven_m)
+        disputed[at] = self._disputed.of(disputed_m[at], self._odom_from_base, self.driven_m)
         if pieces.sum() < _MIN_NEW and disputed.sum() < _MIN_DISPUTED:
             return None
         self._walls.add(beams.ends_m, self._odom_from_base, self.driven_m)
-        self._disputed.add(beams.ends_m[at], self._odom_from_base, self.driven_m)
+        self._disputed.add(disputed_m[at], self._odom_from_base, self.driven_m)
         pieces = np.maximum(pieces, disputed)
         by_chance = _tenth(beams.poses, _share(beams, pieces))
         if by_chance is not None:
@@ -309,7 +343,7 @@ class PoseBelief:
             view = _View(search.scan, search.odom_from_base, search.driven_m, new, chosen_by_chance)
             self._views.append(view)
             self._judged_at, self._judged_m = search.odom_from_base, search.driven_m
-            evidence = Evidence.none(len(now)).with_view(*(each[order] for each in _of_view(found, view)))
+            evidence = Evidence.none(len(now)).with_view(OfView(*(each[order] for each in _of_view(found, view))))
             self._append(now, replace(evidence, checked_nats=np.zeros(len(now))))
             self._keep_distinct()
             return
@@ -334,10 +368,10 @@ class PoseBelief:
             beams = self._scans.beams(view.scan, back[kept], off_m, _OFF_RAD)
             assert beams is not None
             back[kept] = beams.poses
-            of_view = [np.zeros(len(poses)) for _ in range(3)]
+            of_view = OfView(*(np.zeros(len(poses)) for _ in OfView._fields))
             for whole, part in zip(of_view, _of_view(beams, view)):
                 whole[kept] = part
-            evidence = evidence.with_view(*of_view)
+            evidence = evidence.with_view(of_view)
             possible -= view.most
             first = int(view.driven_m / PIECE_M)
             blocked = np.zeros(len(poses))
@@ -386,11 +420,11 @@ class _SearchedScan:
         self._left = self._left[_AT_ONCE:]
         if len(self._left):
             return None
-        poses, explained, known, contradicted = (
+        poses, explained, known, contradicted_at = (
             np.concatenate([getattr(part, name) for part in self._judged])
-            for name in ("poses", "explained", "known", "contradicted")
+            for name in ("poses", "explained", "known", "contradicted_at")
         )
-        return BeamsExplained(poses, beams.ends_m, explained, known, contradicted)
+        return BeamsExplained(poses, beams.ends_m, explained, known, contradicted_at)
 
 
 def expected_nats(scans: MapScans, map_from_base: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -402,14 +436,37 @@ def expected_nats(scans: MapScans, map_from_base: np.ndarray, others: np.ndarray
     if beams is None:
         return np.zeros(len(others))
     pieces = new_walls.pieces(beams.ends_m)
-    unexplained = (beams.known & ~beams.explained) @ pieces
-    return _NATS * np.maximum(unexplained[1:] - unexplained[0], 0.0)
+    missed = (beams.known & ~beams.explained & ~beams.contradicted) @ pieces
+    contradicted = np.array([_pieces_at(beams, at) for at in beams.contradicted_at])
+    nats = -_NATS * ((1.0 - _NEAR_MISS) * missed + contradicted) + _surprise(
+        contradicted, np.full(len(missed), _TYPICAL)
+    )
+    return np.maximum(nats[0] - nats[1:], 0.0)
 
 
-def _of_view(beams: BeamsExplained, view: _View) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(K,) each: evidence, pieces of wall explained, pieces seen."""
+def _pieces_at(beams: BeamsExplained, at: np.ndarray) -> float:
+    """Pieces of wall that the beams show at these shares (B,) of their lengths; NaN: nothing."""
+    shown = ~np.isnan(at)
+    return float(new_walls.pieces(beams.ends_m[shown] * at[shown, None]).sum())
+
+
+def _surprise(contradicted: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """(K,) log likelihood that the map contradicts so many (K,) of the pieces seen (K,), to that of none.
+
+    It depends on how often that happens: where nothing was moved one cupboard in the wrong place says much, where many
+    things were moved it says little. The rate is unknown, but has a prior; the likelihood is integrated over all rates.
+    """
+    things, all_things = contradicted / _THING, seen / _THING
+    rates = special.betaln(1.0 + things, _UNCHANGED + np.maximum(all_things - things, 0.0))
+    return rates - special.betaln(1.0, _UNCHANGED + all_things)
+
+
+def _of_view(beams: BeamsExplained, view: _View) -> OfView:
+    """What a view says of the poses of its beams."""
     seen, explained = beams.known @ view.pieces, beams.explained @ view.pieces
-    return _NATS * (explained - view.chance * seen), explained, seen
+    nats = _NATS * (explained - view.chance * seen)
+    missed = beams.known & ~beams.explained & ~beams.contradicted
+    return OfView(nats, explained, seen, missed @ view.pieces, beams.contradicted @ view.pieces)
 
 
 def _counted(beams: BeamsExplained, new: np.ndarray, likely: np.ndarray) -> np.ndarray:
@@ -425,15 +482,16 @@ def _counted(beams: BeamsExplained, new: np.ndarray, likely: np.ndarray) -> np.n
 
 
 def _disputed(beams: BeamsExplained, likely: np.ndarray) -> np.ndarray:
-    """(B,) bool: beams that the map explains from one of the likely poses ((K,) bool) and contradicts from another, if they are
-    few.
+    """(B, 2) in the robot's frame, where likely poses ((K,) bool) disagree about a beam, if they are few: the map explains it
+    from one of them and contradicts it there from another. NaN: they do not disagree.
 
     What tells copies of a room apart is a piece of furniture beside walls that were seen through the door long before.
     """
     if not 1 < np.count_nonzero(likely) <= _FEW:
-        return np.zeros(len(beams.ends_m), bool)
-    explained = beams.explained[likely]
-    return explained.any(axis=0) & beams.contradicted[likely].any(axis=0)
+        return np.full(beams.ends_m.shape, np.nan)
+    nearest = np.fmin.reduce(beams.contradicted_at[likely], axis=0)
+    explained = beams.explained[likely].any(axis=0)
+    return beams.ends_m * np.where(explained, nearest, np.nan)[:, None]
 
 
 def _share(beams: BeamsExplained, pieces: np.ndarray) -> np.ndarray:
@@ -449,5 +507,6 @@ def _tenth(poses: np.ndarray, share: np.ndarray) -> Optional[float]:
     for _ in range(_CHANCE_RANK - 1):
         if not len(order):
             return None
-        order = order[np.hypot(*(poses[order, :2] - poses[order[0], :2]).T) > _APART_M]
+        off_m = poses[order, :2] - poses[order[0], :2]
+        order = order[np.hypot(off_m[:, 0], off_m[:, 1]) > _APART_M]
     return float(share[order[0]]) if len(order) else None

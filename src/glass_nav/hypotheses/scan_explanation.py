@@ -21,7 +21,7 @@ from glass_nav.hypotheses.place_search import PlaceSearch
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.known_area import KnownArea
-from glass_nav.sensing.raycast import RayCaster
+from glass_nav.sensing.raycast import RayCaster, SurfaceHits
 from glass_nav.sensing.scan import Scan
 from glass_nav.world.grid_map import GridMap
 
@@ -29,6 +29,10 @@ _BEAMS = 120  # of a scan that are used
 _NEAR_CELLS = 3.0  # a beam that ends this close to an expected range is explained
 _MAX_THICK_M = 0.3  # a thicker wall is no glass
 _FAR_M = 0.3  # from a wall: not where it was drawn a little otherwise
+_TURNED = 0.01  # rad by which a pose may be off
+_DEEP_M = 0.08  # in a thing: not where its outline was drawn a cell off
+_THING_M = 1.5  # depth of furniture, at most
+_INSIDE_M = 0.25  # behind the face of a thing, where only its outline is drawn: the rest of it is unknown
 _BACK_M = 0.5  # from the back of a wall, which was not seen, to the face that was
 _SLIDES_M, _SLIDES_RAD = 0.5, np.radians(15.0)  # a pose that would slide further stays where it was given
 _AT_ONCE = 64  # poses
@@ -45,7 +49,12 @@ class BeamsExplained:
     ends_m: np.ndarray  # (B, 2) of the beams, in the robot's frame
     explained: np.ndarray  # (P, B) bool: the map explains the beam
     known: np.ndarray  # (P, B) bool: the beam is evidence; it did not end where the map knows nothing
-    contradicted: np.ndarray  # (P, B) bool: it is evidence, and ended far from all that the map has
+    contradicted_at: np.ndarray  # (P, B) where along it the map contradicts it, 1: at its end; NaN: it does not
+
+    @property
+    def contradicted(self) -> np.ndarray:
+        """(P, B) bool: the beam is evidence, and went through a wall of the map or ended far from all walls."""
+        return ~np.isnan(self.contradicted_at)
 
 
 class ScanExplanation:
@@ -104,15 +113,16 @@ class ScanExplanation:
             return None
         points = scan.points_in_base()[used]
         poses = [np.zeros((0, 3))]
-        explained, known, contradicted = ([np.zeros((0, len(used)), bool)] for _ in range(3))
+        explained, known = ([np.zeros((0, len(used)), bool)] for _ in range(2))
+        contradicted_at = [np.zeros((0, len(used)))]
         for first in range(0, len(map_from_base), _AT_ONCE):
             slid = self._slid(points, map_from_base[first : first + _AT_ONCE], most_m, most_rad)
             poses.append(slid)
             of_pose = self._explained(scan, used, points, slid)
             explained.append(of_pose[0])
             known.append(of_pose[1])
-            contradicted.append(of_pose[2])
-        return BeamsExplained(np.concatenate(poses), points, *map(np.concatenate, (explained, known, contradicted)))
+            contradicted_at.append(of_pose[2])
+        return BeamsExplained(np.concatenate(poses), points, *map(np.concatenate, (explained, known, contradicted_at)))
 
     def search(self, scan: Scan, odom_from_base: np.ndarray) -> Optional[PlaceSearch]:
         """A search of the whole map for poses from which the scan may have been taken; None if hardly any beam
@@ -144,7 +154,7 @@ class ScanExplanation:
     def _explained(
         self, scan: Scan, beams: np.ndarray, points_m: np.ndarray, poses: np.ndarray
     ) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(P, B) bool: explained; known; contradicted."""
+        """(P, B) each: explained, bool; known, bool; where along the beam it is contradicted, NaN where it is not."""
         hits = self._caster.cast_surfaces(
             se2.compose(poses, scan.base_from_laser),
             scan.angles_rad[beams],
@@ -153,17 +163,53 @@ class ScanExplanation:
         )
         measured = scan.ranges_m[beams]
         offered = np.stack([hits.first_m, hits.second_m, hits.third_m, hits.mirrored_m])  # (4, P, B)
-        explained = (np.abs(offered - measured) <= self._near_m).any(axis=0)
         stopped = (hits.first_m < measured) & (hits.first_thickness_m > _MAX_THICK_M)  # it went through no glass
         ends = se2.transform_points(poses[:, None], points_m)
+        through = _beside_another(self._crossed(poses, scan, ends, hits, stopped))
+        explained = (np.abs(offered - measured) <= self._near_m).any(axis=0)
         ahead_m = offered[:3] - measured
         near = np.abs(ahead_m) < _BACK_M
         back = (near & (ahead_m > 0.0)).any(axis=0) & ~(near & (ahead_m <= 0.0)).any(axis=0)
         back &= self._known_area.is_unmapped(ends)
         unseen = (hits.first_m > measured) & self._known_area.is_beside_unmapped(ends)
         known = explained | stopped | (self._known_area.contains(ends) & ~back & ~unseen)
-        far = self._field.distance(ends[..., 0], ends[..., 1]) > _FAR_M
-        return explained, known, known & ~explained & far
+        far = known & ~explained & (self._field.distance(ends[..., 0], ends[..., 1]) > _FAR_M + _TURNED * measured)
+        at = np.where(_beside_another(far), 1.0, np.nan)
+        return explained, known, np.where(through & known, hits.first_m / measured, at)
+
+    def _crossed(
+        self,
+        poses: np.ndarray,
+        scan: Scan,
+        ends_m: np.ndarray,
+        hits: SurfaceHits,
+        stopped: np.ndarray,
+    ) -> np.ndarray:
+        """(P, B) bool: beams that went into something solid, and ended where the map knows something.
+
+        Behind a pane there is free space, or a yard that the mapper did not see. Of a cupboard only the outline is
+        drawn, and the inside is unknown. A beam that grazes a wall, or cuts a corner, is never far from the outline.
+        """
+        origin_m = se2.transform_points(poses, scan.base_from_laser[:2])[:, None]
+        measured_m = np.hypot(*np.moveaxis(ends_m - origin_m, -1, 0))
+        in_wall_m = np.minimum(hits.second_m, measured_m) - hits.first_m
+        crossed = (hits.first_m < measured_m - _FAR_M - _INSIDE_M) & (in_wall_m < _THING_M)
+        pose, beam = np.nonzero(crossed)
+        first_m = hits.first_m[pose, beam]
+        along = (ends_m - origin_m)[pose, beam] / measured_m[pose, beam, None]
+        inside = origin_m[pose, 0] + (first_m + _INSIDE_M)[:, None] * along
+        solid = stopped[pose, beam] | self._known_area.is_unmapped(inside)
+        deep = self._field.distance(inside[:, 0], inside[:, 1]) > _DEEP_M + _TURNED * first_m
+        crossed[pose, beam] = solid & deep
+        return crossed & self._known_area.contains(ends_m)
+
+
+def _beside_another(beams: np.ndarray) -> np.ndarray:
+    """(P, B) bool: those beams that have a neighbour among them; one alone may have just missed a corner."""
+    beside = np.zeros_like(beams)
+    beside[:, 1:] |= beams[:, :-1]
+    beside[:, :-1] |= beams[:, 1:]
+    return beams & beside
 
 
 def _used_beams(scan: Scan) -> Optional[np.ndarray]:

@@ -115,5 +115,5 @@ def pose_from_mrpt(pose: Any) -> np.ndarray:
 
 
 def _value(member: Any) -> float:
-    """The value of a coordinate: a method in MRPT 2, a property later."""
+    """Value of a coordinate: a method in MRPT 2, a property in later versions."""
     return float(member() if callable(member) else member)

@@ -119,8 +119,11 @@ class SeenBeams:
 
     def report(self, trusted: bool) -> BeamReport:
         """Report on the beams; `trusted`: whether the pose is."""
-        surfaces = self._classifier.surfaces(self._scan, self._cases, self._expected, trusted)
-        return BeamReport(self._cases, surfaces, self.evidence.inlier_ratio)
+
+        def cut() -> SurfaceScan:
+            return self._classifier.surfaces(self._scan, self._cases, self._expected, trusted)
+
+        return BeamReport(self._cases, self.evidence.inlier_ratio, cut)
 
 
 class Localizer:
@@ -184,10 +187,10 @@ class Localizer:
         self._classifier.reconfigure(params.classifier)
         self._panes.reconfigure(params.pane_use)
         self._filter.reconfigure(params.particle_filter)
-        self._quality.limit_by(params.quality)
-        self._kidnap_detector.decide_by(params.search)
+        self._quality.reconfigure(params.quality)
+        self._kidnap_detector.reconfigure(params.search)
         if self._search is not None:
-            self._search.decide_by(params.search)
+            self._search.reconfigure(params.search)
         self._params = params
 
     @property

@@ -218,7 +218,7 @@ def _other_shares() -> np.ndarray:
 
 
 def _flat_shares(shares: "Tuple[float, ...]") -> np.ndarray:
-    """(H, _BINS) the same from everywhere, but for what leaks by the edges."""
+    """(H, _BINS) the same from all directions, except for beams that leak past the edges."""
     leaks = [np.tile(np.where(_MIDDLE_RAD > _OBLIQUE_RAD, leak, 1.0), 2) for leak in _LEAKS]
     return np.clip(np.array([share * leak for share in shares for leak in leaks]), 0.01, 0.99)
 

@@ -89,7 +89,7 @@ class PaneFinderParams:
 
 @dataclass(frozen=True)
 class _Stretch:
-    """A part of a line."""
+    """A section of a line."""
 
     ends_m: Tuple[float, float]  # along the line, from its centre
     own: np.ndarray  # (K,) pieces of it that are neither mapped nor posts
@@ -194,7 +194,7 @@ class PaneFinder:
         return points_m[chosen], beam_rad[chosen], np.maximum(width_m[one_each], _THIN_M), excess
 
     def _excess(self, scan: Scan, mapped_m: np.ndarray) -> np.ndarray:
-        """(B,) how intensities differ from those of walls, see WallIntensity, which learns from the scan; NaN: not known."""
+        """(B,) intensities in excess of walls' (NaN: unknown), by WallIntensity, which learns from the scan."""
         if scan.intensities is None:
             return np.full(len(scan), np.nan)
         walls = self._walls.setdefault(scan.lidar, WallIntensity())
@@ -283,13 +283,13 @@ class PaneFinder:
         return replace(pane, probability=_probability(log_odds))
 
     def _is_held(self, line: Line, end_m: float, sign: float) -> bool:
-        """Whether the line goes on from this end to something mapped: a wall, a post, more of the pane."""
+        """Whether a mapped surface (wall, post, other pane) continues the line at this end."""
         reach_m = self._p.pane_to_wall_m + self._p.pane_near_wall_m
         along_m = end_m + sign * np.arange(0.0, reach_m + _THIN_M, _THIN_M)
         return bool(self._mapped.is_speck(line.centre_m + along_m[:, None] * line.along).any())
 
     def _to_wall(self, line: Line, end_m: float, sign: float) -> float:
-        """The end of the pane along the line: the mapped wall near its end, if there is one."""
+        """The end of the pane, extended along the line to the mapped wall near it, if there is one."""
         reach_m = self._p.pane_to_wall_m + self._p.pane_near_wall_m
         step_m = 0.5 * self._mapped.resolution_m
         along_m = end_m + sign * np.arange(0.0, reach_m + step_m, step_m)
@@ -297,7 +297,7 @@ class PaneFinder:
         return float(along_m[met[0]]) if len(met) else end_m
 
     def _judged_again(self, pane: Pane) -> Pane:
-        """A pane from before that was not traced now: what beams say of it since."""
+        """Update a known pane that was not traced this time, by the beams since."""
         count = max(int(pane.length_m / PIECE_M), 1)
         middle_m = pane.start_m + (np.arange(count) + 0.5)[:, None] / count * pane.length_m * pane.direction
         normal = np.array([-pane.direction[1], pane.direction[0]])
@@ -309,14 +309,14 @@ class PaneFinder:
         return replace(pane, probability=_probability(min(log_odds, _log_odds(pane.probability))))
 
     def _prior(self, before: float) -> float:
-        """Log odds before any beam is looked up, of a pane that had this probability before; 0: it is new."""
+        """Log odds before any beams are counted, from the pane's earlier probability; 0 for a new pane."""
         known = np.clip(_log_odds(before), -_KNOWN_LOG_ODDS, _KNOWN_LOG_ODDS)
         return max(_log_odds(self._p.pane_prior), float(known))
 
 
 @dataclass(frozen=True)
 class _Box:
-    """A part of the map, along its axes."""
+    """An axis-parallel box in the map."""
 
     low_m: np.ndarray  # (2,)
     high_m: np.ndarray  # (2,)
@@ -356,12 +356,12 @@ def _may_be_normal(beam: np.ndarray, points_m: np.ndarray, beam_rad: np.ndarray)
 
 
 def _is_one_of(pane: Pane, others: Sequence[Pane]) -> bool:
-    """Whether its middle lies on one of the others, which runs the same way."""
+    """Whether the middle of the pane lies on another one of the same direction."""
     return bool(_lie_on([pane], others)[0])
 
 
 def _lie_on(panes: Sequence[Pane], others: Sequence[Pane]) -> np.ndarray:
-    """(P,) bool: whether the middle of each pane lies on one of the O others, which runs the same way."""
+    """(P,) bool: whether the middle of each pane lies on one of the O others, of the same direction."""
     (start_m, end_m), (other_m, other_end_m) = _ends(panes), _ends(others)
     length_m, other_length_m = np.hypot(*(end_m - start_m).T), np.hypot(*(other_end_m - other_m).T)
     along, other_along = (end_m - start_m) / length_m[:, None], (other_end_m - other_m) / other_length_m[:, None]

@@ -95,7 +95,7 @@ def traced(returns: Returns, least_votes_m: float, least_scans: int) -> Iterator
 
 @dataclass(frozen=True)
 class _Ballots:
-    """K bins of lines, and who voted for which."""
+    """Votes of the returns for K bins of lines."""
 
     votes_m: np.ndarray  # (K,)
     direction_rad: np.ndarray  # (K,) of the lines of a bin
@@ -169,7 +169,7 @@ def _on(line: Line, returns: Returns) -> np.ndarray:
 
 
 def _is_within(incidence_rad: float, beam_rad: np.ndarray, direction_rad: float) -> np.ndarray:
-    """(N,) bool: beams that are nearer than an angle to the normal of a line."""
+    """(N,) bool: beams within an angle of the normal of a line."""
     within: np.ndarray = np.abs(np.cos(beam_rad - direction_rad)) < np.sin(incidence_rad)
     return within
 

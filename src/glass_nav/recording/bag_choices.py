@@ -139,7 +139,7 @@ def _frame_tree(bag: Bag) -> FrameTree:
 
 
 def _odometry(bag: Bag, tree: FrameTree, options: LogOptions, notes: List[str]) -> OdometrySource:
-    """From tf, unless wheels or a topic are requested, or tf has no odometry."""
+    """Odometry from tf, unless wheels or a topic were requested or tf has none."""
     if options.wheels.wheel_topics:
         notes.append(f"odometry from the counts of {' and '.join(options.wheels.wheel_topics)}")
         return OdometrySource(trajectory=bag_wheels.trajectory(bag, options.wheels, options.wheel_base_m))
@@ -181,7 +181,7 @@ def _base_frame(tree: FrameTree, odometry: OdometrySource, options: LogOptions) 
 
 
 def _check_laser(bag: Bag, scan_topic: str, tree: FrameTree, base_frame: str, options: LogOptions) -> None:
-    """Reject at once a bag that does not say where the laser is: every scan would be rejected."""
+    """Refuse a bag that does not say where the laser is: all of its scans would be rejected."""
     if options.laser_pose is not None:
         return
     for _, message in bag.messages(scan_topic):

@@ -202,7 +202,7 @@ def _rosbag2_folder(path: Path) -> Path:
 
 
 def _why_unreadable(paths: Sequence[Path], err: Exception) -> str:
-    """Which of the bags it is, and why."""
+    """Which of the bags cannot be read, and why."""
     for path in paths if len(paths) > 1 else ():
         try:
             with Bag([path]):

@@ -47,7 +47,7 @@ def open_log(paths: Sequence[Path], options: LogOptions) -> Recording:
 
 
 class _Entries:
-    """Iterates the scans of a bag, opening it anew each time."""
+    """Iterates over the scans of a bag, which is opened anew each time."""
 
     def __init__(self, paths: Sequence[Path], choices: BagChoices, options: LogOptions) -> None:
         self._paths, self._scan_topic, self._options = paths, choices.scan_topic, options

@@ -87,7 +87,7 @@ class FrameTree:
 
 
 class _Link:
-    """All transforms of one child to its parent."""
+    """All transforms of one frame to its parent."""
 
     def __init__(self, parent: str) -> None:
         self.parent = parent

@@ -63,7 +63,7 @@ def open_log(path: Path, options: LogOptions) -> Recording:
 
 
 def _scans(path: Path, log: Rawlog, options: LogOptions, holds: str, notes: List[str]) -> np.ndarray:
-    """Indices of the scans of the sensor asked for; a sensor's label stands in for a topic."""
+    """Indices of the scans of the requested sensor; a sensor's label takes the place of a topic."""
     if not len(log["stamps_ns"]):
         raise RecordingError(f"{path}: holds no CObservation2DRangeScan; it holds {holds}")
     labels = np.array(log["labels"])
@@ -101,7 +101,7 @@ def _ground_truth(path: Path, options: LogOptions, stamps_ns: np.ndarray, notes:
 
 
 class _RecordTransforms(Transforms):
-    """Of one scan: MRPT keeps the sensor's pose in each record, and odometry beside it or between the records."""
+    """Transforms of one scan; a rawlog has the sensor's pose in each record, odometry beside or between the records."""
 
     def __init__(
         self,
@@ -132,7 +132,7 @@ class _RecordTransforms(Transforms):
 
 
 class _Entries:
-    """Iterates the scans of a rawlog that is in memory already."""
+    """Iterates over the scans of a rawlog in memory."""
 
     def __init__(
         self,

@@ -71,7 +71,7 @@ def _numbers(path: Path, message: Dict[str, Any]) -> Dict[str, float]:
 
 
 def _number(path: Path, what: str, value: Any) -> float:
-    """rostopic writes nan and inf, which yaml reads as words."""
+    """A number, including nan and inf as rostopic writes them, which yaml reads as words."""
     try:
         if not isinstance(value, bool):
             return float(value)

@@ -98,7 +98,7 @@ def _numbers(path: Path, number: int, words: List[str]) -> List[float]:
 
 
 def _nanoseconds(path: Path, number: int, word: str) -> int:
-    """Seconds as text to nanoseconds, without a float in between: 2**53 ns are 104 days."""
+    """Nanoseconds of a decimal number of seconds, exactly: a float has too few digits after 104 days (2**53 ns)."""
     whole, _, rest = word.partition(".")
     if whole.lstrip("-").isdigit() and (rest.isdigit() or not rest):
         sign = -1 if whole.startswith("-") else 1

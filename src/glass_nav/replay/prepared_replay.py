@@ -81,7 +81,7 @@ def open_recording(options: ReplayOptions, settings: ReplayParams) -> Recording:
 
 
 def _source(given: LogOptions, settings: ReplayParams) -> LogOptions:
-    """The options first, then a frame that the parameters name and that is not just the default."""
+    """Options of the source: as given, else a frame that the parameters name explicitly."""
     default, frames = Frames(), settings.frames
     odom_frame = frames.odom_frame_id if frames.odom_frame_id != default.odom_frame_id else None
     base_frame = frames.base_frame_id if frames.base_frame_id != default.base_frame_id else None

@@ -37,7 +37,7 @@ class NoUsablePose(ValueError):
 
 @dataclass
 class _Drive:
-    """A log after its first reading."""
+    """A log, read once."""
 
     scans: Callable[[], Iterable[Scan]]
     smoother: Smoother

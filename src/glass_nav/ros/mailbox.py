@@ -65,7 +65,7 @@ def outcome(future: "Future[T]", timeout_s: float) -> T:
 
 
 def _run(work: Callable[[], T], future: "Future[T]") -> None:
-    """As an executor does, but only a ValueError is an answer; anything else also ends the run loop."""
+    """Do the work and set the future; as an executor does, but other errors than ValueError end the run loop too."""
     if not future.set_running_or_notify_cancel():
         return
     try:

@@ -83,7 +83,7 @@ class EmitterSearch:
         return tuple(self._found.values())
 
     def _look_closer(self, emitter: Emitter, start_rad: float, end_rad: float, now_ns: Callable[[], int]) -> None:
-        """Go back, and over the coarse move in fine ones."""
+        """Go back, and repeat the last coarse move in fine steps."""
         emitter.turn_to(start_rad)
         fine = self._edges(float(np.degrees(start_rad)), float(np.degrees(end_rad)), self._p.fine_step_deg)
         for before_rad, after_rad in zip(fine[:-1], fine[1:]):
@@ -100,7 +100,7 @@ class EmitterSearch:
 
     @staticmethod
     def _edges(start_deg: float, end_deg: float, step_deg: float) -> List[float]:
-        """Angles [rad] from start to end, a step apart, the last step shorter if it must be."""
+        """Angles [rad] from start to end, a step apart; the last step may be shorter."""
         count = max(int(np.ceil(abs(end_deg - start_deg) / step_deg - 1e-6)), 1)
         steps = start_deg + np.sign(end_deg - start_deg) * step_deg * np.arange(count)
         return [float(each) for each in np.radians(np.append(steps, end_deg))]

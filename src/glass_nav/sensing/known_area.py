@@ -83,5 +83,5 @@ class KnownArea:
 
 
 def _grown(cells: np.ndarray, reach: int) -> np.ndarray:
-    """(H, W) bool: a cell of these is at most so many rows and columns away."""
+    """(H, W) bool: within `reach` rows and columns of a set cell."""
     return ndimage.maximum_filter(cells.view(np.uint8), 2 * reach + 1).view(bool)

@@ -305,7 +305,7 @@ class RayCaster:
     def _checked(
         self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float
     ) -> "Tuple[np.ndarray, np.ndarray]":
-        """Poses in the frame of the grid, and the angles; ValueError if a ray cannot be cast."""
+        """Poses in the frame of the grid, and the angles; ValueError for invalid ones."""
         poses, angles_rad = np.asarray(poses, float), np.asarray(angles_rad, float)
         if poses.ndim != 2 or poses.shape[1] != 3:
             raise ValueError(f"ray caster: poses must have shape (P, 3), got {poses.shape}")
@@ -349,7 +349,7 @@ def _checked_reach(reach_m: np.ndarray, angles_rad: np.ndarray) -> np.ndarray:
 
 
 def _mrpt_rays(grid_map: GridMap) -> _grid.FreeRanges:
-    """MRPT's simulateScanRay on that map."""
+    """Function that casts rays on the map with MRPT's simulateScanRay."""
     from glass_nav import _mrpt_rays  # 56 MB: MRPT brings OpenCV and more
 
     return _mrpt_rays.SimulatedRays(grid_map.occupancy, grid_map.resolution_m, OCCUPIED_PERCENT)

@@ -142,18 +142,7 @@ def scan_from_fields(
         ScanError: no beams, or fields that describe no lidar.
     """
     ranges_m = np.array(ranges_m, dtype=float).reshape(-1)
-    if not len(ranges_m):
-        raise ScanError("no ranges, a scan needs at least 1", stamp_ns)
-    if not (np.isfinite(angle_increment_rad) and angle_increment_rad != 0.0) and len(ranges_m) > 1:
-        raise ScanError(f"angle_increment must be finite and not 0 rad, got {angle_increment_rad}", stamp_ns)
-    if not np.isfinite(angle_min_rad):
-        raise ScanError(f"angle_min must be finite, got {angle_min_rad}", stamp_ns)
-    if not (np.isfinite(range_min_m) and range_min_m >= 0.0):
-        raise ScanError(f"range_min must be in [0, range_max = {range_max_m}) m, got {range_min_m}", stamp_ns)
-    if not (np.isfinite(range_max_m) and range_max_m > 0.0):
-        raise ScanError(f"range_max must be finite and > 0 m, got {range_max_m}", stamp_ns)
-    if not range_min_m < range_max_m:
-        raise ScanError(f"range_min must be in [0, range_max = {range_max_m}) m, got {range_min_m}", stamp_ns)
+    _check_lidar(stamp_ns, len(ranges_m), angle_min_rad, angle_increment_rad, range_min_m, range_max_m)
     if np.shape(base_from_laser) != (3,) or not np.all(np.isfinite(base_from_laser)):
         raise ScanError(f"the laser's pose on the robot must be finite x, y, yaw, got {base_from_laser}", stamp_ns)
     angles_rad = angle_min_rad + angle_increment_rad * np.arange(len(ranges_m))
@@ -175,6 +164,27 @@ def scan_from_fields(
         if intensities is None or len(intensities) != len(ranges_m)
         else np.asarray(intensities, float),
     )
+
+
+def _check_lidar(
+    stamp_ns: int,
+    beams: int,
+    angle_min_rad: float,
+    angle_increment_rad: float,
+    range_min_m: float,
+    range_max_m: float,
+) -> None:
+    """Raise ScanError for fields that describe no lidar."""
+    if not beams:
+        raise ScanError("no ranges, a scan needs at least 1", stamp_ns)
+    if not (np.isfinite(angle_increment_rad) and angle_increment_rad != 0.0) and beams > 1:
+        raise ScanError(f"angle_increment must be finite and not 0 rad, got {angle_increment_rad}", stamp_ns)
+    if not np.isfinite(angle_min_rad):
+        raise ScanError(f"angle_min must be finite, got {angle_min_rad}", stamp_ns)
+    if not (np.isfinite(range_max_m) and range_max_m > 0.0):
+        raise ScanError(f"range_max must be finite and > 0 m, got {range_max_m}", stamp_ns)
+    if not 0.0 <= range_min_m < range_max_m:
+        raise ScanError(f"range_min must be in [0, range_max = {range_max_m}) m, got {range_min_m}", stamp_ns)
 
 
 def spread_evenly(usable: np.ndarray, count: int) -> np.ndarray:

@@ -144,7 +144,7 @@ class ScanQueue:
         self.last_arrival_s, self._first_arrival_s = now_s, None
 
     def _is_starting(self, now_s: float) -> bool:
-        """Whether no scan could be used so far, and that is not yet a reason to complain."""
+        """Whether no scan could be used yet, and it is too early for a warning."""
         first_s = now_s if self._first_arrival_s is None else self._first_arrival_s
         return not self._usable and now_s - first_s < self._grace_s
 
@@ -166,7 +166,7 @@ class ScanQueue:
         return None
 
     def _has_room_for(self, lidar: str) -> bool:
-        """Lidars that never had a scan with its transforms make room."""
+        """Drop lidars whose scans never had transforms if room is needed; whether there is room."""
         if lidar not in self._lidars and len(self._lidars) >= MAX_LIDARS:
             for name in set(self._lidars) - self._usable:
                 self._lidars.pop(name).drop_all()

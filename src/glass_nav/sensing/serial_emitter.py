@@ -98,7 +98,7 @@ class SerialEmitter:
         return line.decode("ascii", "replace").strip()
 
     def _set_raw(self, speed: int) -> None:
-        """8 bits, no parity, no echo, nothing translated."""
+        """8 data bits, no parity, no echo, no translation of characters."""
         settings = termios.tcgetattr(self._file)
         settings[0] = settings[1] = settings[3] = 0
         settings[2] = termios.CS8 | termios.CREAD | termios.CLOCAL

@@ -58,7 +58,7 @@ class TransformSenders:
 
     @staticmethod
     def _contradicts(last: _Heard, now: _Heard) -> bool:
-        """Whether the other sender still counts, and says something else."""
+        """Whether another sender is still active and sends a different value."""
         if not last.static and not 0.0 <= now.at_s - last.at_s < SILENT_S:
             return False
         return not (last.static and now.static and last.value == now.value and last.parent == now.parent)

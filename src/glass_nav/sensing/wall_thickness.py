@@ -35,12 +35,12 @@ def redraw(thickness_m: np.ndarray, grid_map: GridMap, rows: slice, columns: sli
 
 
 def _reach(resolution_m: float, solid_m: float) -> int:
-    """How far off [cells] another cell counts: a climb, and the distance it ends at."""
+    """How far away [cells] a cell may count: the length of a climb plus the distance at its end."""
     return 2 * (int(round(0.5 * solid_m / resolution_m)) + 1)
 
 
 def _draw(thickness_m: np.ndarray, grid_map: GridMap, rows: slice, columns: slice, solid_m: float) -> None:
-    """Put the thickness of the walls in a box into that (H * W,) of all."""
+    """Write the thickness of the walls in a box into that of the whole map, (H * W,)."""
     reach = _reach(grid_map.resolution_m, solid_m)
     around = tuple(slice(max(0, box.start - reach), box.stop + reach) for box in (rows, columns))
     middle = tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip((rows, columns), around))

@@ -88,7 +88,7 @@ def wraps_at(kind: str) -> int:
 
 @dataclass
 class _Wheel:
-    """How far one wheel rolled, by its counts."""
+    """Distance rolled by one wheel, from its counts."""
 
     scale_m: float
     stamps_ns: List[int] = field(default_factory=list)
@@ -175,7 +175,7 @@ class WheelOdometry:
         return self._trajectory.at(np.int64(stamp_ns))
 
     def _advance(self) -> np.ndarray:
-        """Poses up to the time that both wheels have reported."""
+        """Add poses up to the last time that both wheels have reported."""
         left, right = self._wheels
         if not (left.stamps_ns and right.stamps_ns):
             return np.zeros(0, np.int64)
@@ -202,5 +202,5 @@ class WheelOdometry:
 
 
 def _since(wheel: _Wheel, first_ns: int) -> Tuple[np.ndarray, np.ndarray]:
-    """Stamps [ns] since a time, as numbers that a float holds exactly, and how far the wheel had rolled [m]."""
+    """Stamps [ns] relative to a time, exact as floats, and the distances rolled until then [m]."""
     return np.array(wheel.stamps_ns, np.int64) - first_ns, np.array(wheel.rolled_m)

@@ -255,7 +255,7 @@ class Building:
         return building
 
     def _free_place(self, outline_m: np.ndarray, rng: np.random.Generator) -> "np.ndarray | None":
-        """(N, 2) the outline at a nearby place where it touches nothing present; None if there is none."""
+        """(N, 2) the outline, moved to a nearby place where it touches nothing; None if there is none."""
         surfaces = self.surfaces
         from_m, to_m = surfaces.from_m[surfaces.present], surfaces.to_m[surfaces.present]
         middle = outline_m.mean(axis=0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import functools
 import math
 import os
 from dataclasses import replace
@@ -119,30 +120,11 @@ def _building(document: Item, name: str) -> Building:
     )
     things: List[Thing] = []
     for section, mapped, present in (("furniture", True, True), ("unmapped", False, True), ("gone", True, False)):
-
-        def thing(noun: str, item: Item, mapped: bool = mapped, present: bool = present) -> Thing:
-            movable = item.get("movable", mapped and present)
-            if not isinstance(movable, bool):
-                raise BuildingError(f"{noun} movable must be true or false, got {movable!r}")
-            return Thing(
-                se2.transform_points(placed, _outline(noun, item)),
-                mapped=mapped,
-                present=present,
-                movable=movable,
-                **_numbers(noun, item, "reflectance"),
-            )
-
-        things += each(section, thing)
+        things += each(section, functools.partial(_thing, placed, mapped, present))
     for posts in each("mullions", lambda noun, item: _mullions(noun, item, placed)):
         things += posts
     paths = {name: se2.transform_points(placed, points) for name, points in _paths(document).items()}
-    if "start" in document:
-        start = se2.compose(placed, _pose("start", document["start"]))
-    elif paths:
-        first = next(iter(paths.values()))
-        start = np.append(first[0], np.arctan2(*(first[1] - first[0])[::-1]))
-    else:
-        raise BuildingError("has no paths and no start; a building needs one of them")
+    start = _start(document, placed, paths)
     seen = np.zeros((0, 2))
     if "seen" in document:
         seen = se2.transform_points(placed, _points("seen", document, "seen"))
@@ -159,6 +141,30 @@ def _building(document: Item, name: str) -> Building:
         name,
         _tags(document, placed),
     )
+
+
+def _thing(placed: np.ndarray, mapped: bool, present: bool, noun: str, item: Item) -> Thing:
+    """A piece of furniture that the map has or lacks, and that is there or gone."""
+    movable = item.get("movable", mapped and present)
+    if not isinstance(movable, bool):
+        raise BuildingError(f"{noun} movable must be true or false, got {movable!r}")
+    return Thing(
+        se2.transform_points(placed, _outline(noun, item)),
+        mapped=mapped,
+        present=present,
+        movable=movable,
+        **_numbers(noun, item, "reflectance"),
+    )
+
+
+def _start(document: Item, placed: np.ndarray, paths: Dict[str, np.ndarray]) -> np.ndarray:
+    """(3,) start pose: as given, else the begin of the first path, facing along it."""
+    if "start" in document:
+        return se2.compose(placed, _pose("start", document["start"]))
+    if not paths:
+        raise BuildingError("has no paths and no start; a building needs one of them")
+    first = next(iter(paths.values()))
+    return np.append(first[0], np.arctan2(*(first[1] - first[0])[::-1]))
 
 
 def _tags(document: Item, placed: np.ndarray) -> LandmarkMap:
@@ -178,7 +184,7 @@ def _tags(document: Item, placed: np.ndarray) -> LandmarkMap:
 
 
 def _made(noun: str, number: int, item: Item, make: Callable[[str, Item], T]) -> T:
-    """Call make() and add the item's number to its errors."""
+    """Call make(); its errors get the number of the item."""
     try:
         return make(noun, item)
     except ValueError as err:
@@ -219,7 +225,7 @@ def _number(what: str, value: Any) -> float:
 
 
 def _numbers(noun: str, item: Item, *keys: str) -> Dict[str, Any]:
-    """The part's arguments for the keys that are given."""
+    """Keyword arguments of the part, for the keys that are given."""
     given: Dict[str, Any] = {}
     for key in keys:
         if key not in item:
@@ -285,7 +291,7 @@ def _outline(noun: str, item: Item) -> np.ndarray:
 
 
 def _mullions(noun: str, item: Item, placed: np.ndarray) -> List[Thing]:
-    """Square posts: along a line from end to end, or at points."""
+    """Square posts along a line from end to end, or at given points."""
     numbers = {key: _number(f"{noun} {key}", item[key]) for key in ("every", "size", "yaw_deg") if key in item}
     size, every = numbers.get("size", MULLION_M), numbers.get("every", 1.0)
     for key, value in (("size", size), ("every", every)):

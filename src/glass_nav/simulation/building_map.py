@@ -88,7 +88,7 @@ def is_drawn(building: Building, points_m: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _near_surfaces(building: Building) -> Tuple[GridMap, np.ndarray]:
-    """The map, and (H, W) bool: occupied there or in one of the 8 cells around."""
+    """The drawn map, and (H, W) bool: occupied, or one of the 8 cells around an occupied one."""
     grid = draw(building)
     return grid, ndimage.binary_dilation(grid.occupied, np.ones((3, 3), bool))
 
@@ -107,7 +107,7 @@ def _mapped_lines(building: Building) -> Tuple[np.ndarray, np.ndarray]:
 
 
 def _micrometres(points_m: np.ndarray) -> np.ndarray:
-    """(...) whole micrometres."""
+    """(...) rounded to whole micrometres."""
     return np.rint(np.asarray(points_m, float) * UM).astype(np.int64)
 
 

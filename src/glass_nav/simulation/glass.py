@@ -35,7 +35,7 @@ def visibility(incidence_rad: np.ndarray, half_rad: float, width_rad: float) -> 
 
 
 def _clear(cos_incidence: np.ndarray) -> np.ndarray:
-    """R of a clear sheet: 2 r / (1 + r) with r of one surface, the mean of both polarisations."""
+    """Reflectance of a clear sheet: 2 r / (1 + r), with r of one surface averaged over both polarisations."""
     cos_outside = np.clip(cos_incidence, 0.0, 1.0)
     cos_inside = np.sqrt(1.0 - (1.0 - cos_outside**2) / INDEX**2)
     across = ((cos_outside - INDEX * cos_inside) / (cos_outside + INDEX * cos_inside)) ** 2

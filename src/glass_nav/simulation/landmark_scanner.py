@@ -113,7 +113,7 @@ class LandmarkScanner:
         return turns
 
     def _look(self, now_ns: int, share: float, map_from_sensor: np.ndarray) -> None:
-        """Which tags did the beam pass since the last step?"""
+        """Hear the tags that the beam has passed since the last step."""
         start, end = self._on_motor(self._move.start_rad), self._on_motor(self._move.end_rad)
         tags = self._building.tags
         way = tags.positions_m - map_from_sensor[:2]

@@ -143,7 +143,7 @@ class _Fans:
 
 @dataclass(frozen=True)
 class _Ways:
-    """What R rays hit up to the first opaque surface. Panes by ascending range, inf where there is none."""
+    """What R rays hit up to and including the first opaque surface; panes in order of range, inf where there is none."""
 
     pane_m: np.ndarray  # (R, K)
     pane: np.ndarray  # (R, K) index of the surface
@@ -250,7 +250,7 @@ def _direct_echoes(
 
 
 def _fan(model: LidarModel, map_from_laser: np.ndarray) -> _Fans:
-    """All beams of the laser."""
+    """The fan of all beams, from the laser itself."""
     angles_rad = map_from_laser[2] + model.angles_rad
     cos, sin = angles.cos_sin(angles_rad)
     beams = len(angles_rad)
@@ -489,7 +489,7 @@ def _pane_power(model: LidarModel, surfaces: Surfaces, ways: _Ways, rng: np.rand
 
 
 def _spread(values: np.ndarray, rows: np.ndarray, beams: int, rest: float) -> np.ndarray:
-    """(B,) values at their rows, the rest elsewhere."""
+    """(B,) the values at their rows, `rest` elsewhere."""
     whole = np.full(beams, rest, float)
     whole[rows] = values
     return whole

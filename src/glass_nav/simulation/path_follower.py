@@ -93,14 +93,14 @@ class PathFollower:
         return self._steering(bearing, distance_m, speed)
 
     def _steering(self, bearing: float, distance_m: float, speed: float) -> np.ndarray:
-        """Along the arc through the point, or first a turn on the spot."""
+        """Velocity along the arc through the point, after a turn on the spot if the point is not ahead."""
         if abs(bearing) > TURN_ON_THE_SPOT_RAD:
             return pure_pursuit.on_the_spot(bearing, self._robot)
         curvature = pure_pursuit.curvature_towards(bearing, distance_m)
         return pure_pursuit.along_arc(curvature, self._robot, speed, self._p.lateral_acceleration_m_s2)
 
     def _sliding(self, bearing: float, speed: float) -> np.ndarray:
-        """Straight to the point, turning towards it on the move."""
+        """Velocity straight to the point while turning towards it."""
         x, y = self._line.direction(self.progress_m)
         ahead = self._line.direction(self.progress_m + self._p.lookahead_m)
         turn = float(pure_pursuit.on_the_spot(bearing, self._robot)[2])

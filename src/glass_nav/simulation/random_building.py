@@ -57,7 +57,7 @@ Line = Callable[[Tuple[float, float], Tuple[float, float]], np.ndarray]
 
 
 class _Floor:
-    """Walls, doors and things on a rectangular plan, in metres; built() skews it."""
+    """Walls, doors and furniture of a rectangular plan [m]; built() skews it."""
 
     def __init__(self, rng: np.random.Generator, p: FloorParams) -> None:
         self._rng, self._p = rng, p
@@ -123,7 +123,7 @@ class _Floor:
             self._rooms((y0, y1), (x0, x1), across, along, doors, True)
 
     def _hall(self, x0: float, x1: float, y0: float, y1: float) -> None:
-        """Open to all corridors around it."""
+        """Put columns into a hall, which is open to the corridors around it."""
         for _ in range(int(self._rng.integers(1, 4))):
             size = self._rng.uniform(0.3, 0.6)
             place = self._rng.uniform([x0 + 1.2, y0 + 1.2], [x1 - 1.2, y1 - 1.2])
@@ -178,7 +178,7 @@ class _Floor:
                     self._furnish((first, last), (start, stop), (door, at), turned)
 
     def _front(self, first: float, last: float, at: float, door: bool, line: Line) -> float:
-        """The wall to the corridor, with its door; where that is."""
+        """Add the wall to the corridor with its door; returns where the door is."""
         glass = bool(self._rng.random() < self._p.glass)
         width = self._rng.uniform(*DOOR_M)
         middle = self._rng.uniform(first + 0.3 + width / 2.0, last - 0.3 - width / 2.0)
@@ -196,7 +196,7 @@ class _Floor:
         return middle
 
     def _furnish(self, along: Sequence[float], deep: Sequence[float], door: Tuple[float, float], turned: bool) -> None:
-        """Boxes, most of them turned; none near the door."""
+        """Add boxes, most of them turned, but none near the door."""
         for _ in range(int(self._rng.integers(0, 4))):
             length, width = self._rng.uniform(0.4, 1.7), self._rng.uniform(0.4, 0.8)
             reach = 0.5 * math.hypot(length, width) + 0.1

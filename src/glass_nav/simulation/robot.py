@@ -141,7 +141,7 @@ class Robot:
         return made
 
     def _accelerated(self, command: np.ndarray, dt_s: float) -> "Tuple[np.ndarray, np.ndarray]":
-        """The velocity at the end of the time, and its mean over it: a ramp, then the wanted velocity."""
+        """Velocity at the end of the step and its mean over the step: a ramp up to the commanded velocity."""
         p = self.params
         wanted = command.copy()
         if p.kind == "diff":
@@ -164,7 +164,7 @@ class Robot:
         return end, mean
 
     def _free_share(self, twist: np.ndarray) -> float:
-        """The part of a twist before it comes nearer to an obstacle than the base is wide; 1: all of it."""
+        """Share of the twist that can be driven before the base touches an obstacle; 1: all of it."""
         self._room_m -= math.hypot(twist[0], twist[1])
         if self._room_m >= self.params.radius_m:
             return 1.0

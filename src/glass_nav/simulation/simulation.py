@@ -265,12 +265,12 @@ class Simulation:
         return self.look()
 
     def _control_times(self, whole_ns: int) -> List[int]:
-        """Ends of the control steps from now on, all of about the same length."""
+        """Ends of the control steps of a period, which are about equally long."""
         parts = -(-whole_ns // round(CONTROL_S * 1e9))
         return [self._time_ns + whole_ns * part // parts for part in range(1, parts + 1)]
 
     def _control(self, end_ns: int, command: np.ndarray) -> None:
-        """Commands the base, then reads its wheels."""
+        """Send the base a command and, at the end of the step, read its wheels."""
         part_s = (end_ns - self._time_ns) * 1e-9
         self._wheels.step(self._robot.step(command, part_s), part_s)
         self._time_ns = end_ns

@@ -60,7 +60,7 @@ class Steering:
         return self._follower.command(map_from_base)
 
     def _may_drive(self, follower: PathFollower, audience: Audience) -> bool:
-        """Wait for listeners, who would miss the start."""
+        """False until there are listeners, which would miss the start of the drive."""
         if self._driving:
             return True
         self._driving = audience.listeners > 0

@@ -103,7 +103,7 @@ class SearchScene:
         ]
 
     def _now(self, belief: Belief, poses: np.ndarray) -> np.ndarray:
-        """(K, 3) hypotheses, carried on by dead reckoning to the last scan."""
+        """(K, 3) poses of the hypotheses, moved by dead reckoning to the last scan."""
         if belief.odom_from_base is None or self._odom_from_base is None:
             return poses
         return se2.compose(poses, se2.compose(se2.inverse(belief.odom_from_base), self._odom_from_base))

@@ -252,7 +252,7 @@ class SearchSession:
         return [self._status, *self._told_on_the_way(localizer.belief, scan.stamp_ns)]
 
     def _told_on_the_way(self, belief: Optional[Belief], stamp_ns: int) -> List[Decision]:
-        """A line where the number of places that are left has changed, and the last line is some time ago."""
+        """Log the number of remaining places if it changed, at most once per interval."""
         if belief is None:
             return []
         risk = self._search_params.tolerances.risk
@@ -426,7 +426,7 @@ class SearchSession:
         return self._show(SearchState.WAITING, f"the search starts at the next meetpoint: {why}")
 
     def _show(self, state: SearchState, reason: str, stamp_ns: int = 0) -> SearchStatus:
-        """A state outside of searches: what was known is forgotten."""
+        """Enter a state outside of a search; what was known is discarded."""
         self._unpaired_meetpoint, self._unpaired_traversal = None, None
         if self._localizer is not None:
             self._localizer.begin()
@@ -434,11 +434,11 @@ class SearchSession:
         return self._status
 
     def _judgeable(self, meetpoint: Meetpoint) -> Meetpoint:
-        """Without its scan where no map is served to judge it by."""
+        """The meetpoint, without its scan if no map is available to judge the scan by."""
         return meetpoint if self.uses_scans else replace(meetpoint, scan=None)
 
     def _pair(self, kind: str) -> List[Decision]:
-        """Take one edge through the search, once both of its reports are there."""
+        """Advance the search by one edge once both reports, edge and meetpoint, have arrived."""
         estimate, meetpoint, driven = self._status.estimate, self._unpaired_meetpoint, self._unpaired_traversal
         if self._localizer is None or estimate is None or estimate.done:
             self._unpaired_meetpoint, self._unpaired_traversal = None, None
@@ -471,7 +471,7 @@ class SearchSession:
         )
 
     def _judge(self, localizer: AtlasLocalizer, estimate: SearchEstimate, stamp_ns: int) -> List[Decision]:
-        """The decisions on the estimate after a meetpoint."""
+        """Act on the estimate after a meetpoint."""
         goal = self._goal
         gives_up = goal is not None and not estimate.done and 0 < goal.max_edges <= estimate.depth
         if gives_up:
@@ -519,7 +519,7 @@ class SearchSession:
         return []
 
     def _end_goal(self, reason: str, outcome: GoalOutcome = GoalOutcome.ABORTED) -> List[Decision]:
-        """The goal that is on, if one is, ends with what is known now."""
+        """Finish the current goal, if any, with the present result."""
         if self._goal is None:
             return []
         self._goal = None

@@ -56,7 +56,7 @@ def _check_size(path: Path, image: Any) -> None:
 
 
 def _loaded(path: Path, image: Any) -> Any:
-    """The image in a mode of 8 bits, or of 16."""
+    """The image, converted to 8 or 16 bits per channel."""
     try:
         image.load()
     except MemoryError:
@@ -105,7 +105,7 @@ def _incomplete(path: Path, height: int, width: int) -> ImageError:
 
 @contextmanager
 def _any_size() -> Iterator[None]:
-    """Without Pillow's limit of pixels, a guard against files that blow up: _check_size() is ours."""
+    """Lift Pillow's limit on pixels while an image is read; _check_size() is our limit."""
     Image = _module()
     limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
     try:

@@ -137,7 +137,7 @@ def _check_keys(who: str, item: Mapping[Any, Any], known: Sequence[str]) -> None
 
 
 def _check_places(ids: Sequence[str], positions_m: np.ndarray) -> None:
-    """Even tags back to back are apart by their cases; nearer ones are a line copied without a change."""
+    """Refuse landmarks at one place: tags back to back still differ by the thickness of their cases."""
     for number, name in enumerate(ids):
         near = np.hypot(*(positions_m[number + 1 :] - positions_m[number]).T) < MIN_DISTANCE_M
         if near.any():

@@ -112,7 +112,7 @@ def _load_yaml(path: Path) -> GridMap:
 
 
 def _fields(path: Path) -> Dict[str, Any]:
-    """Name -> text, or list of texts, of all fields: yaml-cpp, too, makes numbers of them when they are asked for."""
+    """Name -> text, or list of texts, of all fields; converted when they are read, as yaml-cpp does."""
     import yaml  # here, because the rest of the package reads no yaml
 
     try:
@@ -133,12 +133,12 @@ def _fields(path: Path) -> Dict[str, Any]:
 
 
 def _float(value: Any) -> float:
-    """The number that yaml-cpp reads there, NaN for none: 5e-2, .05, 0.05 with or without quotes, but not 0x1 or 1_000."""
+    """The number as yaml-cpp reads it, else NaN: 5e-2, .05 and "0.05" are numbers; 0x1 and 1_000 are not."""
     return float(value) if isinstance(value, str) and _NUMBER.fullmatch(value.strip()) else math.nan
 
 
 def _flag(value: Any) -> Optional[bool]:
-    """negate, an integer of any base to yaml-cpp; the words of yaml 1.1 for it, which other tools write, count as well."""
+    """`negate`: an integer of any base, as in yaml-cpp, or a boolean word of YAML 1.1, which other tools write."""
     if not isinstance(value, str):
         return None
     word = value.strip().lower()
@@ -174,7 +174,7 @@ def _occupancy(channels: np.ndarray, mode: str, negate: bool, occupied: float, f
 
 
 def _by_total(count: int, mode: str, negate: bool, occupied: float, free: float) -> np.ndarray:
-    """int8 for every sum of so many channels: maps have millions of cells."""
+    """int8 occupancy for every possible sum of the channels: a table, since maps have millions of cells."""
     grey = np.arange(255 * count + 1) / count
     if negate:
         grey = 255.0 - grey

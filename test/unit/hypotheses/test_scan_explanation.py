@@ -172,3 +172,52 @@ def test_a_beam_that_ends_at_the_back_of_a_wall_is_no_evidence_and_one_that_ends
         scan = Scan(0, (end_m - 2.0) / np.cos(angles_rad), angles_rad, 0.1, 25.0, np.zeros(3))
         beams = explanation.beams(scan, np.array([[2.0, 2.0, 0.0]]), 0.0, 0.0)  # slides nowhere
         assert (beams.explained == explained).all() and (beams.known == known).all(), end_m
+
+
+@pytest.mark.parametrize(
+    "end_m, angle_rad, at",
+    [
+        pytest.param(8.0, 0.0, 2.0 / 6.0, id="through a cupboard to the wall behind it"),
+        pytest.param(4.75, 0.0, np.nan, id="short of the back of the cupboard, which was drawn from behind"),
+        pytest.param(8.0, 0.5, np.nan, id="past it to the wall"),
+        pytest.param(6.0, 0.5, 1.0, id="ended in free space"),
+        pytest.param(7.8, 0.5, np.nan, id="a near miss"),
+    ],
+)
+def test_what_goes_through_a_thing_or_ends_far_from_all_is_contradicted_there(
+    end_m: float, angle_rad: float, at: float
+):
+    cells = np.zeros((160, 161), np.int8)  # 8 m by 8 m
+    cells[:, 160] = 100  # the wall at x = 8 m
+    cells[70:90, 80:100] = UNKNOWN  # a cupboard, 1 m by 1 m; its outline is drawn
+    cells[[70, 89], 80:100] = cells[70:90, 80] = cells[70:90, 99] = 100
+    explanation = ScanExplanation(GridMap(cells, 0.05, np.zeros(3)))
+    angles_rad = angle_rad + np.linspace(-0.05, 0.05, 20)
+    scan = Scan(0, (end_m - 2.0) / np.cos(angles_rad), angles_rad, 0.1, 25.0, np.zeros(3))
+    beams = explanation.beams(scan, np.array([[2.0, 4.0, 0.0]]), 0.0, 0.0)
+    np.testing.assert_allclose(beams.contradicted_at[0], np.full(20, at), atol=0.02)
+    assert beams.contradicted.tolist() == (~np.isnan(beams.contradicted_at)).tolist()
+
+
+def test_behind_a_pane_there_is_a_yard_that_the_mapper_did_not_see():
+    occupancy = np.full((80, 240), UNKNOWN, np.int8)  # 4 m by 12 m
+    occupancy[:, :80] = occupancy[:, 160:] = 0
+    occupancy[:, [80, 160]] = 100  # the pane at x = 4 m, a wall at 8 m
+    explanation = ScanExplanation(GridMap(occupancy, 0.05, np.zeros(3)))
+    angles_rad = np.linspace(-0.1, 0.1, 20)
+    scan = Scan(0, 6.0 / np.cos(angles_rad), angles_rad, 0.1, 25.0, np.zeros(3))
+    beams = explanation.beams(scan, np.array([[2.0, 2.0, 0.0]]), 0.0, 0.0)
+    assert beams.explained.all() and not beams.contradicted.any()
+
+
+def test_one_beam_alone_contradicts_nothing():
+    cells = np.zeros((160, 161), np.int8)
+    cells[:, 160] = 100
+    explanation = ScanExplanation(GridMap(cells, 0.05, np.zeros(3)))
+    angles_rad = np.linspace(-0.1, 0.1, 20)
+    ranges_m = 6.0 / np.cos(angles_rad)
+    ranges_m[[4, 10, 11]] = 3.0
+    beams = explanation.beams(
+        Scan(0, ranges_m, angles_rad, 0.1, 25.0, np.zeros(3)), np.array([[2.0, 4.0, 0.0]]), 0.0, 0.0
+    )
+    assert np.flatnonzero(beams.contradicted[0]).tolist() == [10, 11]

@@ -301,7 +301,7 @@ class EdgeDriver:
         self._leg.failure = failure
 
     def _halt(self, phase: DriverPhase, reason: str) -> None:
-        """Stand, and remember what it did; what it remembers already stays if it did nothing."""
+        """Stop with this phase and reason; the leg that was being driven is kept so that it can be resumed."""
         leg = self._leg
         if leg.phase in _DRIVING and leg.phase != DriverPhase.RETURNING:
             self._halted = leg

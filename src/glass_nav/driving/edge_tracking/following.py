@@ -51,7 +51,7 @@ def follow(leg: Leg, near: Surroundings, graph: LocalGraph) -> Optional[str]:
 
 
 def _join_graph(leg: Leg, near: Surroundings, graph: LocalGraph) -> bool:
-    """A line to the graph and along it to the nearest meetpoint; False if the graph is out of reach."""
+    """Line to the graph and along it to the nearest meetpoint; False if the graph is out of reach."""
     here = near.pose[:2]
     foot = graph.foot(here, _TO_GRAPH_M)
     if foot is None:

@@ -130,7 +130,7 @@ class LocalMap:
         return occupied.reshape(self._size, self._size) & ~self._stood
 
     def _counts_at(self, cells: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """How often beams ended at flat cells (K,), and passed them: (directions, K) each."""
+        """(directions, K) each: how many beams ended in the flat cells (K,), and how many passed them."""
         ended, passed = (
             counts.reshape(self._p.directions, -1)[:, cells].astype(np.int64) for counts in (self._ended, self._passed)
         )
@@ -208,7 +208,7 @@ class LocalMap:
         return here_m, float(np.hypot(*(at - point_m))), room_m
 
     def _is_free(self, points_m: np.ndarray) -> np.ndarray:
-        """(K,) bool: beams passed there, and nothing stands there; points (K, 2)."""
+        """(K,) bool: beams passed the points (K, 2), and no obstacle is there."""
         columns, rows = (np.floor(points_m / self._p.resolution_m).astype(np.int64) - self._first).T
         inside = (columns >= 0) & (columns < self._size) & (rows >= 0) & (rows < self._size)
         columns, rows = np.where(inside, columns, 0), np.where(inside, rows, 0)
@@ -267,7 +267,7 @@ class LocalMap:
         return np.floor(angle_rad * turn + 0.5).astype(np.int64) % self._p.directions * self._size**2 + cell
 
     def _ends(self, scan: Scan, laser: np.ndarray) -> np.ndarray:
-        """(K,) counters of all beams that came back."""
+        """(K,) counters of the cells in which beams ended."""
         answered = scan.answered
         bearing = scan.angles_rad[answered] + laser[2]
         ranges_m = scan.ranges_m[answered]
@@ -278,7 +278,7 @@ class LocalMap:
         return self._counters(bearing[inside], cell)
 
     def _passes(self, scan: Scan, laser: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """(K,) counters of the cells that a beam passed, each cell once."""
+        """(K,) counters of the cells that beams passed; each cell once."""
         count = len(scan)
         step = float(scan.angles_rad[1] - scan.angles_rad[0]) if count > 1 else 2.0 * np.pi
         ranges_m = np.where(np.isposinf(scan.ranges_m), min(self._p.unanswered_m, scan.range_max_m), scan.ranges_m)
@@ -295,7 +295,7 @@ class LocalMap:
         return self._counters(bearing[passed], cells[passed])
 
     def _count(self, counts: np.ndarray, counters: np.ndarray) -> None:
-        """One more at each of these counters (K,), no two the same; both counts are halved where there are many."""
+        """Increase these distinct counters (K,) by one; both counts of a cell are halved once they are large."""
         counts = counts.reshape(-1)
         counts[counters] += 1
         many = counters[counts[counters] >= _FORGET_AT]
@@ -306,7 +306,7 @@ class LocalMap:
     # -- panes
 
     def _extended(self, occupied: np.ndarray) -> np.ndarray:
-        """(n, n) bool: cells on the lines of pieces of glass, next to them."""
+        """(n, n) bool: free cells that continue the line of a piece of glass."""
         more = np.zeros_like(occupied)
         cells = np.flatnonzero(self.glass())
         ended = self._counts_at(cells)[0] >= self._p.least_ends
@@ -337,7 +337,7 @@ class LocalMap:
         ]
 
     def _stand(self, cells: np.ndarray, more: np.ndarray, occupied: np.ndarray, direction: int) -> None:
-        """Mark cells in their order, until something stands there or beams of that direction passed."""
+        """Mark cells as occupied, in order, up to an obstacle or to a cell that beams of that direction passed."""
         near = np.array([[(direction + off) % self._p.directions] for off in (-1, 0, 1)])
         inside = ((cells >= 0) & (cells < self._size)).all(axis=1)
         columns, rows = np.where(inside[:, None], cells, 0).T
@@ -361,7 +361,7 @@ def _pieces(cells: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _overlap(shift: int, size: int) -> Tuple[slice, slice]:
-    """Where what is kept goes to, and where it comes from, along one axis."""
+    """Slices along one axis of a shifted window: where the cells that stay go to, and where they come from."""
     if shift >= 0:
         return slice(0, size - shift), slice(shift, size)
     return slice(-shift, size), slice(0, size + shift)

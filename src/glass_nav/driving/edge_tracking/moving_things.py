@@ -37,7 +37,7 @@ def moved_m(scans: Sequence[Scan]) -> np.ndarray:
 
 
 def _middle_m(scans: Sequence[Scan]) -> np.ndarray:
-    """(B,) median range of each beam; inf where it mostly met nothing."""
+    """(B,) median range of each beam; inf where most of its ranges are."""
     return np.median([np.where(scan.answered, scan.ranges_m, np.inf) for scan in scans], axis=0)
 
 

@@ -102,7 +102,7 @@ class _Look:
 
 
 class _Track:
-    """A node while the robot is about."""
+    """A node of the local graph, tracked while the robot is near it."""
 
     def __init__(self, look: _Look) -> None:
         self.looks = [look]
@@ -189,7 +189,7 @@ class PassingObserver:
         self.way.append(WayPoint(stamp_ns, pose[:2].copy() if foot is None else graph.point(foot)))
 
     def _looks(self, graph: LocalGraph, stamp_ns: int, pose: np.ndarray) -> List[_Look]:
-        """Nodes that the robot is about, in sight; the nearest first."""
+        """Nodes of the graph that are near and in sight, the nearest first."""
         found = graph.graph
         away = np.hypot(*(found.position_m - pose[:2]).T)
         about = np.flatnonzero((graph.degree != 2) & (away <= self._p.near(found.r_m) + self._p.linger_m))
@@ -209,7 +209,7 @@ class PassingObserver:
         ]
 
     def _follow(self, look: _Look) -> None:
-        """To the node that it shows, which no other look of this graph showed; a new one if there is none."""
+        """Add the look to the nearest track without a look of this graph; begin a new track if none is close."""
         free = [track for track in self._open if track.last.number < look.number]
         off = [float(np.hypot(*(track.last.position_m - look.position_m))) for track in free]
         if off and min(off) <= _SAME_NODE_M:

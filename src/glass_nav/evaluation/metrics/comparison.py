@@ -152,7 +152,7 @@ class Comparison:
             return confidence.of_sum(groups)
 
     def _difference_groups(self, contestant: str, figure: Figure, log: str) -> "List[Tuple[float, np.ndarray]]":
-        """Weights and values whose sum of means is the difference in one log; empty: not known."""
+        """Weights and values of one log, whose sum of means is the difference; empty if unknown."""
         ours, first = (
             {run.seed: self.value(run, figure) for run in self.runs_of(each, log)}
             for each in (contestant, self.contestants[0])
@@ -223,7 +223,7 @@ def _common_stamps(runs: Sequence[Run], log: str) -> np.ndarray:
 
 
 def _values(run: Run, stamps_ns: np.ndarray, first: Sequence[Run]) -> Dict[str, float]:
-    """The figures of a run over those scans, NaN where not known, infinite where a pose was not finite."""
+    """The figures of a run over those scans; NaN: unknown, inf: a pose was not finite."""
     used = np.isin(run.stamps_ns, stamps_ns)
     summary = pose_errors.summary(PoseErrors(run.errors.position_m[used], run.errors.yaw_rad[used]))
     absent = math.nan if not run.errors.matched[used].any() else math.inf  # summary() has None for both

@@ -13,7 +13,7 @@ from typing import Dict, List, Optional, Tuple
 import numpy as np
 
 from glass_nav.evaluation.metrics.pose_errors import RIGHT_M, RIGHT_RAD, SLACK_NS
-from glass_nav.geometry import angles
+from glass_nav.geometry import angles, polyline
 from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.vocabulary import LocalizationState
 
@@ -117,10 +117,9 @@ def trace(
         off[~np.isfinite(off).all(axis=1)] = np.inf
         covered = reference.covers(stamps_ns, SLACK_NS)
         error[covered] = off[covered]
-    steps = np.diff(odom_from_base[:, :2], axis=0)
     return IntegrityTrace(
         stamps_ns,
-        np.concatenate([np.zeros(min(len(yaw), 1)), np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))]),
+        polyline.distances_along(odom_from_base[:, :2]),
         np.array(states, dtype=object).astype(str),
         error,
         axes @ covariance @ axes.transpose(0, 2, 1),
@@ -167,7 +166,7 @@ def summary(claims: IntegrityTrace) -> Dict[str, Optional[float]]:
 
 
 def _rounded(value: float) -> Optional[float]:
-    """To 12 digits, the last ones of a sum depend on where its terms lie in memory; None: infinite or NaN."""
+    """The value to 12 digits (the order of summation changes later ones); None if inf or NaN."""
     return float(f"{value:.12g}") if math.isfinite(value) else None
 
 
@@ -183,7 +182,7 @@ def _until_next(values: np.ndarray, run: Tuple[int, int]) -> float:
 
 
 def _delays(seconds: np.ndarray, wrong: np.ndarray, localized: np.ndarray) -> Tuple[float, float]:
-    """The longest time until an alarm and until the pose is right again; infinite: not before the end."""
+    """Longest time until an alarm, and until the pose is right again; inf: not before the end of the log."""
     to_alarm = back = 0.0
     for first, last in rows_of(wrong):
         over = np.nonzero(~localized[first : last + 1])[0]

@@ -160,7 +160,7 @@ def _counts(score: TopologyScore, dead_ends: Optional[bool]) -> Dict[str, Any]:
 
 
 def _spread(off: Sequence[float]) -> Dict[str, Optional[float]]:
-    """Median with its sign, and of the absolute values the median and the 95th percentile."""
+    """Signed median; median and 95th percentile of the absolute values."""
     if not len(off):
         return dict.fromkeys(("median", "median_abs", "p95_abs"))
     return {
@@ -230,7 +230,7 @@ def compare(known: KnownNodes, passed: Sequence[Visit], seen: Sequence[SeenNode]
 def _matched(
     known: KnownNodes, passed: Sequence[Visit], seen: Sequence[SeenNode], counts: Sequence[bool]
 ) -> Tuple[Dict[int, Visit], Dict[int, int]]:
-    """Row of what was seen -> visit, and number of the visit -> that row; the nearest pairs first."""
+    """Row of what was seen -> visit, and number of that visit -> row; the nearest pairs are matched first."""
     pairs = []
     for row, node in enumerate(seen):
         for number, visit in enumerate(passed):

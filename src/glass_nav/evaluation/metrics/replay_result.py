@@ -205,7 +205,7 @@ def _write_tum(path: Path, result: ReplayResult) -> None:
 
 
 def _write_per_scan(path: Path, result: ReplayResult) -> None:
-    """A row per scan; what is not known is empty."""
+    """One row per scan; unknown values are left empty."""
     errors = result.errors
     nowhere = np.full((len(result), 3), np.nan)
     true = nowhere if result.reference is None or not len(result) else result.reference.at(result.stamps_ns)
@@ -294,7 +294,7 @@ def _read_worst(path: Path) -> List[KeptScan]:
 
 
 def _symmetric(deviation: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """Covariances (S, 3, 3) of standard deviations (S, 3) and of what stands beside the diagonal (S, 3)."""
+    """Covariances (S, 3, 3) from standard deviations (S, 3) and off-diagonal elements (S, 3)."""
     covariance = np.zeros((len(deviation), 3, 3))
     covariance[:, [0, 1, 2], [0, 1, 2]] = deviation**2
     covariance[:, _ROW, _COLUMN] = covariance[:, _COLUMN, _ROW] = beside

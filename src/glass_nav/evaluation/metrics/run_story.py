@@ -13,7 +13,7 @@ import numpy as np
 from glass_nav.evaluation.metrics import relative_errors
 from glass_nav.evaluation.metrics.pose_errors import LOST_M, RIGHT_M, RIGHT_RAD, PoseErrors
 from glass_nav.evaluation.metrics.replay_result import NO_BEAM, ReplayResult
-from glass_nav.geometry import angles
+from glass_nav.geometry import angles, polyline
 from glass_nav.vocabulary import BeamCase, LocalizationState
 
 SEARCHING = (LocalizationState.GLOBAL_SEARCH, LocalizationState.UNKNOWN)  # states without a pose to rely on
@@ -106,8 +106,7 @@ def first_localized(result: ReplayResult) -> Optional[int]:
 
 def driven_m(result: ReplayResult) -> np.ndarray:
     """(S,) distance since the first scan by odometry."""
-    steps = np.diff(result.odom_from_base[:, :2], axis=0)
-    return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+    return polyline.distances_along(result.odom_from_base[:, :2])
 
 
 def right(errors: PoseErrors) -> np.ndarray:
@@ -144,7 +143,7 @@ def yaw_spikes(result: ReplayResult, most: int = 3) -> List[YawSpike]:
 
 
 def _why_off(result: ReplayResult, row: int) -> str:
-    """What was special about a scan, in a few words."""
+    """In a few words: what may explain the error at a scan."""
     rate_deg_s = _turning_rate_deg_s(result)[row]
     if rate_deg_s > _FAST_DEG_S:
         return f"turning {rate_deg_s:.0f}°/s: a stamp 10 ms off is {rate_deg_s / 100.0:.1f}°"
@@ -202,7 +201,7 @@ def percent(share: float) -> str:
 
 
 def _scope(result: ReplayResult, errors: PoseErrors, found: Optional[int]) -> np.ndarray:
-    """(S,) bool: scans whose errors count. A pose that is still searched for has none."""
+    """(S,) bool: scans that are evaluated; those during a global search are not."""
     since = np.zeros(len(result), bool) if found is None else np.arange(len(result)) >= found
     since &= errors.matched
     return since if since.any() else errors.matched
@@ -361,7 +360,7 @@ def _time(result: ReplayResult) -> Figure:
 
 
 def _percentile(values: np.ndarray, percents: float) -> float:
-    """Infinite next to infinite stays infinite."""
+    """Percentiles like numpy's, but between two infinite values the result is infinite, not NaN."""
     with np.errstate(invalid="ignore"):
         value = float(np.percentile(values, percents))
     return float("inf") if np.isnan(value) else value

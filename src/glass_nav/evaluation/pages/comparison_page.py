@@ -58,7 +58,7 @@ def headline(compared: Comparison) -> str:
 
 
 def _runs(compared: Comparison) -> List[List[str]]:
-    """Head and rows."""
+    """Header and rows of the table of runs."""
     head = [
         "log",
         "contestant",

@@ -42,7 +42,7 @@ def run_lines(result: ReplayResult) -> List[str]:
 
 
 def _relative_lines(figures: Dict[str, Any]) -> List[str]:
-    """By evo's definitions, see relative_errors.py."""
+    """Lines of the relative errors; evo's definitions, see relative_errors.py."""
     over = [
         f"over {name} {figures[f'relative_{key}_rmse_m']:.4f} m, {figures[f'relative_{key}_yaw_rmse_deg']:.3f} deg"
         for key, name in (("1m", "1 m"), ("1s", "1 s"))

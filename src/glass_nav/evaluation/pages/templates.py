@@ -45,5 +45,5 @@ def _data_uri(png: Path) -> str:
 
 
 def _share_of(part: float, whole: float) -> float:
-    """For a width, which must not be 0."""
+    """The part as a share of the whole for the width of a bar, which must not be 0."""
     return max(part / max(whole, 1e-9), 1e-4)

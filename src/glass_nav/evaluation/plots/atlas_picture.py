@@ -66,7 +66,7 @@ def draw_edge(path: Path, grid: Optional[GridMap], atlas: AtlasDrawing, edge: in
 
 
 def _panels(low: np.ndarray, high: np.ndarray, count: int) -> Any:
-    """A figure and its axes, in a column for a floor that is wide, else in a row."""
+    """A figure with `count` axes: one below the other for a wide floor, else side by side."""
     width, height = high - low
     column = width > 1.4 * height
     side = 13.0 if column else 8.0
@@ -94,7 +94,7 @@ def _draw_ground(axes: Any, grid: Optional[GridMap], low: np.ndarray, high: np.n
 
 
 def _draw_graph(axes: Any, atlas: AtlasDrawing) -> None:
-    """Edges and nodes with their numbers; of numbers that would cover each other the nodes' are kept."""
+    """Edges and nodes with numbers; where two would overlap, the node's is drawn."""
     labels = Labels(axes)
     _draw_nodes(axes, atlas, labels)
     _draw_edges(axes, atlas, labels)
@@ -165,7 +165,7 @@ def _draw_segments(axes: Any, segments: np.ndarray, colour: Any, width: float) -
 
 
 def _draw_arrow(axes: Any, line: np.ndarray, colour: Any) -> None:
-    """In the middle of a line, along it."""
+    """An arrow along the line, at its middle."""
     middle = len(line) // 2
     axes.annotate(
         "",

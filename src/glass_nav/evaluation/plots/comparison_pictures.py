@@ -149,7 +149,7 @@ def _errors(folder: Path, compared: Comparison, log: str, number: int) -> Option
 
 
 def _by_scan(runs: List[Run]) -> "tuple[np.ndarray, np.ndarray]":
-    """Stamps (S,) that all of them have an error for, and the errors (R, S) [m]."""
+    """Stamps (S,) at which every run has an error, and these errors (R, S) [m]."""
     known = [np.unique(run.stamps_ns[run.errors.matched], return_index=True) for run in runs]
     stamps_ns = known[0][0]
     for other, _ in known[1:]:

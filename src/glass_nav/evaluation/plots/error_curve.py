@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -19,11 +19,14 @@ RIBBON = 0.08  # share of the error axis below 0, for the states
 
 
 def draw_errors(axes: Any, result: ReplayResult) -> None:
-    from matplotlib.patches import Patch
+    top_m = _draw_curves(axes, result)
+    _draw_ribbon(axes, result, -RIBBON * top_m, -0.25 * RIBBON * top_m)
 
+
+def _draw_curves(axes: Any, result: ReplayResult) -> float:
+    """Position and heading over time: errors, or deviations without a ground truth; returns the top of the axis [m]."""
     seconds = (result.stamps_ns - result.stamps_ns[0]) * 1e-9
     errors = result.errors
-    position: Optional[np.ndarray] = None
     if errors.matched.any():
         position, yaw, what = errors.position_m, np.degrees(errors.yaw_rad), "error"
     else:
@@ -59,15 +62,23 @@ def draw_errors(axes: Any, result: ReplayResult) -> None:
     axes.set_ylabel(f"position {what} [m]", color=ESTIMATE_COLOUR)
     axes.tick_params(axis="y", colors=ESTIMATE_COLOUR)
     axes.grid(True, axis="y", linewidth=0.4, alpha=0.6)
+    return top
+
+
+def _draw_ribbon(axes: Any, result: ReplayResult, low_m: float, high_m: float) -> None:
+    """The states along the time axis; each scan's state holds until the next scan."""
+    from matplotlib.patches import Patch
+
+    seconds = (result.stamps_ns - result.stamps_ns[0]) * 1e-9
     present = states_in_order(result.states)
     states = np.array(result.states)
-    for state in present:  # a ribbon along the time axis; each scan's state holds until the next scan
+    for state in present:
         holds = states == state
         holds[1:] |= states[:-1] == state
         axes.fill_between(
             seconds,
-            -RIBBON * top,
-            -0.25 * RIBBON * top,
+            low_m,
+            high_m,
             where=holds,
             step="post",
             facecolor=state_colour(state),

@@ -117,7 +117,7 @@ def _font(name: str) -> Any:
 
 
 def _swatch(row: Row) -> Any:
-    """A mark as rviz draws it."""
+    """The sample of one row, as rviz draws it."""
     from PIL import Image, ImageDraw
 
     width, height = (_FINE * side for side in _SWATCH)

@@ -52,7 +52,7 @@ def _draw_panes(figure: Any, axes: Any, panes: Sequence[Pane], beside: Sequence[
 
 
 def _extent(grid_map: GridMap) -> "tuple[np.ndarray, np.ndarray]":
-    """Corners (2,) [m] of what is known of the map."""
+    """Lower left and upper right corner (2,) [m] of the known part of the map."""
     rows, columns = np.nonzero(grid_map.occupancy != UNKNOWN)
     if not len(rows):
         rows, columns = np.array([0, grid_map.occupancy.shape[0] - 1]), np.array([0, grid_map.occupancy.shape[1] - 1])

@@ -63,7 +63,7 @@ def draw(
 
 
 def _draw_meetings(axes: Any, score: TopologyScore, verdict: str, labels: Labels) -> None:
-    """Where they are in the map: seen and missed ones as the atlas has them, with a line to what was seen."""
+    """Mark seen and missed meetpoints at their places in the atlas; a line leads to where each was seen."""
     meetings = score.of_kind(verdict)
     if not meetings:
         return

@@ -145,7 +145,7 @@ def _draw_ways(figure: Any, axes: Any, result: ReplayResult) -> None:
 
 
 def _figures(result: ReplayResult) -> str:
-    """The line under the title."""
+    """Text of the line below the title."""
     figures = result.metrics()
     if not result.errors.matched.any():
         return f"{figures['scans']} scans, no ground truth"

@@ -70,14 +70,14 @@ def draw(path: Path, grid: GridMap, story: WakeUpStory, title: str) -> None:
 
 
 def _shown(count: int) -> List[int]:
-    """Depths with a panel."""
+    """Depths of the search that get a panel."""
     if count <= MAX_PANELS:
         return list(range(count))
     return [*range(MAX_PANELS // 2), *range(count - MAX_PANELS // 2, count)]
 
 
 def _bounds(grid: GridMap, story: WakeUpStory) -> "tuple[np.ndarray, np.ndarray]":
-    """Corners of all that the map knows and of the path."""
+    """Corners of the box around the known map and the path."""
     rows, columns = np.nonzero(grid.occupancy >= 0)
     if len(rows):
         corners = [[x, y] for x in (columns.min(), columns.max() + 1) for y in (rows.min(), rows.max() + 1)]
@@ -127,7 +127,7 @@ def _draw_depth(axes: Any, grid: GridMap, depth: Depth, number: int, low: np.nda
 
 
 def _arrows(axes: Any, poses: np.ndarray, colour: str) -> None:
-    """As long on the paper in any building."""
+    """Draw arrows at poses, equally long on paper for every building."""
     axes.quiver(
         poses[:, 0],
         poses[:, 1],
@@ -151,7 +151,7 @@ _PAPER = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none"
 
 
 def _marks(story: WakeUpStory) -> List[Any]:
-    """The legend of all marks that are drawn."""
+    """Handles of the legend, for all marks drawn."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

@@ -63,7 +63,8 @@ class BeamClassifier:
         self.caster.walls_at(np.zeros(0, np.int32))  # works out all normals now: that takes longer than a scan may wait
         self.known_area = KnownArea(grid_map)
         self.thickness_m = wall_thickness.wall_thickness(grid_map)  # (H * W,)
-        self._opaque = np.flatnonzero(free_standing.walls(grid_map, params.vote.glass_max_thickness_m))  # flat cells
+        self._mapped = grid_map  # without the panes that redraw() adds
+        self._opaque = self._thick_things()
         self.residuals = RangeResiduals(_DEPTH_SHARE, params.min_sigma_m)
         self.glass_map = GlassMap(grid_map, params.glass)
         self._coatings = UNKNOWN_COATINGS
@@ -75,8 +76,10 @@ class BeamClassifier:
             self._params.raycast_threads,
         ):
             self.caster = RayCaster(self.caster.grid_map, params.raycast_backend, params.raycast_threads)
-        self.glass_map.weigh_by(params.glass)
-        self._params = params
+        self.glass_map.reconfigure(params.glass)
+        before, self._params = self._params, params
+        if params.vote.glass_max_thickness_m != before.vote.glass_max_thickness_m:
+            self._opaque = self._thick_things()
 
     def redraw(self, grid_map: GridMap, panes: Sequence[Pane]) -> None:
         """Go on with the same map after panes were drawn in; what was learnt of other walls stays.
@@ -147,6 +150,10 @@ class BeamClassifier:
         return surface_scan.of(
             scan.ranges_m, cases.case, first, self.glass_map.chances(first.cell), gate_m, scan.range_max_m, trusted
         )
+
+    def _thick_things(self) -> np.ndarray:
+        """(K,) flat cells, ascending, of free-standing things that are too thick to be glass."""
+        return np.flatnonzero(free_standing.walls(self._mapped, self.max_glass_thickness_m))
 
     def _is_gone(self, cell: np.ndarray, axis_rad: np.ndarray) -> np.ndarray:
         """(G,) bool, of cells (G,) with their axes (G,): the map shows what is no longer there."""

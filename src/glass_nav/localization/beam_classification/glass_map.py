@@ -92,9 +92,9 @@ class GlassMap:
         # Of each wall: log odds that beams added: can be seen through, and is there though it can.
         self._log_odds = np.zeros((2, len(self._wall)), np.float32)
         self._crossed = np.zeros(len(self._wall), bool)
-        self.weigh_by(evidence)
+        self.reconfigure(evidence)
 
-    def weigh_by(self, evidence: GlassEvidence) -> None:
+    def reconfigure(self, evidence: GlassEvidence) -> None:
         """Use other evidence per crossing from now on; what was learnt stays."""
         self._evidence = evidence
         self._prior = np.log([[evidence.glass_prior / (1.0 - evidence.glass_prior)], [_THERE / (1.0 - _THERE)]])

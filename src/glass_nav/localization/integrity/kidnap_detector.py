@@ -133,11 +133,11 @@ class KidnapDetector:
         self._given = given
         self._verdict = Verdict(float("nan"), self._usual, -np.inf, False, None, None)
 
-    def decide_by(self, params: SearchParams) -> None:
+    def reconfigure(self, params: SearchParams) -> None:
         """Use other limits from the next scan on."""
         self._params = params
         if self._search is not None:
-            self._search.decide_by(params)
+            self._search.reconfigure(params)
 
     @property
     def _tolerance(self) -> float:

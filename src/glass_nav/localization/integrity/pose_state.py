@@ -75,7 +75,7 @@ class PoseQuality:
         self._verdict: Optional[Verdict] = None
         self._inlier_ratio = float("nan")
 
-    def limit_by(self, limits: QualityLimits) -> None:
+    def reconfigure(self, limits: QualityLimits) -> None:
         """Use other limits from now on; what was learnt stays."""
         self._limits = limits
 

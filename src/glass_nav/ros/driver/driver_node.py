@@ -65,9 +65,7 @@ from glass_nav.topology.atlas.atlas import AtlasError
 from glass_nav.vocabulary import LocalizationState, Outcome
 
 MARKERS_PERIOD_S = 0.5
-ODOMETRY_GRACE_S = (
-    1.0  # by the wall clock, without odometry, before the log says so: at the start it may come a little later
-)
+ODOMETRY_GRACE_S = 1.0  # by the wall clock; odometry may begin later than the node, so that the log says nothing yet
 SILENCE_S = 5.0  # without any scan for so long, the log says why
 
 
@@ -210,7 +208,7 @@ class DriverNode:
         self._do(self._driver.turn_choice(msg.rank, msg.name, conversions.ns_from_stamp(msg.header.stamp)))
 
     def _see(self, mail: "Dict[str, List[Any]]") -> None:
-        """Scans that have their transforms, of whichever of the two topics the driver prefers now."""
+        """Pass on the scans that have their transforms, from the topic that the driver prefers now."""
         for lane, source in (("scans", self._scans), ("surfaces", self._surfaces)):
             for msg in mail[lane]:
                 stale = source.receive(msg, self._clock.now_s, None)
@@ -313,7 +311,7 @@ class DriverNode:
         )
 
     def _report(self) -> None:
-        """/diagnostics, once a second."""
+        """Publish /diagnostics, once a second."""
         if time.monotonic() < self._next_report_s:
             return
         self._next_report_s = time.monotonic() + 1.0

@@ -143,7 +143,7 @@ class LandmarksNode:
     # -- bearings
 
     def _work_off(self) -> None:
-        """Messages in order of arrival, as soon as tf has what they need."""
+        """Process messages in order of arrival, each as soon as its transforms are available."""
         while self._waiting:
             arrival_s, msg = self._waiting[0]
             missing = self._missing_transform(msg)
@@ -169,7 +169,7 @@ class LandmarksNode:
         return ""
 
     def _take(self, msg: LandmarkBearingsMsg) -> None:
-        """Processes a message whose transforms are available: a fix, or why there is none."""
+        """Process a message whose transforms are available: publish a fix, or report why there is none."""
         mounting = conversions.mounting_from_transform(
             self._tf.lookup_transform(
                 self._p.base_frame_id, conversions.frame_id(msg.header.frame_id), rospy.Time(0)

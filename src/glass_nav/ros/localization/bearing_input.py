@@ -59,7 +59,7 @@ class BearingInput:
         self._waiting.clear()
 
     def _add(self, localizer: PoseFilter, msg: LandmarkBearings) -> None:
-        """The bearings of one message to known landmarks."""
+        """Add the bearings of one message to known landmarks."""
         mounting = conversions.mounting_from_transform(
             self._tf.lookup_transform(
                 self._p.base_frame_id, conversions.frame_id(msg.header.frame_id), rospy.Time(0)

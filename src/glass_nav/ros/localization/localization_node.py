@@ -288,7 +288,7 @@ class LocalizationNode:
         self._health.add_update(time.process_time() - began_cpu_s, time.monotonic() - began_s)
 
     def _pass_over(self, stamp_ns: int, why: str) -> None:
-        """A scan was rejected: the pose still moves on with the odometry."""
+        """Move the pose on by odometry after a scan was rejected."""
         self._scans.refuse(why)
         if self._session.estimate is not None:
             self._outputs.send_transform(stamp_ns, self._session.estimate.map_from_odom)
@@ -310,7 +310,7 @@ class LocalizationNode:
         return jump is not None
 
     def _restart(self, why: str) -> None:
-        """Time jumped: stamps start over."""
+        """Start the filter over: time jumped."""
         self._scans.restart(self._clock.now_s)
         self._bearings.restart()
         self._tf.clear()
@@ -348,7 +348,7 @@ class LocalizationNode:
         self._diagnostics.publish(self._health.report(situation))
 
     def _say_what_to_start(self) -> None:
-        """While nothing was localized: what is missing, for those who started this node alone."""
+        """Log what is missing as long as nothing was localized, for those who start this node alone."""
         if self._session.estimate is not None or time.monotonic() - self._started_s < SETTLING_S:
             return
         hint = what_to_start(
@@ -361,7 +361,7 @@ class LocalizationNode:
 
 
 def _keep_on_server(saved: SavedPose) -> None:
-    """Stores the pose as AMCL does, but with one request for all six; OSError without a parameter server."""
+    """Store the pose on the parameter server as AMCL does, in one request; OSError without a server."""
     requests = MultiCall(ServerProxy(rosgraph.get_master_uri()))
     pose = zip(("pose_x", "pose_y", "pose_a"), saved.map_from_base)
     covariance = zip(("cov_xx", "cov_yy", "cov_aa"), np.diag(saved.covariance))

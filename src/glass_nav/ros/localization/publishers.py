@@ -164,7 +164,7 @@ class Publishers:
         self._wall_markers.publish(wall_display.wall_markers(self._frame, grid_map, glass, localizer.unmapped_panes))
 
     def _show_beams(self, placed: PlacedScan, estimate: Estimate, now_s: float) -> None:
-        """The beams for rviz, if it listens and they are due."""
+        """Publish the beams for rviz, if it listens and they are due."""
         listeners = self._beam_cloud.get_num_connections(), self._beam_markers.get_num_connections()
         if not any(listeners) or not self._beams_pace.is_due(now_s, period_s(self._p.gui_publish_rate)):
             return

@@ -70,7 +70,7 @@ class ReconfigureServer:
             return ReconfigureResponse(self._publish())
 
     def _change(self, wanted: Dict[str, Any]) -> None:
-        """The changed values; ValueError if one is invalid: then none is applied."""
+        """Apply the changed values; ValueError, and no change, if one is invalid."""
         values = dict(self._started_with if wanted.pop(RESTORE, False) else self._values)
         unused = sorted(amcl_parameters.NAMES.intersection(wanted).difference(values))
         if unused:
@@ -136,7 +136,7 @@ def config_msg(values: Mapping[str, Any], groups: List[str]) -> Config:
 
 
 def _groups(values: Mapping[str, Any], explained: Mapping[str, Explained]) -> List[str]:
-    """The sections of the parameter file that these values are of, in its order."""
+    """Sections of the parameter file that contain these values, in its order."""
     return list(dict.fromkeys(each.section for name, each in explained.items() if each.section and name in values))
 
 
@@ -145,7 +145,7 @@ def _group(name: str, number: int) -> Dict[str, Any]:
 
 
 def _edit_method(name: str, choices: Sequence[str]) -> str:
-    """The possible values for rqt_reconfigure, as Python text that it evaluates."""
+    """The possible values as Python text, which rqt_reconfigure evaluates."""
     return str(
         {
             "enum": [{"name": choice, "value": choice, "type": "str", "description": ""} for choice in choices],
@@ -155,7 +155,7 @@ def _edit_method(name: str, choices: Sequence[str]) -> str:
 
 
 def _values_from_msg(msg: Config) -> Dict[str, Any]:
-    """Name -> value of all that the message sets."""
+    """Name -> value of every parameter in the message."""
     return {
         each.name: kind(each.value)
         for kind, group in ((bool, msg.bools), (int, msg.ints), (float, msg.doubles), (str, msg.strs))

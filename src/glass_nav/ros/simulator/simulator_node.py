@@ -113,7 +113,7 @@ class SimulatorNodeParams:
 
 @dataclass(frozen=True)
 class _Drive:
-    """The objects that the parameters describe, built and checked."""
+    """The objects that the parameters describe, built and validated."""
 
     simulation: Simulation
     follower: Optional[PathFollower]
@@ -220,7 +220,7 @@ class SimulatorNode:
     # -- output
 
     def _publish_reading(self) -> None:
-        """Publish the time and what the wheels report."""
+        """Publish the time and the wheel readings."""
         reading = self._simulation.reading
         self._clock.publish(Clock(conversions.stamp_from_ns(reading.stamp_ns)))
         self._transforms.publish(
@@ -256,7 +256,7 @@ class SimulatorNode:
             publish(frame_messages.initial_pose_msg(frame, names))
 
     def _serve_map(self) -> None:
-        """The map that the package draws of the building."""
+        """Publish the map that the package draws of the building."""
         stamp = conversions.stamp_from_ns(self._simulation.stamp_ns)
         building = self._simulation.building
         erased = erased_glass.choose(building, self._p.glass_erased, self._p.seed)
@@ -265,7 +265,7 @@ class SimulatorNode:
         self._map.give(conversions.msg_from_map(grid_map, stamp, self._names.map))
 
     def _await_answer(self, ending: threading.Event) -> None:
-        """Let the localization keep up: wait for its transform of this scan, unless it has stopped answering."""
+        """Wait for the localization's transform at this scan, unless it has stopped answering."""
         until_s = time.monotonic() + (ANSWER_WAIT_S if self._answering else 0.0)
         while self._answers == self._answers_used and time.monotonic() < until_s and not ending.wait(0.001):
             pass
@@ -285,7 +285,7 @@ class _Listener(rospy.SubscribeListener):
 
 
 def _drive(p: SimulatorNodeParams) -> _Drive:
-    """The simulation and its path; ValueError with one line."""
+    """Build the simulation and its path; ValueError with one line."""
     model = lidar.preset(p.lidar)
     if p.beams:
         model = replace(model, beams=p.beams)

@@ -69,7 +69,7 @@ class AmclNode:
 
 
 class _Loader(roslaunch.xmlloader.XmlLoader):  # type: ignore[misc]
-    """roslaunch's own, which says of every fault in which file it is, also below includes."""
+    """roslaunch's loader, which names the file of every error, also in included files."""
 
     ignore_unset_args = False  # some versions read it without setting it
 

@@ -48,7 +48,7 @@ def main() -> None:
 
 
 def _play(arguments: List[str], ending: threading.Event) -> int:
-    """Play, and say how far it is; the exit code of rosbag play."""
+    """Play with progress; returns the exit code of rosbag play."""
     clock_s: List[float] = []
     rospy.Subscriber("/clock", Clock, lambda msg: clock_s.__setitem__(slice(None), [msg.clock.to_sec()]), queue_size=1)
     part = _part(arguments)
@@ -68,7 +68,7 @@ def _play(arguments: List[str], ending: threading.Event) -> int:
 
 
 def _part(arguments: List[str]) -> Optional[PlayedPart]:
-    """The part that will be played; None if a bag cannot be read (rosbag play says why)."""
+    """The part to be played; None if a bag cannot be read (rosbag play reports why)."""
     spans_s = []
     try:
         for path in play_progress.bags_of(arguments):

@@ -110,7 +110,7 @@ def _rgb(rgb: "tuple[int, int, int]") -> ColorRGBA:
 
 
 def _text(header: Header, atlas: Atlas, text: str) -> Marker:
-    """Above the atlas, readable from where all of it is seen."""
+    """A text above the atlas, as large as the view of the whole atlas needs."""
     low, high = atlas.nodes.position_m.min(axis=0), atlas.nodes.position_m.max(axis=0)
     size = search_scene.letter_size_m(atlas)
     pose = Pose(orientation=Quaternion(w=1.0))

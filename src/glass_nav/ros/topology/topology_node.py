@@ -210,7 +210,7 @@ class TopologyNode:
             self._carry_out(self._session.preempt())
 
     def _service(self, work: Callable[[], str]) -> Callable[[TriggerRequest], TriggerResponse]:
-        """A service that lets the run loop do the work and returns its message."""
+        """A service whose work is done by the run loop; `work` returns its response."""
 
         def serve(_request: TriggerRequest) -> TriggerResponse:
             try:
@@ -239,7 +239,7 @@ class TopologyNode:
         return str(rospy.get_param("~atlas", self._p.atlas))
 
     def _make_atlas(self, request: search_session.AtlasRequest) -> None:
-        """Beside the run loop; that of a large map takes a minute."""
+        """Build the atlas outside of the run loop; for a large map it takes a minute."""
 
         @contextmanager
         def watched(what: str, steps: int) -> Iterator[Callable[[], None]]:
@@ -272,7 +272,7 @@ class TopologyNode:
             self._carry_out_as[type(decision)](decision)
 
     def _publish(self, status: SearchStatus) -> None:
-        """Status, candidates and markers, all latched for later subscribers."""
+        """Publish status, candidates and markers, latched."""
         frame, localizer = self._p.global_frame_id, self._session.localizer
         if status.estimate is None and status.belief is None:
             self._scene.forget()

@@ -280,7 +280,7 @@ def _first(bad: np.ndarray) -> int:
 
 
 def _refuse(who: str, bad: np.ndarray, given: np.ndarray, allowed: str) -> None:
-    """Raises AtlasError for the first row that is bad."""
+    """Raise AtlasError for the first bad row, if there is one."""
     at = _first(bad)
     if at >= 0:
         raise AtlasError(f"{who} {at}: {allowed}, got {np.asarray(given)[at].tolist()}")
@@ -346,7 +346,7 @@ def _refuse_bad_darts(darts: Darts, nodes: int, edges: int) -> None:
 
 
 def _refuse_bad_rings(rings: Ragged, darts: Darts, nodes: int) -> None:
-    """Reciprocity: each dart is in the ring of the node that it leaves, once, and nowhere else."""
+    """Check reciprocity: each dart is exactly once in the ring of the node that it leaves, and in no other ring."""
     rings.refuse_bad_offsets("the rings of nodes", nodes)
     at = _first(np.diff(rings.offsets) == 0)
     if at >= 0:
@@ -382,7 +382,7 @@ def _refuse_bad_kinds(nodes: Nodes, degree: np.ndarray) -> None:
 
 
 def _refuse_bad_order(rings: Ragged, darts: Darts, degree: np.ndarray) -> None:
-    """Cyclic order: once round the ring is one turn clockwise."""
+    """Check cyclic order: one round of a ring is one turn clockwise."""
     bearing = darts.bearing_rad[rings.values]
     following = np.arange(1, len(bearing) + 1)
     following[rings.offsets[1:] - 1] = rings.offsets[:-1]

@@ -65,7 +65,7 @@ def prove(
 
 
 def _groups(pairs: np.ndarray, dart: np.ndarray) -> np.ndarray:
-    """(C,) label of each dart, equal for those that pairs (P, 2) connect."""
+    """(C,) label of each dart; pairs (P, 2) connect darts of the same label."""
     from scipy.sparse import coo_matrix, csgraph  # slow to import
 
     names, compact = np.unique(np.concatenate([pairs.ravel(), dart]), return_inverse=True)

@@ -202,7 +202,7 @@ class AtlasLocalizer:
     # -- judgement
 
     def _begin_forest(self, meetpoint: Meetpoint, among: Optional[np.ndarray] = None) -> None:
-        """Anew in the same search."""
+        """Start a new forest within the same search."""
         self._edges_before += self._forest.depth
         self._by_graph.begin()
         self._forest.begin(meetpoint, among)

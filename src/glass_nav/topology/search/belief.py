@@ -50,7 +50,9 @@ class Belief:
         return np.flatnonzero(self.share > risk * self.share[0]) if len(self) else np.zeros(0, np.int64)
 
 
-def places(poses: np.ndarray, scan_nats: np.ndarray, graph_nats: np.ndarray) -> Tuple[np.ndarray, np.ndarray, float]:
+def places(
+    poses: np.ndarray, scan_nats: np.ndarray, graph_nats: np.ndarray, between_nats: np.ndarray
+) -> Tuple[np.ndarray, np.ndarray, float]:
     """Shares of distinct places.
 
     All evidence tells whether the robot is in the map at all. Between two places of it scans must have their part:
@@ -61,6 +63,7 @@ def places(poses: np.ndarray, scan_nats: np.ndarray, graph_nats: np.ndarray) -> 
         poses: (N, 3) hypotheses; those that are no rivals of each other are one place.
         scan_nats: (N,) log likelihood ratios to elsewhere, as likely as one place before there was evidence, by scans.
         graph_nats: (N,) ... by meetpoints and edges.
+        between_nats: (N,) log likelihood ratios to each other, which say nothing of elsewhere.
 
     Returns:
         (K,) indices of the best pose of each place, the likeliest first; (K,) shares; share of elsewhere.
@@ -77,7 +80,7 @@ def places(poses: np.ndarray, scan_nats: np.ndarray, graph_nats: np.ndarray) -> 
         left = left[~same]
     in_map = float(np.logaddexp.reduce(log_mass))
     total = np.logaddexp(in_map, 0.0)
-    among = log_mass + np.maximum(graph_nats[first[0]] - graph_nats[first] - _MOST_BY_GRAPH, 0.0)
+    among = log_mass + between_nats[first] + np.maximum(graph_nats[first[0]] - graph_nats[first] - _MOST_BY_GRAPH, 0.0)
     order = np.argsort(-among, kind="stable")
     share = np.exp(among[order] - np.logaddexp.reduce(among) + in_map - total)
     return np.array(first, np.int64)[order], share, float(np.exp(-total))

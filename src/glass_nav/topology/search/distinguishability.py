@@ -62,7 +62,7 @@ def of(
 
 
 def _merged(alike: Set[FrozenSet[int]]) -> List[FrozenSet[int]]:
-    """Sets that share a dart as one, by their smallest dart."""
+    """Sets that share a dart are united; returned by their smallest dart."""
     merged: List[Set[int]] = []
     for each in sorted(alike, key=min):
         touching = [other for other in merged if other & each]

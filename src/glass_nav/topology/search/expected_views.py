@@ -19,7 +19,7 @@ from glass_nav.topology.atlas.atlas import Atlas
 
 _COMPARED = 300  # new pairs for each step: 0.1 s
 _DIFFERENT = 2.0  # nats that tell two places apart; copies of a room that are drawn at another angle differ by less
-DECISIVE = 8.0  # ... so surely that a robot drives there to see it
+DECISIVE = 7.0  # ... so surely that a robot drives there to see it: a risk of 0.001
 _ROOM_M = 0.5  # nearer to walls a scan depends on each centimetre, and the robot stops short of a dead end
 _MAX_KEPT = 100_000  # pairs
 _SAME_M = 0.7  # a meetpoint nearer than this to one where the robot was is that

@@ -54,7 +54,7 @@ def _edge_seen(traversal: Traversal, left: Optional[Meetpoint]) -> str:
 
 
 def _first_row(localizer: AtlasLocalizer, here: Meetpoint) -> Iterator[str]:
-    """Every node of the atlas."""
+    """Row 0: every node of the atlas."""
     atlas = localizer.atlas
     active = set(atlas.darts.node[localizer.forest.row(0).dart].tolist())
     for node in range(len(atlas.nodes)):
@@ -62,7 +62,7 @@ def _first_row(localizer: AtlasLocalizer, here: Meetpoint) -> Iterator[str]:
 
 
 def _expanded_row(localizer: AtlasLocalizer) -> Iterator[str]:
-    """Every edge of every active search node of the row before."""
+    """The next row: every edge of every active search node of the row before."""
     forest, atlas, matcher = localizer.forest, localizer.atlas, localizer.matcher
     traversal, here, depth = forest.traversals[-1], forest.meetpoints[-1], forest.depth
     before = forest.row(depth - 1).dart
@@ -113,7 +113,7 @@ def _turn_mismatch(atlas: Atlas, departure: int, before: np.ndarray) -> str:
 
 
 def _shortened(lines: List[str]) -> List[str]:
-    """Active ones first when there are many, and a count of the rest."""
+    """At most so many lines, active ones first, and a count of the omitted ones."""
     if len(lines) <= MAX_LINES:
         return lines
     active = [line for line in lines if "  x  " not in line]

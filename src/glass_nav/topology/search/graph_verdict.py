@@ -80,7 +80,7 @@ class GraphVerdict:
         return self._searching(reason, dart, errors, proof.ranks[0])
 
     def _claimed(self, dart: np.ndarray, errors: np.ndarray) -> SearchEstimate:
-        """State for one candidate, or several indistinguishable ones: more edges must confirm it."""
+        """State for one candidate, or for several that cannot be told apart: to be confirmed by more edges."""
         depth, count = self._forest.depth, len(dart)
         path, driven = self._forest.path(int(dart[0])), self._driven(dart)
         if self._claim is None or not self._claim.holds(path, count):
@@ -115,7 +115,7 @@ class GraphVerdict:
         return TurnChoice(rank, int(self._atlas.degree[self._atlas.darts.node[dart[0]]]))
 
     def _driven(self, dart: np.ndarray) -> Set[int]:
-        """Edges on the path of the first candidate."""
+        """Edges on the path of this candidate."""
         return {passed >> 1 for _, passed, _ in self._forest.path(int(dart[0]))[1:]}
 
     def _turn_to_new_edge(self, dart: np.ndarray) -> Optional[int]:
@@ -124,7 +124,7 @@ class GraphVerdict:
 
 
 def _straight_on(meetpoint: Meetpoint) -> int:
-    """Rank of the edge most nearly opposite to the one the robot came along."""
+    """Rank of the edge most nearly opposite to the one along which the robot arrived."""
     if not len(meetpoint.bearings_rad):
         return meetpoint.degree // 2
     return int(np.argmin(np.abs(meetpoint.gaps_rad - np.pi)))

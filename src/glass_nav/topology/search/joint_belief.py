@@ -34,7 +34,7 @@ _LISTED = 100  # hypotheses that were ruled out
 
 @dataclass(frozen=True)
 class _Arrival:
-    """At a meetpoint."""
+    """The robot at a meetpoint, with the poses from which it is judged."""
 
     node: NodeEvidence
     driven_m: float  # until then
@@ -151,7 +151,7 @@ class JointBelief:
 
     def _made(self) -> Belief:
         evidence, poses = self._poses.evidence, self._poses.poses
-        first, share, elsewhere = belief.places(poses, evidence.nats, evidence.other_nats)
+        first, share, elsewhere = belief.places(poses, evidence.nats, evidence.other_nats, evidence.between_nats)
         return Belief(
             self._poses.odom_from_base,
             poses[first],
@@ -168,7 +168,7 @@ class JointBelief:
         )
 
     def _gone(self, before: Optional[Belief], test: str, expected: float) -> Tuple[RuledOut, ...]:
-        """The hypotheses of a belief before that are not followed any more."""
+        """Hypotheses of an earlier belief that are no longer followed."""
         here, after = self._poses.odom_from_base, self._poses.poses
         if before is None or here is None or before.odom_from_base is None:
             return ()

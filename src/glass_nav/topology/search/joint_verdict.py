@@ -168,7 +168,7 @@ class JointVerdict:
         return times is not None and len(times) > 1 and bool(times.min() > 0)
 
     def _least_passed(self, here: Meetpoint) -> int:
-        """Rank of an edge that was passed least often; back only if there is no other."""
+        """Rank of the edge that was passed least often; the edge back only if it is the only one."""
         times = self._passed.times(here)
         if times is None:
             return here.degree // 2

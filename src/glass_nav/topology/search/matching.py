@@ -240,7 +240,7 @@ class Matcher:
         return self._directions_fit(departure, twin(departure), self.atlas.edges.sigma_m[departure >> 1], traversal)
 
     def _segments_fit(self, departure: np.ndarray, traversal: Traversal) -> np.ndarray:
-        """(C,) bool: the walls seen do not contradict those along darts (C,); all True if there are too many."""
+        """(C,) bool: the walls seen are compatible with those along darts (C,); all True for too many darts."""
         if self._segments is None or not len(traversal.segments_m) or len(departure) > _MAX_COMPARED:
             return np.ones(len(departure), bool)
         if id(traversal) not in self._compared and len(self._compared) >= _REMEMBERED:

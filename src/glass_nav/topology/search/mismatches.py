@@ -63,7 +63,7 @@ def words(gone: RuledOut) -> str:
 
 
 def _along(matcher: Matcher, arrival: int, traversal: Traversal) -> Optional[Failed]:
-    """The first test of the edge that a dart fails; None: it passes all."""
+    """The first test of the edge that a dart fails; None if it passes all."""
     departure = np.array([arrival ^ 1])
     if len(matcher.edges_along(departure, traversal)):
         return None
@@ -82,7 +82,7 @@ def _along(matcher: Matcher, arrival: int, traversal: Traversal) -> Optional[Fai
 
 
 def _at(matcher: Matcher, dart: int, here: Meetpoint) -> Optional[Failed]:
-    """The first test of the node that a dart fails; None: it passes all."""
+    """The first test of the node that a dart fails; None if it passes all."""
     atlas = matcher.atlas
     node = int(atlas.darts.node[dart])
     degree, r_m = int(atlas.degree[node]), float(atlas.nodes.r_m[node])

@@ -54,7 +54,7 @@ class Row:
 
 @dataclass
 class _Found:
-    """Parts of a row in the making."""
+    """Parts of a row that is being built."""
 
     darts: List[np.ndarray] = field(default_factory=list)
     parents: List[np.ndarray] = field(default_factory=list)

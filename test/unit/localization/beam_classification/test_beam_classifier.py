@@ -78,6 +78,30 @@ def test_parameters_change_from_the_next_scan_on_and_what_was_learnt_stays():
         assert classifier.caster is not caster
 
 
+def test_how_thick_glass_may_be_can_change_at_run_time():
+    """A box of 0.3 m that was carried out: beams that pass prove that it is gone, unless it may be glass."""
+    cells = MAP.occupancy.copy()
+    rows, columns = MAP.cells(np.array([[4.8, 1.8], [5.05, 2.3]]))
+    cells[rows[0] : rows[1] + 1, columns[0] : columns[1] + 1] = 100
+    with_box = replace(MAP, occupancy=cells)
+    thick = replace(PARAMS, vote=replace(PARAMS.vote, glass_max_thickness_m=1.0))
+
+    def surfaces(params, then):
+        classifier = BeamClassifier(params, with_box)
+        classifier.reconfigure(then)
+        for x in np.linspace(3.0, 4.0, 5):
+            pose = np.array([x, 2.0, 0.0])
+            scan, _ = seen(True, pose)
+            cases, expected = classifier.classify(scan, pose, NARROW)
+            classifier.learn(scan, expected)
+        return classifier.surfaces(scan, cases, expected, True).ranges_m
+
+    thin_ranges, thick_ranges = surfaces(PARAMS, PARAMS), surfaces(thick, thick)
+    assert not np.array_equal(thin_ranges, thick_ranges)
+    np.testing.assert_array_equal(surfaces(thick, PARAMS), thin_ranges)
+    np.testing.assert_array_equal(surfaces(PARAMS, thick), thick_ranges)
+
+
 @pytest.mark.parametrize("trusted", [True, False])
 def test_beams_behind_the_pane_are_cut_at_it_when_the_pose_is_trusted(trusted):
     scan, case = seen(True)

@@ -280,7 +280,7 @@ def test_other_limits_hold_from_the_next_scan_on():
     watched.drive(loop_drive(30))
     true, wrong = carried(60)
     assert not any(verdict.found is not None for verdict in watched.drive(true[:40], wrong[:40]))
-    watched.watch.decide_by(SearchParams(search_margin=2.0))
+    watched.watch.reconfigure(SearchParams(search_margin=2.0))
     odom = odometry(true, np.random.default_rng(0))
     last = watched.drive(true[40:], wrong[40:], odom[40:])
     assert any(verdict.found is not None for verdict in last) or last[-1].contested

@@ -72,7 +72,7 @@ def is_confirmed(
     """Of two places with such evidence by scans, by those of them that did not choose the first, and by meetpoints."""
     params, matcher = SearchParams(), Matcher(CROSS, SearchParams().tolerances, use_angles=True)
     poses = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]])
-    first, share, elsewhere = belief.places(poses, np.array(scans), np.array(graph))
+    first, share, elsewhere = belief.places(poses, np.array(scans), np.array(graph), np.zeros(len(poses)))
     evidence = np.array(scans)[first], np.full(2, checked), np.array(graph)[first], np.ones(2)
     told = Belief(np.zeros(3), poses, share, elsewhere, *evidence, np.full(2, NO_DART), driven_m, 3)
     verdict = JointVerdict(matcher, SearchForest(matcher, 2), PassedEdges(), params)

@@ -54,7 +54,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
 
 
 def _spikes(result: ReplayResult) -> str:
-    """What lone spikes of the heading are due to."""
+    """One sentence on what causes isolated spikes of the heading error."""
     spikes = run_story.yaw_spikes(result, MAX_SPIKES)
     if not spikes:
         return ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Optional, Tuple
+from typing import Any, Optional, Tuple
 
 import numpy as np
 
@@ -16,28 +16,34 @@ from glass_nav.vocabulary import SERIES_COLOURS, state_colour, state_mark, state
 
 
 def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture]:
+    return _draw_against_truth(folder, result) if result.errors.matched.any() else _draw_over_time(folder, result)
+
+
+def _draw_over_time(folder: Path, result: ReplayResult) -> Optional[Picture]:
+    figure = new_figure(10.0, 2.6)
+    axes = figure.subplots()
+    axes.plot(run_story.seconds_of(result), result.reliability, color=SERIES_COLOURS[0], linewidth=1.0)
+    axes.set_ylim(0.0, 1.02)
+    axes.set_xlabel("time since the first scan [s]")
+    axes.set_ylabel("reliability [1]")
+    axes.grid(True, axis="y", linewidth=0.4, alpha=0.6)
+    return save(
+        folder,
+        figure,
+        "reliability",
+        "Reported reliability",
+        f"The probability of a correct pose that the filter reports, over time; median "
+        f"{np.median(result.reliability):.2f}.",
+        "It cannot be checked without a ground truth.",
+    )
+
+
+def _draw_against_truth(folder: Path, result: ReplayResult) -> Optional[Picture]:
     errors = result.errors
-    if not errors.matched.any():
-        figure = new_figure(10.0, 2.6)
-        axes = figure.subplots()
-        axes.plot(run_story.seconds_of(result), result.reliability, color=SERIES_COLOURS[0], linewidth=1.0)
-        axes.set_ylim(0.0, 1.02)
-        axes.set_xlabel("time since the first scan [s]")
-        axes.set_ylabel("reliability [1]")
-        axes.grid(True, axis="y", linewidth=0.4, alpha=0.6)
-        return save(
-            folder,
-            figure,
-            "reliability",
-            "Reported reliability",
-            f"The probability of a correct pose that the filter reports, over time; median "
-            f"{np.median(result.reliability):.2f}.",
-            "It cannot be checked without a ground truth.",
-        )
     reported, off = result.reliability[errors.matched], errors.position_m[errors.matched]
     state_of, right = np.array(result.states)[errors.matched], run_story.right(errors)[errors.matched]
     figure = new_figure(10.0, 3.4)
-    left, beside = figure.subplots(1, 2, gridspec_kw={"width_ratios": [1.6, 1.0]})
+    left, right_axes = figure.subplots(1, 2, gridspec_kw={"width_ratios": [1.6, 1.0]})
     for state in states_in_order(state_of.tolist()):
         here = state_of == state
         left.scatter(
@@ -57,14 +63,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
     left.set_ylabel("true position error [m]")
     left.legend(loc="lower left", fontsize=8, frameon=True, markerscale=2.0)
     centres, share, counts = calibration(reported, right)
-    beside.plot([0.0, 1.0], [0.0, 1.0], color="#888888", linewidth=0.8, linestyle="--")
-    beside.bar(centres, share, width=0.085, color=SERIES_COLOURS[0])
-    for centre, height, count in zip(centres, share, counts):
-        beside.annotate(str(count), (centre, height), ha="center", va="bottom", fontsize=7)
-    beside.set_xlim(0.0, 1.0)
-    beside.set_ylim(0.0, 1.1)
-    beside.set_xlabel("reported reliability [1]")
-    beside.set_ylabel("share that was right [1]")
+    _draw_calibration(right_axes, centres, share, counts)
     return save(
         folder,
         figure,
@@ -79,6 +78,17 @@ def draw(folder: Path, result: ReplayResult, ground: Ground) -> Optional[Picture
         "Right is "
         f"within {pose_errors.RIGHT_M:g} m and {np.degrees(pose_errors.RIGHT_RAD):.0f}°.",
     )
+
+
+def _draw_calibration(axes: Any, centres: np.ndarray, share: np.ndarray, counts: np.ndarray) -> None:
+    axes.plot([0.0, 1.0], [0.0, 1.0], color="#888888", linewidth=0.8, linestyle="--")
+    axes.bar(centres, share, width=0.085, color=SERIES_COLOURS[0])
+    for centre, height, count in zip(centres, share, counts):
+        axes.annotate(str(count), (centre, height), ha="center", va="bottom", fontsize=7)
+    axes.set_xlim(0.0, 1.0)
+    axes.set_ylim(0.0, 1.1)
+    axes.set_xlabel("reported reliability [1]")
+    axes.set_ylabel("share that was right [1]")
 
 
 def calibration(reported: np.ndarray, right: np.ndarray) -> "Tuple[np.ndarray, np.ndarray, np.ndarray]":

@@ -65,7 +65,7 @@ def draw(folder: Path, result: ReplayResult, ground: Ground, number: int, kept: 
 
 
 def _overlay(axes: Any, ends_m: np.ndarray) -> None:
-    """Where the same beams (B, 2) end at the true pose [m]."""
+    """Draw where the beams (B, 2) end at the true pose [m]."""
     axes.scatter(*ends_m.T, s=9, c=TRUTH_COLOUR, marker="1", linewidths=0.7, zorder=3.5, label="at the true pose")
     axes.legend(
         loc="upper center", bbox_to_anchor=(0.5, 0.0), borderaxespad=4.0, fontsize=7, frameon=False, markerscale=2.0
@@ -81,7 +81,7 @@ def _draw_scan(
     answered: np.ndarray,
     shown: Sequence[np.ndarray],
 ) -> None:
-    """The scan as it lies on the map at a pose; the part of the map holds it at all poses shown."""
+    """Draw a scan at a pose on the map; the window contains it at all poses shown."""
     ends = kept.points_m[answered]
     corners = np.concatenate([[other[:2] for other in shown], *(se2.transform_points(other, ends) for other in shown)])
     corners = corners[np.isfinite(corners).all(axis=1)]

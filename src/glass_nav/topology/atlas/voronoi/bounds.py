@@ -52,7 +52,7 @@ def of(grid_map: GridMap, clearance: float, smallest: float) -> Bounds:
 
 
 def _drop_specks(free: np.ndarray, least_cells: float) -> None:
-    """Free cells in pieces too small for the robot are no longer free; in place."""
+    """Mark free cells as not free, in place, where a piece of them is too small for the robot."""
     label, count = ndimage.label(free)
     large = np.bincount(label.ravel(), minlength=count + 1) >= least_cells
     large[0] = False
@@ -60,7 +60,7 @@ def _drop_specks(free: np.ndarray, least_cells: float) -> None:
 
 
 def _around(cells: np.ndarray) -> np.ndarray:
-    """(H, W) bool: one of the cell itself and its 8 neighbours is set."""
+    """(H, W) bool: the cell or one of its 8 neighbours is set."""
     beside = cells.copy()
     beside[1:] |= cells[:-1]
     beside[:-1] |= cells[1:]
@@ -71,7 +71,7 @@ def _around(cells: np.ndarray) -> np.ndarray:
 
 
 def _distance_of_walls(occupied: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """(G,) how far from each cell the nearest occupied one is: 0 if it is one, inf if there is none."""
+    """(G,) distance from each cell to the nearest occupied one [cells]; inf if there is none."""
     away = np.where(occupied[rows, columns], 0.0, np.inf)
     walls = np.argwhere(occupied & _around(~occupied))
     if len(walls):
