@@ -87,13 +87,14 @@ def test_a_corridor_with_equal_doors_leaves_the_pose_at_any_of_them():
 
 
 def test_of_posts_along_a_bridge_a_scan_that_fits_in_part_may_have_met_any():
-    """The linearized fit is sharp at each of them."""
-    posts = [(x, y, x + 0.05, y + 0.05) for x in np.arange(2.0, 18.0, 0.5) for y in (9.0, 11.0)]
+    """The linearized fit is sharp at each of them, and the heading is less certain."""
+    posts = [(x, 11.0, x + 0.05, 11.05) for x in np.arange(2.0, 18.0, 0.5)]
     pose = np.array([10.0, 10.0, 0.0])
-    ends = [(x + 0.025, y + 0.025) for x, y, _, _ in posts if abs(x - 10.0) < 4.0]
+    ends = [(x + 0.025, 11.025) for x, *_ in posts if abs(x - 10.0) < 3.0]
+    ends += [(10.0 + x, 9.025) for x in np.arange(-1.0, 1.0, 0.1)]
     angle = np.arctan2(*(np.array(ends) - pose[:2]).T[::-1])
     points = se2.transform_points(se2.inverse(pose), np.array(ends)[np.argsort(angle)])
-    assert deviations(fit_of(map_of(posts), points, pose, matched=0.2))[0] > 0.2
+    assert deviations(fit_of(map_of([(0, 9, 20, 9), *posts]), points, pose, matched=0.3))[0] > 0.2
 
 
 def test_errors_of_a_wall_do_not_average_out_over_beams():
