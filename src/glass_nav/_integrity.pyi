@@ -16,6 +16,7 @@ class ScanFit:
         worth: float,
     ) -> tuple[np.ndarray, np.ndarray, float]: ...  # (3, 3), (3,) float64
 
+def share_of_second(first: np.ndarray, second: np.ndarray) -> np.ndarray: ...  # (3, 3) float64
 def better_of(first: np.ndarray, second: np.ndarray) -> np.ndarray: ...  # (3, 3) float64
 def widened_by(covariance: np.ndarray, spread: np.ndarray) -> np.ndarray: ...  # (3, 3) float64
 def carried(
