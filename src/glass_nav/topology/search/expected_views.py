@@ -17,7 +17,7 @@ from glass_nav.hypotheses import pose_belief
 from glass_nav.hypotheses.pose_belief import MapScans
 from glass_nav.topology.atlas.atlas import Atlas
 
-_COMPARED = 300  # new pairs for each step: 0.1 s
+_COMPARED = 500  # new pairs for each step: 0.15 s
 _DIFFERENT = 2.0  # nats that tell two places apart; copies of a room that are drawn at another angle differ by less
 DECISIVE = 7.0  # ... so surely that a robot drives there to see it: a risk of 0.001
 _ROOM_M = 0.5  # nearer to walls a scan depends on each centimetre, and the robot stops short of a dead end
@@ -38,11 +38,18 @@ class ExpectedViews:
         self._been: List[np.ndarray] = []  # (3,) the same, at each arrival
         self._aimed: List[np.ndarray] = []  # (3,) the same, where the robot will have been at its next arrival
         self._left = _COMPARED
+        self.has_looked_again = False
 
     def forget(self) -> None:
         """Start over for another search."""
+        self.look_again()
+        self.has_looked_again = False
+
+    def look_again(self) -> None:
+        """The robot is to go once more to where it has been: a lidar that does not see all round may have missed something."""
         self._been.clear()
         self._aimed.clear()
+        self.has_looked_again = True
 
     def arrive(self, odom_from_base: np.ndarray) -> None:
         """The robot is at a meetpoint, at odometry (3,): what is seen there is known now, and told places apart or not."""
