@@ -96,19 +96,14 @@ class ExpectedViews:
             self._known.update(zip(((a, b) for b in others), found.tolist()))
         return np.where(been, 0.0, np.array([self._known.get(pair, 0.0) for pair in pairs]))
 
-    def alike(self, first: np.ndarray, second: np.ndarray, here: Optional[np.ndarray] = None) -> np.ndarray:
-        """(P,) bool: neither of arrival darts (P,) would look different from the other.
+    def alike(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """(P,) bool: neither of arrival darts (P,) would look different from the other; wherever the robot has been.
 
         Args:
             first, second: darts of two places, in either order.
-            here: (2, 3) poses of the robot now at the two places; None: it has been nowhere.
         """
         a, b = self.at(first), self.at(second)
-        alike = np.maximum(self.nats(a, b), self.nats(b, a)) < _DIFFERENT
-        if here is not None:
-            at = [[self._has_been(poses, np.broadcast_to(each, poses.shape)) for each in here] for poses in (a, b)]
-            alike |= ((at[0][0] & at[1][1]) | (at[0][1] & at[1][0])).any(axis=1)
-        return alike
+        return np.maximum(self.nats(a, b), self.nats(b, a)) < _DIFFERENT
 
     def differ(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """(P,) bool: a scan at poses first (P, 3) would tell for certain that the robot is not at second (P, 3)."""

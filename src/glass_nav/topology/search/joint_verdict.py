@@ -98,6 +98,9 @@ class JointVerdict:
             voted = vote.expected(self._matcher, dart, share, self._views, poses)
         is_worth = voted is not None and (self._views is None or voted.removed >= _WORTH)
         if voted is not None and voted.splits and is_worth:
+            if self._views is not None:
+                (there,) = self._views.at(self._matcher.departures(dart[:1], voted.rank) ^ 1)
+                self._views.aim(se2.compose(se2.inverse(poses[0]), there))
             reason = f"{places}; next the turn that leaves the least doubt per metre"
             return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(voted.rank, here.degree))
         towards = None if is_worth else self._towards_difference(belief, left, known, dart, here)
