@@ -41,7 +41,8 @@ def _check_radius(moves: Moves, link: str) -> Iterator[Finding]:
     if len(by_odometry) < _MIN_PAIRS:
         return
     way_m = np.hypot(by_odometry[:, 0], by_odometry[:, 1])
-    low, bend, high = np.percentile(angles.wrap(by_scans[:, 2] - by_odometry[:, 2]) / way_m, [25, 50, 75])
+    excess_rad_m = angles.wrap(by_scans[:, 2] - by_odometry[:, 2]) / way_m
+    low, bend, high = np.percentile(excess_rad_m, [25, 50, 75])
     if abs(bend) < _BEND_RAD_M or high - low > _SPREAD_RAD_M:
         return
     ways = motion_checks.way_ratio(moves)

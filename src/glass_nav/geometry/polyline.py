@@ -59,6 +59,14 @@ def distinct(points: np.ndarray, least_step: float = 1e-6) -> np.ndarray:
     return points[keep]
 
 
+def distances_along(points: np.ndarray) -> np.ndarray:
+    """(W,) distance along the line from the first point to each of the points (W, 2)."""
+    steps = np.diff(points, axis=0)
+    along = np.zeros(len(points))
+    along[1:] = np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))
+    return along
+
+
 def length(points: np.ndarray) -> float:
     """Length of the line through the points (W, 2)."""
     return float(np.hypot(*np.diff(points, axis=0).T).sum())

@@ -507,5 +507,6 @@ def _tenth(poses: np.ndarray, share: np.ndarray) -> Optional[float]:
     for _ in range(_CHANCE_RANK - 1):
         if not len(order):
             return None
-        order = order[np.hypot(*(poses[order, :2] - poses[order[0], :2]).T) > _APART_M]
+        off_m = poses[order, :2] - poses[order[0], :2]
+        order = order[np.hypot(off_m[:, 0], off_m[:, 1]) > _APART_M]
     return float(share[order[0]]) if len(order) else None

@@ -60,5 +60,6 @@ def _ring(pose: np.ndarray) -> np.ndarray:
     """Pairs of ends (2 n, 2): a circle, and a line from its middle to where the robot faces."""
     turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS + 1)
     circle = pose[:2] + _RING_M * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    heading = pose[:2] + 1.6 * _RING_M * np.array([[0.0, 0.0], [np.cos(pose[2]), np.sin(pose[2])]])
+    facing = np.array([np.cos(pose[2]), np.sin(pose[2])])
+    heading = np.stack([pose[:2], pose[:2] + 1.6 * _RING_M * facing])
     return np.concatenate([np.repeat(circle, 2, axis=0)[1:-1], heading])

@@ -262,7 +262,8 @@ def _contradiction(poses: np.ndarray, odometry: np.ndarray, known: np.ndarray) -
 def _odometry_steps(odometry: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """(S - 1, 3) steps, each in the robot's frame before it, and their deviations (S - 1, 3)."""
     steps = se2.compose(se2.inverse(odometry[:-1]), odometry[1:])
-    travelled = np.stack([np.ones(len(steps)), np.hypot(*steps[:, :2].T), np.abs(steps[:, 2])])
+    length_m = np.hypot(steps[:, 0], steps[:, 1])
+    travelled = np.stack([np.ones(len(steps)), length_m, np.abs(steps[:, 2])])
     return steps, (_STEP_SIGMA @ travelled).T
 
 

@@ -57,3 +57,9 @@ def test_points_that_repeat_the_one_before_are_left_out():
 def test_a_line_is_as_long_as_its_pieces() -> None:
     assert polyline.length(np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 6.0]])) == 7.0
     assert polyline.length(np.zeros((1, 2))) == 0.0
+
+
+@pytest.mark.parametrize("count, along", [(0, []), (1, [0.0]), (3, [0.0, 5.0, 7.0])])
+def test_distances_along_a_line_begin_with_0(count, along):
+    points = np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 6.0]])[:count]
+    np.testing.assert_array_equal(polyline.distances_along(points), along)

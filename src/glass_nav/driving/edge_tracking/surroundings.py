@@ -97,15 +97,21 @@ class Surroundings:
 
     def obstacles_m(self, pose: np.ndarray) -> np.ndarray:
         """(K, 2) what stands near the robot at a pose (3,), in its frame: the last scan, the walls of the map."""
-        points = self._points_m[np.abs(self._points_m - pose[:2]).max(axis=1) < _NEAR_M]
+        points = _near(self._points_m, pose)
         return se2.transform_points(se2.inverse(pose), np.concatenate([points, self.unseen_walls_m(pose)]))
 
     def unseen_walls_m(self, pose: np.ndarray) -> np.ndarray:
         """(K, 2) walls of the map near a pose (3,) that the last scan does not show: it shows better where the others are."""
-        walls = self._walls_m[np.abs(self._walls_m - pose[:2]).max(axis=1) < _NEAR_M]
+        walls = _near(self._walls_m, pose)
         if not len(self._points_m) or not len(walls):
             return walls
         return walls[cKDTree(self._points_m).query(walls, distance_upper_bound=_SEEN_M)[0] > _SEEN_M]
+
+
+def _near(points_m: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    """(K, 2) the points (N, 2) that are near a pose (3,), by the larger of their distances along the axes."""
+    off_m = np.abs(points_m - pose[:2])
+    return points_m[np.maximum(off_m[:, 0], off_m[:, 1]) < _NEAR_M]
 
 
 def _steady_points(scan: Scan, local_from_base: np.ndarray) -> np.ndarray:

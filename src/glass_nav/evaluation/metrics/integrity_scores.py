@@ -13,7 +13,7 @@ from typing import Dict, List, Optional, Tuple
 import numpy as np
 
 from glass_nav.evaluation.metrics.pose_errors import RIGHT_M, RIGHT_RAD, SLACK_NS
-from glass_nav.geometry import angles
+from glass_nav.geometry import angles, polyline
 from glass_nav.geometry.trajectory import Trajectory
 from glass_nav.vocabulary import LocalizationState
 
@@ -117,10 +117,9 @@ def trace(
         off[~np.isfinite(off).all(axis=1)] = np.inf
         covered = reference.covers(stamps_ns, SLACK_NS)
         error[covered] = off[covered]
-    steps = np.diff(odom_from_base[:, :2], axis=0)
     return IntegrityTrace(
         stamps_ns,
-        np.concatenate([np.zeros(min(len(yaw), 1)), np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))]),
+        polyline.distances_along(odom_from_base[:, :2]),
         np.array(states, dtype=object).astype(str),
         error,
         axes @ covariance @ axes.transpose(0, 2, 1),

@@ -14,7 +14,7 @@ from typing import Dict, Optional, Tuple
 import numpy as np
 
 from glass_nav.evaluation.metrics.pose_errors import SLACK_NS
-from glass_nav.geometry import angles, se2
+from glass_nav.geometry import angles, polyline, se2
 from glass_nav.geometry.trajectory import Trajectory
 
 DISTANCE_M, TIME_S = 1.0, 1.0
@@ -74,7 +74,7 @@ def of(true: np.ndarray, estimates: np.ndarray, pairs: Tuple[np.ndarray, np.ndar
 
 def pairs_by_distance(estimates: np.ndarray, distance_m: float) -> Tuple[np.ndarray, np.ndarray]:
     """For each pose (N, 3) the one whose path from there is nearest to a distance, if it is within TOLERANCE of it."""
-    path_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(estimates[:, :2], axis=0).T))])
+    path_m = polyline.distances_along(estimates[:, :2])
     begin = np.arange(len(path_m) - 1)
     after = np.clip(np.searchsorted(path_m, path_m[:-1] + distance_m), begin + 1, len(path_m) - 1)
     before = np.maximum(np.searchsorted(path_m, path_m[np.maximum(after - 1, begin + 1)]), begin + 1)  # first of equals

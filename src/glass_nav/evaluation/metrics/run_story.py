@@ -13,7 +13,7 @@ import numpy as np
 from glass_nav.evaluation.metrics import relative_errors
 from glass_nav.evaluation.metrics.pose_errors import LOST_M, RIGHT_M, RIGHT_RAD, PoseErrors
 from glass_nav.evaluation.metrics.replay_result import NO_BEAM, ReplayResult
-from glass_nav.geometry import angles
+from glass_nav.geometry import angles, polyline
 from glass_nav.vocabulary import BeamCase, LocalizationState
 
 SEARCHING = (LocalizationState.GLOBAL_SEARCH, LocalizationState.UNKNOWN)  # states without a pose to rely on
@@ -106,8 +106,7 @@ def first_localized(result: ReplayResult) -> Optional[int]:
 
 def driven_m(result: ReplayResult) -> np.ndarray:
     """(S,) distance since the first scan by odometry."""
-    steps = np.diff(result.odom_from_base[:, :2], axis=0)
-    return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+    return polyline.distances_along(result.odom_from_base[:, :2])
 
 
 def right(errors: PoseErrors) -> np.ndarray:

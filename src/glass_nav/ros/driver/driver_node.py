@@ -65,9 +65,7 @@ from glass_nav.topology.atlas.atlas import AtlasError
 from glass_nav.vocabulary import LocalizationState, Outcome
 
 MARKERS_PERIOD_S = 0.5
-ODOMETRY_GRACE_S = (
-    1.0  # by the wall clock, without odometry, before the log says so: at the start it may come a little later
-)
+ODOMETRY_GRACE_S = 1.0  # by the wall clock; odometry may begin later than the node, so that the log says nothing yet
 SILENCE_S = 5.0  # without any scan for so long, the log says why
 
 

@@ -132,6 +132,6 @@ def bearings(line_m: np.ndarray) -> Tuple[float, float]:
 
 
 def _bearing(line_m: np.ndarray) -> float:
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line_m, axis=0).T))])
+    along = polyline.distances_along(line_m)
     x, y = (np.interp(BEARING_AT_M, along, line_m[:, axis]) - line_m[0, axis] for axis in (0, 1))
     return float(np.arctan2(y, x))

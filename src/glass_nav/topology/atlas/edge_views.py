@@ -13,7 +13,7 @@ from typing import Tuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from glass_nav.geometry import angles
+from glass_nav.geometry import angles, polyline
 from glass_nav.sensing.raycast import RayCaster
 from glass_nav.world import wall_segments
 from glass_nav.world.grid_map import GridMap
@@ -95,8 +95,7 @@ class EdgeViews:
 
 def poses_along(line_m: np.ndarray, step_m: float) -> np.ndarray:
     """(P, 3) poses along a line (n, 2), looking along it: at both ends, and between them at most one step apart."""
-    pieces = np.diff(line_m, axis=0)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*pieces.T))])
+    pieces, along = np.diff(line_m, axis=0), polyline.distances_along(line_m)
     at = np.linspace(0.0, along[-1], int(np.ceil(along[-1] / step_m)) + 1)
     piece = np.clip(np.searchsorted(along, at, side="right") - 1, 0, len(pieces) - 1)
     return np.column_stack(

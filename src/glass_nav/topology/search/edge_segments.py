@@ -64,8 +64,7 @@ def contradiction(seen_m: np.ndarray, atlas_m: np.ndarray, path_m: np.ndarray, r
     Returns:
         share 0..1 of the walls that are compared, and metres of wall that stand in free space.
     """
-    atlas_m = atlas_m[np.hypot(*(atlas_m[:, 2:] - atlas_m[:, :2]).T) > 1e-6]
-    seen_m = seen_m[np.hypot(*(seen_m[:, 2:] - seen_m[:, :2]).T) > 1e-6]
+    atlas_m, seen_m = _without_points(atlas_m), _without_points(seen_m)
     if not len(seen_m) or not len(atlas_m):
         return 0.0, 0.0
     pieces = _Pieces(seen_m)
@@ -80,6 +79,12 @@ def contradiction(seen_m: np.ndarray, atlas_m: np.ndarray, path_m: np.ndarray, r
     share = contradicts / (supports + contradicts + _DOUBT_M)
     best = int(np.argmin(share))
     return float(share[best]), float(contradicts[best])
+
+
+def _without_points(segments_m: np.ndarray) -> np.ndarray:
+    """The segments (n, 4) that have a length."""
+    along_m = segments_m[:, 2:] - segments_m[:, :2]
+    return segments_m[np.hypot(along_m[:, 0], along_m[:, 1]) > 1e-6]
 
 
 class _Pieces:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from glass_nav.geometry import se2
+from glass_nav.geometry import polyline, se2
 from glass_nav.topology.atlas import components
 from glass_nav.topology.atlas.voronoi.bounds import Bounds
 from glass_nav.topology.atlas.voronoi.meetpoints import Meetpoints
@@ -97,7 +97,7 @@ def _order(point: np.ndarray) -> Tuple[float, float]:
 
 def _smooth(line: np.ndarray) -> np.ndarray:
     """A line (n, 2) without the steps of the cells: equidistant points, moved by a cell at most; the ends stay."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    along = polyline.distances_along(line)
     count = max(int(np.ceil(along[-1] / POINT_CELLS)), 1)
     at = np.linspace(0.0, along[-1], count + 1)
     even = np.column_stack([np.interp(at, along, line[:, axis]) for axis in (0, 1)])
