@@ -92,7 +92,8 @@ class DistanceField {
              row + margin < field_.height_ + 0.999;
     }
 
-    __attribute__((always_inline)) void distances_inside(const Values& column, const Values& row, float* distance_m) const {
+    __attribute__((always_inline)) void distances_inside(const Values& column, const Values& row,
+                                                         float* distance_m) const {
       std::array<std::int32_t, kMost> corner;
       std::array<float, kMost> right, up;
       std::array<std::array<float, kMost>, 4> at;

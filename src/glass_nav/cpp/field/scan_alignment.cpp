@@ -21,7 +21,8 @@ struct Equations {
 };
 
 /// Of the squared distances, with Geman-McClure weights.
-GLASS_NAV_VECTORIZED Equations normal_equations(const DistanceField& field, const Points& points, const Pose& pose, double scale_m) {
+GLASS_NAV_VECTORIZED Equations normal_equations(const DistanceField& field, const Points& points, const Pose& pose,
+                                                double scale_m) {
   const double cos = std::cos(pose[2]), sin = std::sin(pose[2]), square = scale_m * scale_m;
   Slopes at;
   Slopes::Values x, y, map_x, map_y, along_yaw, weight;
