@@ -107,6 +107,7 @@ class ScanSearch:
         points: np.ndarray,  # (B, 2) float64
         headings_rad: np.ndarray,  # (A,) float64
         keep: int,
+        max_behind: float,
     ) -> None: ...
     look_ups: int
     def advance(self, look_ups: int) -> bool: ...

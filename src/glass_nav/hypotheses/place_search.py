@@ -30,7 +30,12 @@ class PlaceSearch:
     """advance() with every scan until it is complete; then there are places()."""
 
     def __init__(
-        self, matcher: ScanMatcher, field: DistanceField, points_m: np.ndarray, odom_from_base: np.ndarray
+        self,
+        matcher: ScanMatcher,
+        field: DistanceField,
+        points_m: np.ndarray,
+        odom_from_base: np.ndarray,
+        max_behind: float = 1.0,
     ) -> None:
         """
         Args:
@@ -38,11 +43,12 @@ class PlaceSearch:
             field: of the map.
             points_m: (B, 2) finite end points of the scan's beams in the robot's frame.
             odom_from_base: (3,) odometry at the scan.
+            max_behind: how far the matcher's score of a place, 0..1, may be behind that of the best.
         """
         self._field, self._points_m = field, points_m
         self._odom_from_base = np.array(odom_from_base, float)
         self._slice = _SLICE if matcher.cell_count <= _CACHED_CELLS else _SLICE // 3
-        self._matching = matcher.begin(points_m, _STARTS)
+        self._matching = matcher.begin(points_m, _STARTS, max_behind)
         self._matched = False
         self._starts = np.zeros((0, 3))  # still to be aligned
         self._aligned: List[np.ndarray] = []  # (N, 3) poses

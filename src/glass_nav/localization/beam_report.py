@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Callable
 
 from glass_nav.localization.beam_classification.case_votes import BeamCases
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
@@ -13,5 +15,10 @@ class BeamReport:
     """The report on the beams of one scan."""
 
     cases: BeamCases  # of every beam
-    surface_scan: SurfaceScan  # the scan in which glass is an obstacle
     inlier_ratio: float  # of the beams that say something, see beam_evidence.py; NaN without any
+    cut: Callable[[], SurfaceScan]  # by what the filter knows when it is called
+
+    @cached_property
+    def surface_scan(self) -> SurfaceScan:
+        """The scan in which glass is an obstacle. Computed on first access, which must be before the next scan."""
+        return self.cut()

@@ -174,7 +174,9 @@ class DocumentLocalizer:
         best = pose_estimate.of(self._particles, self._weights)
         judgement = self._quality.judge(best)
         trusted = judgement.state == LocalizationState.LOCALIZED
-        report = BeamReport(cases, self._classifier.surfaces(scan, cases, expected, trusted), evidence.inlier_ratio)
+        report = BeamReport(
+            cases, evidence.inlier_ratio, lambda: self._classifier.surfaces(scan, cases, expected, trusted)
+        )
         return Estimate(
             scan.stamp_ns,
             map_from_base,

@@ -119,8 +119,11 @@ class SeenBeams:
 
     def report(self, trusted: bool) -> BeamReport:
         """Report on the beams; `trusted`: whether the pose is."""
-        surfaces = self._classifier.surfaces(self._scan, self._cases, self._expected, trusted)
-        return BeamReport(self._cases, surfaces, self.evidence.inlier_ratio)
+
+        def cut() -> SurfaceScan:
+            return self._classifier.surfaces(self._scan, self._cases, self._expected, trusted)
+
+        return BeamReport(self._cases, self.evidence.inlier_ratio, cut)
 
 
 class Localizer:

@@ -31,9 +31,9 @@ def by_trying(scores, allowed, points, headings):
     return best
 
 
-def search(scores, allowed, points, headings, keep):
+def search(scores, allowed, points, headings, keep, max_behind=1.0):
     """Row, column, heading and score of the best places."""
-    complete = _grid.ScanSearch(_grid.MatchGrid(scores, allowed), points, headings, keep)
+    complete = _grid.ScanSearch(_grid.MatchGrid(scores, allowed), points, headings, keep, max_behind)
     assert complete.advance(2**62)
     return complete.places()
 
@@ -55,6 +55,9 @@ def test_branch_and_bound_finds_what_trying_everything_finds(seed):
     assert allowed[row, column].all()
     few = search(scores, allowed, points, headings, 7)
     np.testing.assert_array_equal(few[3], score[:7])
+    near = search(scores, allowed, points, headings, 10_000, 0.1)
+    assert 0 < len(near[3]) < len(score)
+    np.testing.assert_array_equal(near[3], score[score >= score[0] - 25.5])
 
 
 def test_many_points_add_up():
@@ -70,7 +73,7 @@ def test_a_search_in_slices_finds_what_one_at_once_finds(slice_size):
     rng = np.random.default_rng(3)
     scores, allowed = rng.integers(0, 256, (40, 70)).astype(np.uint8), rng.random((40, 70)) < 0.3
     given = rng.uniform(-20.0, 20.0, (9, 2)), rng.uniform(-np.pi, np.pi, 7), 20
-    sliced = _grid.ScanSearch(_grid.MatchGrid(scores, allowed), *given)
+    sliced = _grid.ScanSearch(_grid.MatchGrid(scores, allowed), *given, 1.0)
     slices = 1
     while not sliced.advance(slice_size):
         slices += 1

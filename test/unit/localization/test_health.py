@@ -34,7 +34,7 @@ def estimate(state="LOCALIZED", std=0.05, used_share=0.9, beams=100):
         np.zeros(3),
         np.eye(3) * std**2,
         np.zeros(3),
-        lambda: BeamReport(cases, surfaces, used_share),
+        lambda: BeamReport(cases, used_share, lambda: surfaces),
         np.zeros((5, 3)),
         state,
         "why",

@@ -801,7 +801,7 @@ def test_mrpts_ray_casts_give_nearly_the_same_answer(drive):
 
 def test_the_search_beside_tracking_ends_though_the_robot_stands(drive, monkeypatch):
     """Each scan advances it, though only the first one moves the particles; its verdict changes the confidence."""
-    monkeypatch.setattr(place_search, "_SLICE", 1_000_000)
+    monkeypatch.setattr(place_search, "_SLICE", 20_000)
     localizer = started(at=drive.true[0] + [0.0, 0.0, 0.2])
     stands = [
         localizer.update(replace(drive.scans[0], stamp_ns=index * SECOND_NS), drive.odometry[0]) for index in range(60)

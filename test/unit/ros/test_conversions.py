@@ -176,7 +176,7 @@ def estimate(particles: int = 3) -> Estimate:
         np.array([1.0, 2.0, 0.5]),
         covariance,
         np.zeros(3),
-        lambda: BeamReport(cases, surface, 0.9),
+        lambda: BeamReport(cases, 0.9, lambda: surface),
         poses,
         "LOCALIZED",
         "for the test",

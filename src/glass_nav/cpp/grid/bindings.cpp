@@ -249,11 +249,12 @@ std::shared_ptr<MatchGrid> make_match_grid(const Array<std::uint8_t>& scores, co
 }
 
 std::unique_ptr<ScanSearch> make_search(std::shared_ptr<MatchGrid> grid, const Array<double>& points,
-                                        const Array<double>& headings_rad, std::size_t keep) {
+                                        const Array<double>& headings_rad, std::size_t keep, double max_behind) {
   if (points.ndim() != 2 || points.shape(1) != 2) throw std::invalid_argument("points must be (B, 2)");
   if (headings_rad.ndim() != 1) throw std::invalid_argument("headings must be (A,)");
   return std::make_unique<ScanSearch>(std::move(grid), points.data(), static_cast<std::size_t>(points.shape(0)),
-                                      headings_rad.data(), static_cast<std::size_t>(headings_rad.shape(0)), keep);
+                                      headings_rad.data(), static_cast<std::size_t>(headings_rad.shape(0)), keep,
+                                      max_behind);
 }
 
 py::tuple places(const ScanSearch& search) {
@@ -296,7 +297,8 @@ PYBIND11_MODULE(_grid, module) {
   py::class_<MatchGrid, std::shared_ptr<MatchGrid>>(module, "MatchGrid")
       .def(py::init(&make_match_grid), py::arg("scores"), py::arg("allowed"));
   py::class_<ScanSearch>(module, "ScanSearch")
-      .def(py::init(&make_search), py::arg("grid"), py::arg("points"), py::arg("headings_rad"), py::arg("keep"))
+      .def(py::init(&make_search), py::arg("grid"), py::arg("points"), py::arg("headings_rad"), py::arg("keep"),
+           py::arg("max_behind"))
       .def("advance", &ScanSearch::advance, py::arg("look_ups"), py::call_guard<py::gil_scoped_release>())
       .def_property_readonly("look_ups", &ScanSearch::look_ups)
       .def("places", &places);

@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::size_t kAtOnce = 16;        // scores of a plane that are added up in the time of one other look-up
 constexpr std::size_t kMaxPoints16 = 257;  // whose scores add up to 16 bits
+constexpr int kHighest = 255;              // score of a point
 
 int floor_div(int value, int by) { return value >= 0 ? value / by : -((-value + by - 1) / by); }
 
@@ -71,8 +72,12 @@ const std::uint8_t* MatchGrid::Planes::row(int x, int y, int block_row, int& fir
 }
 
 ScanSearch::ScanSearch(std::shared_ptr<const MatchGrid> grid, const double* points, std::size_t count,
-                       const double* headings_rad, std::size_t heading_count, std::size_t keep)
-    : grid_(std::move(grid)), point_count_(count), keep_(keep), turned_(heading_count) {
+                       const double* headings_rad, std::size_t heading_count, std::size_t keep, double max_behind)
+    : grid_(std::move(grid)),
+      point_count_(count),
+      keep_(keep),
+      max_behind_(static_cast<std::int32_t>(std::lround(kHighest * static_cast<double>(count) * max_behind))),
+      turned_(heading_count) {
   for (std::size_t heading = 0; heading < heading_count; ++heading) {
     const double cos = std::cos(headings_rad[heading]), sin = std::sin(headings_rad[heading]);
     for (std::size_t i = 0; i < count; ++i) {
@@ -95,7 +100,7 @@ bool ScanSearch::advance(std::size_t look_ups) {
     if (look_ups_ >= until) return false;
     const Square square = squares_.top();
     squares_.pop();
-    const std::int32_t least = kept_.size() < keep_ ? 0 : kept_.top().bound;
+    const std::int32_t least = std::max(highest_ - max_behind_ - 1, kept_.size() < keep_ ? 0 : kept_.top().bound);
     if (square.bound <= least) {
       squares_ = {};
       break;
@@ -105,12 +110,14 @@ bool ScanSearch::advance(std::size_t look_ups) {
     if (best.heading < 0) continue;
     if (kept_.size() == keep_) kept_.pop();
     kept_.push(best);
+    highest_ = std::max(highest_, best.bound);
   }
   return true;
 }
 
 std::vector<Match> ScanSearch::places() const {
   auto kept = kept_;
+  while (!kept.empty() && kept.top().bound < highest_ - max_behind_) kept.pop();  // found before the best was
   std::vector<Match> found(kept.size());
   for (std::size_t i = found.size(); i-- > 0; kept.pop()) {
     const Square& at = kept.top();

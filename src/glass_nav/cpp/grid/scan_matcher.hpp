@@ -74,9 +74,10 @@ class MatchGrid {
 /// is done in slices, as much at a time as the caller has time for.
 class ScanSearch {
  public:
-  /// At most keep places. points: (count, 2) in cells, from the robot.
+  /// At most `keep` places, none of whose scores is further than `max_behind`, a share of the highest score that there
+  /// is, behind that of the best. points: (count, 2) in cells, from the robot.
   ScanSearch(std::shared_ptr<const MatchGrid> grid, const double* points, std::size_t count, const double* headings_rad,
-             std::size_t heading_count, std::size_t keep);
+             std::size_t heading_count, std::size_t keep, double max_behind);
 
   /// Goes on until about so many scores were looked up; whether all is done.
   bool advance(std::size_t look_ups);
@@ -109,6 +110,8 @@ class ScanSearch {
 
   std::shared_ptr<const MatchGrid> grid_;
   std::size_t point_count_, keep_;
+  std::int32_t max_behind_;                  // of the summed scores
+  std::int32_t highest_ = 0;                 // sum so far
   std::vector<std::vector<Offset>> turned_;  // the points, for each heading
   std::size_t next_row_ = 0;                 // of blocks, over all headings: the next to be bounded
   std::size_t look_ups_ = 0;                 // so far
