@@ -63,7 +63,7 @@ class DistanceField {
       }
     }
 
-    void distances(double x_m, double y_m, float* distance_m) const {
+    __attribute__((always_inline)) void distances(double x_m, double y_m, float* distance_m) const {
       std::array<double, kMost> column, row;
       for (std::size_t k = 0; k < count_; ++k) {
         column[k] = column_[k] + cos_[k] * x_m - sin_[k] * y_m;
@@ -92,7 +92,8 @@ class DistanceField {
              row + margin < field_.height_ + 0.999;
     }
 
-    void distances_inside(const Values& column, const Values& row, float* distance_m) const {
+    __attribute__((always_inline)) void distances_inside(const Values& column, const Values& row,
+                                                         float* distance_m) const {
       std::array<std::int32_t, kMost> corner;
       std::array<float, kMost> right, up;
       std::array<std::array<float, kMost>, 4> at;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "vectorized.hpp"
+
 namespace glass_nav {
 
 LogDensity::LogDensity(double sigma_m, double z_hit, double z_rand)
@@ -21,8 +23,8 @@ LogDensity::LogDensity(double sigma_m, double z_hit, double z_rand)
   parts_.push_back({static_cast<float>(value_at(parts)), 0.0F});
 }
 
-void log_weights_at(const DistanceField& field, const Points& points, const std::vector<Pose>& poses,
-                    const LogDensity& density, double* log_w) {
+GLASS_NAV_VECTORIZED void log_weights_at(const DistanceField& field, const Points& points,
+                                         const std::vector<Pose>& poses, const LogDensity& density, double* log_w) {
   using Frames = DistanceField::Frames;
   std::array<float, Frames::kMost> distance_m;
   std::fill_n(log_w, poses.size(), 0.0);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vectorized.hpp"
+
 namespace glass_nav {
 namespace {
 
@@ -19,7 +21,8 @@ struct Equations {
 };
 
 /// Of the squared distances, with Geman-McClure weights.
-Equations normal_equations(const DistanceField& field, const Points& points, const Pose& pose, double scale_m) {
+GLASS_NAV_VECTORIZED Equations normal_equations(const DistanceField& field, const Points& points, const Pose& pose,
+                                                double scale_m) {
   const double cos = std::cos(pose[2]), sin = std::sin(pose[2]), square = scale_m * scale_m;
   Slopes at;
   Slopes::Values x, y, map_x, map_y, along_yaw, weight;
@@ -95,7 +98,7 @@ Matrix3 information_at(const DistanceField& field, const Points& points, const P
   return {e.a00, e.a01, e.a02, e.a01, e.a11, e.a12, e.a02, e.a12, e.a22};
 }
 
-double fit_at(const DistanceField& field, const Points& points, const Pose& pose, double scale_m) {
+GLASS_NAV_VECTORIZED double fit_at(const DistanceField& field, const Points& points, const Pose& pose, double scale_m) {
   const double cos = std::cos(pose[2]), sin = std::sin(pose[2]), square = scale_m * scale_m;
   Slopes at;
   Slopes::Values x_m, y_m;

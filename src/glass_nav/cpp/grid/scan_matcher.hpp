@@ -110,8 +110,8 @@ class ScanSearch {
 
   std::shared_ptr<const MatchGrid> grid_;
   std::size_t point_count_, keep_;
-  std::int32_t max_behind_;    // of the summed scores
-  std::int32_t highest_ = 0;   // sum so far
+  std::int32_t max_behind_;                  // of the summed scores
+  std::int32_t highest_ = 0;                 // sum so far
   std::vector<std::vector<Offset>> turned_;  // the points, for each heading
   std::size_t next_row_ = 0;                 // of blocks, over all headings: the next to be bounded
   std::size_t look_ups_ = 0;                 // so far
