@@ -56,7 +56,7 @@ SUBCOMMANDS = {
 SETUP_WORDS = {
     "catkin_make",
     "cd",
-    "git",
+    "ln",
     "pip",
     "rosdep",
     "scripts/demo",

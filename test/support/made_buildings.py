@@ -102,8 +102,11 @@ class Drive:
         seed: int = 0,
         p: EdgeDriverParams = EdgeDriverParams(),
         odometry: OdometryParams = OdometryParams(),
+        scan_rate_hz: float = 5.0,  # most drives need no more
     ) -> None:
-        self.simulation = Simulation(building, model, odometry=odometry, seed=seed, start=np.array(start, float))
+        self.simulation = Simulation(
+            building, model, odometry=odometry, seed=seed, start=np.array(start, float), scan_rate_hz=scan_rate_hz
+        )
         self.driver = EdgeDriver(p)
         self.command = np.zeros(3)
         self.commands: List[np.ndarray] = []

@@ -224,7 +224,7 @@ class _Steps:
         self._ended: "set[int]" = set()
 
     def heard(self, event: "Tuple[float, Tuple[int, int]]") -> None:
-        """From a worker, in the client's own thread."""
+        """Take a report from a worker, in the client's own thread."""
         number, count = event[1]
         self.reached(number, count)
 

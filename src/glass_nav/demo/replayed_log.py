@@ -49,7 +49,7 @@ class MapAgreement:
 
 
 def map_agreement(scans: Iterable[Scan], result: ReplayResult, field: DistanceField) -> MapAgreement:
-    """Of the scans for which the result has a pose and a reference; beams that met nothing are left out."""
+    """Distance of the beams' ends from the walls, at our poses and at those of the reference; medians of each scan."""
     reference, ours = result.reference, dict(zip(result.stamps_ns.tolist(), result.map_from_base))
     off_m: List[List[float]] = []
     for scan in scans:

@@ -145,11 +145,11 @@ class Driver:
     # -- events
 
     def at(self, now_s: float) -> None:
-        """Time goes on; if it jumped back, reset() is due."""
+        """Set the time; if it jumped back, call reset() next."""
         self._now_s = now_s
 
     def reset(self, why: str) -> List[Decision]:
-        """Time jumped back: odometry and stamps begin anew, and so does the driver."""
+        """Start over: time jumped back, and so do odometry and stamps."""
         self._log(f"{why}: the driver restarts", logging.WARNING)
         if self._job is not None:
             self._finish(self._job, Ending(Outcome.RESET, why))

@@ -45,7 +45,7 @@ class InputWatch:
         self.reset()
 
     def reset(self) -> None:
-        """Time began anew."""
+        """Start over: time jumped back."""
         self.scan_ns = 0  # stamp of the last scan that was used; 0: none
         self.odometry: Optional[Odometry] = None
         self.localization: Optional[LocalizationState] = None

@@ -31,7 +31,7 @@ class MeetpointStay:
         self.arrival = None
 
     def reset(self) -> None:
-        """Time began anew."""
+        """Start over: time jumped back."""
         self.arrival, self._reported_s = None, -math.inf
 
     def was_left(self, odom_from_base: Optional[np.ndarray]) -> bool:

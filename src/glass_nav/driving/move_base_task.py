@@ -84,7 +84,7 @@ class MoveBaseTask:
         return np.zeros(3)
 
     def hold(self) -> None:
-        """Call the goal off until the next step()."""
+        """Cancel the goal until the next step()."""
         if self._is_sent and self._ended is None:
             self._is_sent = False
             self._sendings += 1

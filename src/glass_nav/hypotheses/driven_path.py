@@ -2,7 +2,8 @@
 
 A robot drives only through free space. A pose from which odometry would have led through walls or unmapped space is
 probably wrong, whatever its scans show. The path is judged in pieces, since one moved object, or a door that was closed
-when the map was made, blocks several points of it. N points, K poses.
+when the map was made, blocks several points of it. It counts once, however often the robot drives there. N points, K
+poses.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from glass_nav.geometry import se2
 
 PIECE_M = 0.5  # of the path: one piece of evidence
 _STEP_M = 0.1  # between points: less than walls are thick
+_SAME_M, _DRIFT_SHARE = 0.3, 0.02  # a point nearer to an earlier one is the same; more per metre driven since
 
 IsFree = Callable[[np.ndarray], np.ndarray]  # points (..., 2) of the map -> (...) bool: a robot may stand there
 
@@ -30,8 +32,15 @@ class DrivenPath:
         """The robot is at odometry (3,), after that distance."""
         if self._points and np.hypot(*(odom_from_base[:2] - self._points[-1])) < _STEP_M:
             return
+        piece = int(driven_m / PIECE_M)
+        earlier = int(np.searchsorted(self._piece, piece - 1))  # points that the robot has left behind
+        if earlier:
+            near_m = _SAME_M + _DRIFT_SHARE * PIECE_M * (piece - np.array(self._piece[:earlier]))
+            off_m = np.hypot(*(np.array(self._points[:earlier]) - odom_from_base[:2]).T)
+            if (off_m < near_m).any():
+                return
         self._points.append(np.array(odom_from_base[:2], float))
-        self._piece.append(int(driven_m / PIECE_M))
+        self._piece.append(piece)
 
     @property
     def complete(self) -> int:

@@ -323,7 +323,7 @@ class _Box:
 
     @staticmethod
     def around(points_m: np.ndarray, margin_m: float) -> "_Box":
-        """With a margin around points (N, 2); nothing around none."""
+        """The box of points (N, 2) with a margin; empty without points."""
         low_m = points_m.min(axis=0, initial=np.inf) - margin_m
         return _Box(low_m, points_m.max(axis=0, initial=-np.inf) + margin_m)
 

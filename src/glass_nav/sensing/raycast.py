@@ -141,7 +141,7 @@ class RayCaster:
         return self._grid.cast(poses, angles_rad, max_range_m, self._threads)
 
     def cast_first(self, poses: np.ndarray, angles_rad: np.ndarray, max_range_m: float) -> FirstHits:
-        """As cast(), also returning the cells met."""
+        """Like cast(), but also returns the cells that the rays met."""
         poses, angles_rad = self._checked(poses, angles_rad, max_range_m)
         return FirstHits(*self._grid.cast_first(poses, angles_rad, max_range_m, self._threads))
 

@@ -65,7 +65,7 @@ class Drive:
     def run(self, task, until=lambda: False, limit_s=240.0):
         """Until the task has ended, or so long."""
         for step in range(round(limit_s / CONTROL_S)):
-            if step % 2 == 0:
+            if step % 4 == 0:  # 5 Hz
                 frame = self.simulation.look()
                 self.driver.see(frame.scan, frame.odom_from_base)
             self.last = task.step(self.now())

@@ -33,3 +33,14 @@ def test_who_has_not_driven_has_met_no_wall() -> None:
     assert path.complete == 0 and path.blocked(in_front_of_a_wall, here[None], here, 0, 0).tolist() == [0.0]
     path.add(here, 0.0)
     assert path.complete == 0 and path.blocked(in_front_of_a_wall, np.zeros((0, 3)), here, 0, 1).tolist() == []
+
+
+def test_a_thing_that_the_robot_drives_through_again_counts_once() -> None:
+    path = driven(3.1)
+    for x in np.arange(3.1, -0.1, -0.02):  # and back
+        path.add(np.array([x, 0.05, np.pi]), float(6.2 - x))
+    here = np.array([0.0, 0.05, np.pi])
+    for x in np.arange(0.0, 3.1, 0.02):  # and beside it, where it was not
+        path.add(np.array([x, -1.0, 0.0]), float(7.2 + x))
+    assert path.blocked(in_front_of_a_wall, here[None], here, 0, 14).tolist() == [1.0]
+    assert path.blocked(in_front_of_a_wall, here[None], here, 0, path.complete).tolist() == [2.0]

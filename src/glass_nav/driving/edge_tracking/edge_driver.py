@@ -81,7 +81,7 @@ class EdgeDriver:
         self.reset()
 
     def reset(self) -> None:
-        """Forget all: odometry began anew, or the robot was carried."""
+        """Start over: odometry was restarted, or the robot was carried."""
         self._near.clear()
         self._velocity = np.zeros(3)
         self._arrival: Optional[Arrival] = None

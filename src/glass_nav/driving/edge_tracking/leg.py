@@ -48,7 +48,7 @@ class Leg:
     dismissed_m: List[np.ndarray] = field(default_factory=list)  # (2,) places that turned out to be no nodes
 
     def follow(self, node: Node, rank: int) -> None:
-        """Along the edge of that rank."""
+        """Follow the edge of that rank."""
         self.rank = rank
         self.way = line(node.branches[rank].way_m)
         self.trace = Trace(node.position_m)

@@ -85,7 +85,7 @@ class LocalMap:
         return self._p
 
     def clear(self) -> None:
-        """Forget all."""
+        """Forget everything."""
         self._occupied = None
         self._ended[:], self._passed[:], self._stood[:], self._seen = 0, 0, False, False
 

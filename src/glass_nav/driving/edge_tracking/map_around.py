@@ -27,7 +27,7 @@ class MapAround:
         self._wide: Optional[LocalMap] = None  # while the robot is in a hall that needs it
 
     def clear(self) -> None:
-        """Forget all."""
+        """Forget everything."""
         self._fine.clear()
         self._wide = None
 

@@ -36,7 +36,7 @@ class Surroundings:
         self.clear()
 
     def clear(self) -> None:
-        """Forget all."""
+        """Forget everything."""
         self._map.clear()
         self._at.clear()
         self.grid: Optional[GridMap] = None  # the last map; None before the first

@@ -73,7 +73,7 @@ class ScanMemory:
         return None
 
     def forget(self) -> None:
-        """Time began anew."""
+        """Forget all scans: time jumped back."""
         with self._came:
             self._scans.clear()
         self._given_ns = -1

@@ -38,7 +38,6 @@ def prove(
     dart: np.ndarray,
     max_pairs: int = MAX_PAIRS,
     views: Optional[ExpectedViews] = None,
-    poses: Optional[np.ndarray] = None,
 ) -> Proof:
     """Whether candidates can be told apart.
 
@@ -47,7 +46,6 @@ def prove(
         dart: (C,) candidates at meetpoints that are alike.
         max_pairs: the search stops after this number.
         views: scans at meetpoints tell them apart, too; None: they do not.
-        poses: (C, 3) of the robot at each candidate: where it has been it has looked; None: it has been nowhere.
     """
     group = np.arange(len(dart))
     searched, known = 0, np.zeros((0, 2), np.int64)
@@ -55,8 +53,7 @@ def prove(
         apart = np.flatnonzero(group != group[0])
         if not len(apart):
             return Proof(views is None or not views.is_exhausted, None, searched)
-        here = None if poses is None else poses[[0, apart[0]]]
-        met, ranks = _search(matcher, dart[0], dart[apart[0]], max_pairs - searched, views, here)
+        met, ranks = _search(matcher, dart[0], dart[apart[0]], max_pairs - searched, views)
         searched += len(met)
         if ranks is not None or searched >= max_pairs:
             return Proof(False, ranks, searched)
@@ -80,7 +77,6 @@ def _search(
     second: int,
     max_pairs: int,
     views: Optional[ExpectedViews],
-    here: Optional[np.ndarray],
 ) -> Tuple[np.ndarray, Optional[List[int]]]:
     """The pairs (P, 2) that turns lead to from one pair, level by level, and the turns to the first that differs."""
     count = len(matcher.atlas.darts)
@@ -99,7 +95,7 @@ def _search(
             )
             alike = matcher.alike_along(one, other) & matcher.alike_along(other, one)
             if views is not None:
-                alike[alike] = views.alike(one[alike] ^ 1, other[alike] ^ 1, here)
+                alike[alike] = views.alike(one[alike] ^ 1, other[alike] ^ 1)
             bad = np.flatnonzero(~alike)
             if len(bad):
                 return _pairs(visited, count), _turns(levels, int(able[bad[0]]), rank)

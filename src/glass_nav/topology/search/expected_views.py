@@ -17,7 +17,7 @@ from glass_nav.hypotheses import pose_belief
 from glass_nav.hypotheses.pose_belief import MapScans
 from glass_nav.topology.atlas.atlas import Atlas
 
-_COMPARED = 300  # new pairs for each step: 0.1 s
+_COMPARED = 500  # new pairs for each step: 0.15 s
 _DIFFERENT = 2.0  # nats that tell two places apart; copies of a room that are drawn at another angle differ by less
 DECISIVE = 7.0  # ... so surely that a robot drives there to see it: a risk of 0.001
 _ROOM_M = 0.5  # nearer to walls a scan depends on each centimetre, and the robot stops short of a dead end
@@ -38,11 +38,18 @@ class ExpectedViews:
         self._been: List[np.ndarray] = []  # (3,) the same, at each arrival
         self._aimed: List[np.ndarray] = []  # (3,) the same, where the robot will have been at its next arrival
         self._left = _COMPARED
+        self.has_looked_again = False
 
     def forget(self) -> None:
         """Start over for another search."""
+        self.look_again()
+        self.has_looked_again = False
+
+    def look_again(self) -> None:
+        """The robot is to go once more to where it has been: a lidar that does not see all round may have missed something."""
         self._been.clear()
         self._aimed.clear()
+        self.has_looked_again = True
 
     def arrive(self, odom_from_base: np.ndarray) -> None:
         """The robot is at a meetpoint, at odometry (3,): what is seen there is known now, and told places apart or not."""
@@ -89,19 +96,14 @@ class ExpectedViews:
             self._known.update(zip(((a, b) for b in others), found.tolist()))
         return np.where(been, 0.0, np.array([self._known.get(pair, 0.0) for pair in pairs]))
 
-    def alike(self, first: np.ndarray, second: np.ndarray, here: Optional[np.ndarray] = None) -> np.ndarray:
-        """(P,) bool: neither of arrival darts (P,) would look different from the other.
+    def alike(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """(P,) bool: neither of arrival darts (P,) would look different from the other; wherever the robot has been.
 
         Args:
             first, second: darts of two places, in either order.
-            here: (2, 3) poses of the robot now at the two places; None: it has been nowhere.
         """
         a, b = self.at(first), self.at(second)
-        alike = np.maximum(self.nats(a, b), self.nats(b, a)) < _DIFFERENT
-        if here is not None:
-            at = [[self._has_been(poses, np.broadcast_to(each, poses.shape)) for each in here] for poses in (a, b)]
-            alike |= ((at[0][0] & at[1][1]) | (at[0][1] & at[1][0])).any(axis=1)
-        return alike
+        return np.maximum(self.nats(a, b), self.nats(b, a)) < _DIFFERENT
 
     def differ(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """(P,) bool: a scan at poses first (P, 3) would tell for certain that the robot is not at second (P, 3)."""

@@ -6,7 +6,7 @@ risk. It is LOST if only elsewhere is left, and AMBIGUOUS if nothing can tell th
 
 from __future__ import annotations
 
-from typing import Optional
+from typing import Optional, Tuple
 
 import numpy as np
 
@@ -93,38 +93,80 @@ class JointVerdict:
         poses, share = belief.poses[known], belief.share[known]
         if self._views is not None and belief.odom_from_base is not None:
             self._views.arrive(belief.odom_from_base)
-        voted, ranks = None, None
-        if len(dart) > 1:
+        voted = None
+        if len(dart) > 1 and known[0] == left[0]:  # the likeliest place has a vote
             voted = vote.expected(self._matcher, dart, share, self._views, poses)
-        if self._views is not None and (voted is None or voted.removed < _WORTH):
-            lead = self._followed(belief, poses, share)
-            others = belief.poses[left[left != known[lead]]]
-            difference = vote.towards_difference(self._matcher, self._views, int(dart[lead]), poses[lead], others)
-            if difference is not None:
-                ranks = difference.ranks
-                if len(ranks) == 1:
-                    self._views.aim(difference.base_from_there)
-        if ranks is None and voted is not None and voted.splits and (self._views is None or voted.removed >= _WORTH):
+        is_worth = voted is not None and (self._views is None or voted.removed >= _WORTH)
+        if voted is not None and voted.splits and is_worth:
+            if self._views is not None:
+                (there,) = self._views.at(self._matcher.departures(dart[:1], voted.rank) ^ 1)
+                self._views.aim(se2.compose(se2.inverse(poses[0]), there))
             reason = f"{places}; next the turn that leaves the least doubt per metre"
             return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(voted.rank, here.degree))
-        proof = None
-        if ranks is None and len(dart) > 1:
-            proof = ambiguity.prove(self._matcher, dart, views=self._views, poses=poses)
-            ranks = proof.ranks if self._views is None else None
-        if ranks is not None:
-            reason = f"{places}; next towards the nearest difference, {len(ranks)} edge{'s' * (len(ranks) != 1)} away"
-            return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(ranks[0], here.degree))
-        if proof is not None and depth > 0 and 1.0 - belief.share[known].sum() < self._params.tolerances.risk:
-            if proof.indistinguishable:
+        towards = None if is_worth else self._towards_difference(belief, left, known, dart, here)
+        if towards is not None:
+            rank, edges = towards
+            reason = f"{places}; next towards the nearest difference, {edges} edge{'s' * (edges != 1)} away"
+            return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(rank, here.degree))
+        if len(dart) > 1 and 1.0 - belief.share[known].sum() < self._params.tolerances.risk:
+            proof = ambiguity.prove(self._matcher, dart, views=self._views)
+            if proof.ranks is not None and self._views is None:
+                reason = f"{places}; next towards the nearest difference, {len(proof.ranks)} edges away"
+                return self._estimate(
+                    SearchState.SEARCHING, reason, depth, dart, TurnChoice(proof.ranks[0], here.degree)
+                )
+            if proof.indistinguishable and depth > 0:
                 reason = f"{len(dart)} places match, and no turn can tell them apart"
                 return self._estimate(SearchState.AMBIGUOUS, reason, depth, dart, None)
             if self._views is not None and not self._views.is_exhausted and self._has_passed_all(here):
-                reason = f"{len(dart)} places match, and no meetpoint where the robot has not been tells them apart"
-                return self._estimate(SearchState.AMBIGUOUS, reason, depth, dart, None)
+                if self._views.has_looked_again:
+                    reason = f"{len(dart)} places match, and two visits to where they differ did not tell them apart"
+                    return self._estimate(SearchState.AMBIGUOUS, reason, depth, dart, None)
+                self._views.look_again()
         reason = f"{places}; no turn is known to tell them apart; next a new edge"
         return self._estimate(
             SearchState.SEARCHING, reason, depth, dart, TurnChoice(self._least_passed(here), here.degree)
         )
+
+    def _towards_difference(
+        self, belief: Belief, left: np.ndarray, known: np.ndarray, dart: np.ndarray, here: Meetpoint
+    ) -> Optional[Tuple[int, int]]:
+        """The turn to where the followed place would look different from the other places left, and how many edges away
+        that is; None: there is no such meetpoint where the robot has not been.
+
+        Args:
+            left: (L,) indices of the places left.
+            known: (C,) those of them that have a dart.
+            dart: (C,) which one.
+        """
+        if self._views is None:
+            return None
+        lead = left[self._followed(belief, belief.poses[left], belief.share[left])]
+        along = dict(zip(known.tolist(), dart.tolist())).get(int(lead), NO_DART)
+        begin = along if along != NO_DART else self._dart_beside(belief.poses[lead], here)
+        if begin == NO_DART:
+            lead = known[0]
+            along = begin = int(dart[0])
+        pose, others = belief.poses[lead], belief.poses[left[left != lead]]
+        found = vote.towards_difference(self._matcher, self._views, begin, pose, others)
+        if found is None:
+            return None
+        if len(found.ranks) == 1:
+            self._views.aim(found.base_from_there)
+        if along != NO_DART:
+            return found.ranks[0], len(found.ranks)
+        departure = self._matcher.ring_from(begin)[found.ranks[0]]  # the atlas has another degree here
+        ahead = self._atlas.darts.bearing_rad[departure] - pose[2]
+        return int(np.abs(angles.wrap(here.bearings_rad - ahead)).argmin()), len(found.ranks)
+
+    def _dart_beside(self, pose: np.ndarray, here: Meetpoint) -> int:
+        """A dart of the node where a robot with pose (3,) stands, whatever its degree; NO_DART: none is near."""
+        if not len(here.bearings_rad):
+            return NO_DART
+        off_m = np.hypot(*(self._atlas.nodes.position_m - se2.transform_points(pose, here.centre_m)).T)
+        node = int(off_m.argmin())
+        ring = self._atlas.rings[node]
+        return int(ring[0]) if len(ring) and off_m[node] < _NODE_M else NO_DART
 
     def _estimate(
         self,

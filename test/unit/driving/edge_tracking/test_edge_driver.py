@@ -332,7 +332,8 @@ def test_where_there_is_no_way_it_looks_around_again_and_gives_up():
 @pytest.mark.long_run
 def test_a_side_corridor_that_turns_out_to_be_behind_a_pane_is_no_meetpoint():
     """From afar the foot of the T is open; whoever stands before it sees the glass."""
-    drive, arrival = arrived_in_t(t_corridor([Pane(np.array([[5.0, 0.0], [7.0, 0.0]]))]))
+    pane = Pane(np.array([[5.0, 0.0], [7.0, 0.0]]))
+    drive, arrival = arrived_in_t(t_corridor([pane]), scan_rate_hz=10.0)
     assert arrival.meetpoint.degree == 1 and drive.where(arrival) == pytest.approx([1.0, 1.0], abs=0.15)
     drive.driver.leave(0)
     reasons = set()

@@ -45,25 +45,54 @@ def test_no_edge_is_told_where_the_atlas_has_no_such_node(pose: "list[float]", d
     assert joint_verdict.darts_near(CROSS, np.array([pose]), meetpoint).tolist() == [NO_DART]
 
 
-def test_a_place_without_a_node_is_told_apart_by_driving_to_where_it_looks_different() -> None:
+def two_rows(here: Meetpoint) -> "tuple[JointVerdict, PassedEdges]":
+    """Of two equal rows of three places, 100 m apart; from the east the second looks different. The robot is at a place."""
     row = made_atlases.corridors(
         [(x, y) for y in (0.0, 100.0) for x in (0.0, 6.0, 12.0)], [0.5, 1.3, 0.5] * 2, [(0, 1), (1, 2), (3, 4), (4, 5)]
     )
     matcher, params = Matcher(row, SearchParams().tolerances, use_angles=False), SearchParams()
     scans = MadeScans(lambda poses: np.where((poses[:, 0] > 10.0) & (poses[:, 1] > 50.0), 0.5, 1.0), np.zeros((0, 3)))
     forest, passed = SearchForest(matcher, 2), PassedEdges()
-    here = Meetpoint(2, 1.3, bearings_rad=np.array([np.pi, 0.0]), odom_from_base=np.zeros(3))
     forest.begin(here)
     passed.begin(here)
-    verdict = JointVerdict(matcher, forest, passed, params, ExpectedViews(row, scans))
-    poses, even = np.array([[6.0, 0.0, 0.0], [6.5, 103.0, 0.0]]), np.zeros(2)  # the atlas has no node at the second
-    share, dart = np.array([0.6, 0.4]), np.array([1, NO_DART])
-    told = Belief(np.zeros(3), poses, share, 0.0, even, even, even, np.ones(2), dart, 3.0, 2)
+    return JointVerdict(matcher, forest, passed, params, ExpectedViews(row, scans)), passed
+
+
+def believed(poses: "list[list[float]]", dart: "list[int]") -> Belief:
+    even = np.zeros(2)
+    share = np.array([0.6, 0.4])
+    return Belief(np.zeros(3), np.array(poses), share, 0.0, even, even, even, np.ones(2), np.array(dart), 3.0, 2)
+
+
+def test_a_place_without_a_node_is_told_apart_by_driving_to_where_it_looks_different() -> None:
+    verdict, _ = two_rows(Meetpoint(2, 1.3, bearings_rad=np.array([np.pi, 0.0]), odom_from_base=np.zeros(3)))
+    told = believed([[6.0, 0.0, 0.0], [6.5, 103.0, 0.0]], [1, NO_DART])  # the atlas has no node at the second
     estimate = verdict.at_meetpoint(told, 1)
     assert estimate.state == SearchState.SEARCHING and estimate.choice is not None and estimate.choice.rank == 1
     assert estimate.reason.endswith("2 places left; next towards the nearest difference, 1 edge away")
     again = verdict.at_meetpoint(told, 2)  # it has looked, and sees no difference
     assert again.state == SearchState.SEARCHING and again.reason.endswith("next a new edge")
+
+
+def test_where_the_robot_sees_more_edges_than_the_atlas_has_it_takes_the_one_in_the_direction_of_the_difference() -> (
+    None
+):
+    bearings_rad = np.array([np.pi, 1.5, 0.2, -1.5])
+    verdict, _ = two_rows(Meetpoint(4, 1.3, bearings_rad=bearings_rad, odom_from_base=np.zeros(3)))
+    estimate = verdict.at_meetpoint(believed([[6.0, 0.0, 0.0], [6.0, 100.0, 0.0]], [NO_DART, 5]), 1)
+    assert estimate.choice is not None and estimate.choice.rank == 2  # east
+    assert estimate.reason.endswith("next towards the nearest difference, 1 edge away")
+
+
+def test_places_are_ambiguous_only_after_a_second_visit_to_where_they_differ() -> None:
+    here = Meetpoint(2, 1.3, bearings_rad=np.array([np.pi, 0.0]), odom_from_base=np.zeros(3))
+    verdict, passed = two_rows(here)
+    passed.add(1, here, 6.0)  # both edges, to and fro
+    told = believed([[6.0, 0.0, 0.0], [6.0, 100.0, 0.0]], [1, 5])
+    states = [verdict.at_meetpoint(told, depth) for depth in range(1, 5)]
+    assert [each.state for each in states[:-1]] == [SearchState.SEARCHING] * 3
+    assert states[-1].state == SearchState.AMBIGUOUS
+    assert states[-1].reason == "2 places match, and two visits to where they differ did not tell them apart"
 
 
 def is_confirmed(
