@@ -8,9 +8,8 @@ field of sensing/distance_field.py.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import List, Sequence
+from typing import List
 
 import numpy as np
 
@@ -95,17 +94,13 @@ def fit(field: DistanceField, points_m: np.ndarray, poses: np.ndarray, scale_m: 
 
 def distinct(aligned: Alignment) -> Alignment:
     """At most 4 different places that fit about as well as the best, best first."""
-    poses, fits = aligned.poses.tolist(), aligned.fit.tolist()
-    least = _AS_GOOD * max(fits, default=0.0)
+    left = np.argsort(-aligned.fit)
+    left = left[aligned.fit[left] > _AS_GOOD * aligned.fit.max(initial=0.0)]
     chosen: List[int] = []
-    for index in np.argsort(-aligned.fit).tolist():
-        if not fits[index] > least or len(chosen) == _KEEP:
-            break
-        if not any(_is_same_place(poses[index], poses[other]) for other in chosen):
-            chosen.append(index)
+    while len(left) and len(chosen) < _KEEP:
+        best, left = left[0], left[1:]
+        chosen.append(best)
+        off = aligned.poses[left] - aligned.poses[best]
+        same = (np.hypot(off[:, 0], off[:, 1]) < _SAME_M) & (np.abs(angles.wrap(off[:, 2])) < _SAME_RAD)
+        left = left[~same]
     return Alignment(aligned.poses[chosen], aligned.information[chosen], aligned.fit[chosen])
-
-
-def _is_same_place(pose: Sequence[float], other: Sequence[float]) -> bool:
-    apart_m = math.hypot(pose[0] - other[0], pose[1] - other[1])
-    return apart_m < _SAME_M and abs(angles.wrap_one(pose[2] - other[2])) < _SAME_RAD

@@ -11,6 +11,7 @@ import numpy as np
 from glass_nav.simulation.path_follower import PathFollower
 
 COMMAND_TIMEOUT_NS = 500_000_000  # a robot without commands for this long stops
+DRIVER_LAG_NS = 200_000_000  # a driver whose last command to move is older than this does not keep up
 START_WAIT_S = 30.0  # for the localization's first answer; then the path begins without it
 BEHIND_S = 1.0  # behind the wall clock: longer delays are not caught up
 
@@ -38,6 +39,7 @@ class Steering:
         """
         self._follower, self._repeat, self._wait_for_answer = follower, repeat, wait_for_answer
         self._command, self._command_until_ns = np.zeros(3), 0
+        self._given_up = False  # waiting for the command that comes after the present one
         self._driving = False
 
     @property
@@ -48,6 +50,16 @@ class Steering:
     def take(self, velocity: np.ndarray, stamp_ns: int) -> None:
         """A command (3,) at a simulated time."""
         self._command, self._command_until_ns = velocity, stamp_ns + COMMAND_TIMEOUT_NS
+        self._given_up = False
+
+    def is_overdue(self, stamp_ns: int) -> bool:
+        """Whether the robot moves by a command that is older than a driver that keeps up lets it become."""
+        command_ns = self._command_until_ns - COMMAND_TIMEOUT_NS
+        return not self._given_up and bool(np.any(self._command)) and stamp_ns - command_ns >= DRIVER_LAG_NS
+
+    def give_up_waiting(self) -> None:
+        """Nothing is overdue until there is another command: the driver has stopped sending them."""
+        self._given_up = True
 
     def velocity(self, stamp_ns: int, map_from_base: np.ndarray, audience: Audience) -> np.ndarray:
         """(3,) wanted now."""

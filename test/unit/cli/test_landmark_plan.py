@@ -63,6 +63,7 @@ def test_a_plan_may_begin_with_nothing_and_may_add_nothing(room, capsys):
     assert len(landmark_file.load(room / "out" / "landmarks.yaml")) == 0
 
 
+@pytest.mark.long_run
 def test_finer_steps_make_better_positions(room, capsys):
     def median(step: str) -> float:
         assert plan(room, "--add", "0", "--step-deg", step) == 0

@@ -53,6 +53,7 @@ def floor(tmp_path):
     return tmp_path / "floor.yaml"
 
 
+@pytest.mark.long_run
 def test_the_missing_pane_is_found_and_drawn(run, drive, tmp_path):
     lacking, complete = drive.with_suffix(".map.yaml"), drive.with_suffix(".complete.map.yaml")
     code, out, err = run("map", "panes", drive, "--map", lacking, "--every", "2", "--out", tmp_path / "found")

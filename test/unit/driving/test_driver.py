@@ -274,6 +274,7 @@ def test_without_an_atlas_to_search_in_a_robot_that_stands_fails_and_one_with_a_
     assert robot.driver.status.task == "traverse_edge"
 
 
+@pytest.mark.long_run
 def test_moved_away_from_its_meetpoint_it_stands_at_none_and_seeks_one_only_for_a_search_that_waits():
     robot = standing()
     robot.carried_m = np.array([0.5, 0.0, 0.0])

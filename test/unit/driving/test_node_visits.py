@@ -43,12 +43,14 @@ def along_corridor(atlas: Atlas, building: Building) -> List[NodeVisit]:
     return visits
 
 
+@pytest.mark.long_run
 def test_the_node_that_it_drives_past_is_seen_as_the_map_has_it(atlas: Atlas) -> None:
     visits = [visit for visit in along_corridor(atlas, t_corridor()) if visit.node == junction(atlas)]
     assert len(visits) == 1
     assert visits[0].r_m == pytest.approx(T_R_M, abs=0.08)
 
 
+@pytest.mark.long_run
 def test_a_node_that_is_not_there_is_missed(atlas: Atlas) -> None:
     """The side corridor is walled off."""
     straight = walled(np.array([[0.0, 0.0], [12.0, 0.0], [12.0, W], [0.0, W]]))
@@ -56,6 +58,7 @@ def test_a_node_that_is_not_there_is_missed(atlas: Atlas) -> None:
     assert [visit.node for visit in visits] == [junction(atlas)] and math.isnan(visits[0].r_m)
 
 
+@pytest.mark.long_run
 def test_what_is_seen_otherwise_is_neither_a_visit_nor_a_miss(atlas: Atlas, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(node_visits.PassingObserver, "counts", lambda observer, node: False)
     assert not along_corridor(atlas, t_corridor())

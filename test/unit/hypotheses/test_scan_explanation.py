@@ -127,6 +127,7 @@ def test_a_beam_that_ends_where_the_mapper_saw_nothing_and_no_wall_before_is_no_
     assert beams is not None and not beams.explained.any() and beams.known.all()
 
 
+@pytest.mark.long_run
 def test_where_nothing_is_known_the_truth_is_among_the_places_proposed_and_explains_most():
     building, explanation = office()
     for number, truth in enumerate(PLACES):

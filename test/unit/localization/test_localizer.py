@@ -1236,6 +1236,7 @@ def past_a_pane():
     return localizer, scans
 
 
+@pytest.mark.long_run
 def test_a_pane_that_the_map_lacks_is_found_and_is_glass(past_a_pane):
     localizer, _ = past_a_pane
     (pane,) = localizer.unmapped_panes

@@ -54,6 +54,7 @@ def odometries(path, options):
     return recording.notes, np.array([step.odom_from_base for step in recording if isinstance(step, Step)])
 
 
+@pytest.mark.long_run
 def test_wheels_and_tf_give_the_same_trajectory(bag):
     _, by_tf = odometries(bag, LogOptions())
     notes, by_wheels = odometries(bag, WHEELS)

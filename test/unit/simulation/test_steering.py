@@ -31,6 +31,19 @@ def test_a_command_goes_before_the_path_until_it_is_old():
     assert velocity(steering, stamp_ns=10 * SECOND + 500_000_000) == [0.5, 0.0, 0.0]
 
 
+def test_a_command_to_move_is_overdue_once_it_is_old_and_until_nobody_waits_for_the_next():
+    steering = Steering(None, repeat=False, wait_for_answer=False)
+    assert not steering.is_overdue(10 * SECOND)  # there was none
+    for begun_ns in (10 * SECOND, 20 * SECOND):
+        steering.take(np.array([0.1, 0.0, 0.3]), begun_ns)
+        assert not steering.is_overdue(begun_ns + 199_999_999)
+        assert steering.is_overdue(begun_ns + 200_000_000)
+        steering.give_up_waiting()
+        assert not steering.is_overdue(begun_ns + 200_000_000)
+    steering.take(np.zeros(3), 30 * SECOND)  # to stand: no next command is needed
+    assert not steering.is_overdue(31 * SECOND)
+
+
 def test_without_a_path_a_robot_whose_driver_fell_silent_stops():
     steering = Steering(None, repeat=False, wait_for_answer=False)
     assert velocity(steering) == STANDS and not steering.waits

@@ -48,6 +48,7 @@ from glass_nav.simulation.simulation import CONTROL_S, Frame, Simulation
 from glass_nav.simulation.steering import Audience, Pace, Steering
 
 ANSWER_WAIT_S = 1.0  # at full speed: longest wait for map -> odom of a scan, by the wall clock
+DRIVER_WAIT_S = 2.0  # longest wait for a driver's next command, by the wall clock
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,7 @@ class SimulatorNodeParams:
     scan_rate_hz: float = 10.0
     turn_time_s: float = 0.0  # from the first beam of a scan to the last one
     speed_factor: float = 1.0  # simulated seconds per second; 0: as fast as the localization follows
+    wait_for_driver: bool = False  # time does not pass while a command to move is more than 0.2 s old
     laser_x_m: float = 0.12  # where the laser sits on the robot
     laser_y_m: float = 0.0
     laser_yaw_rad: float = 0.0
@@ -181,6 +183,8 @@ class SimulatorNode:
                 self._publish_frame(simulation.look())
                 if self._p.speed_factor == 0.0:
                     self._await_answer(ending)
+            if self._p.wait_for_driver:
+                self._await_command(ending)
             left_s = (self._next_scan_ns - simulation.stamp_ns) * 1e-9
             simulation.move(min(CONTROL_S, left_s), self._wanted_velocity())
             self._publish_reading()
@@ -208,12 +212,24 @@ class SimulatorNode:
 
     # -- commands
 
-    def _wanted_velocity(self) -> np.ndarray:
-        for msg in self._inbox.take(timeout_s=0.0)["commands"]:
+    def _await_command(self, ending: threading.Event) -> None:
+        """Let the driver keep up, on a machine that is busy: the next command may be late, and must not be too late."""
+        until_s = time.monotonic() + DRIVER_WAIT_S
+        self._take_commands(0.0)
+        while self._steering.is_overdue(self._simulation.stamp_ns) and not ending.is_set():
+            self._take_commands(0.01)
+            if time.monotonic() > until_s:
+                self._steering.give_up_waiting()
+
+    def _take_commands(self, timeout_s: float) -> None:
+        for msg in self._inbox.take(timeout_s)["commands"]:
             try:
                 self._steering.take(frame_messages.velocity_from_msg(msg), self._simulation.stamp_ns)
             except ValueError as err:
                 self._log.warn(f"cmd_vel refused: {err}")
+
+    def _wanted_velocity(self) -> np.ndarray:
+        self._take_commands(0.0)
         audience = Audience(self._answers, self._scans.get_num_connections(), time.monotonic() - self._began_s)
         return self._steering.velocity(self._simulation.stamp_ns, self._simulation.map_from_base, audience)
 

@@ -40,6 +40,7 @@ def driven(correct):
     return np.array(believed), local.walls(), at, true, odometry
 
 
+@pytest.mark.long_run
 def test_walls_stay_thin_and_the_way_true_though_odometry_errs():
     believed, walls, at, true, odometry = driven(correct=True)
     off_m = np.hypot(*(believed - true)[:, :2].T)

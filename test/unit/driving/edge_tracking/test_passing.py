@@ -74,6 +74,7 @@ def test_the_meetpoint_of_a_t_is_seen_where_three_walls_are_equally_far(passed):
     assert nodes[0].first_ns < nodes[0].stamp_ns < nodes[0].last_ns
 
 
+@pytest.mark.long_run
 def test_the_way_is_that_of_the_graph(passed):
     """In the corridor the edge runs in its middle, where the robot drives as well."""
     nodes, _, observer = passed

@@ -65,6 +65,7 @@ def test_what_cannot_be_answered_is_refused(grid_map, scan, rough, line):
     assert str(refused.value) == line
 
 
+@pytest.mark.long_run
 def test_the_quality_of_a_scan_does_not_wait_for_the_segments():
     locator, grid_map = PoseLocator(), L_ROOM.grid_map()
     case = np.full(len(SCAN), BeamCase.DIFFUSE)

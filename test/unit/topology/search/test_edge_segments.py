@@ -151,6 +151,7 @@ def test_a_search_goes_by_walls_too(params, left):
     assert {int(dart) ^ 1 for dart in estimate.dart} == left
 
 
+@pytest.mark.long_run
 @pytest.mark.parametrize("name", ["glass_office", "changed_rooms"])
 def test_the_own_walls_of_an_edge_never_rule_it_out(name):
     """All edges of real atlases, both ways, seen from beginnings that are off by what the tolerances allow."""
