@@ -41,7 +41,6 @@ _UNKNOWN_FIT = 0.4  # of a beam that ends where the map knows nothing: likelier 
 _MIN_KNOWN = 0.3  # of the beams of one scan must end where the map knows something: else it proposes no place
 _FULL_FIT = 20.0  # log likelihood ratio of a place where all beams end on walls to one where none does, in one view
 _VIEW_M = 2.0  # after this distance the surroundings are seen anew
-_JUDGE_AGAIN = np.array([0.25, 0.25])  # [m, rad] after which candidates are judged again: nearer scans say the same
 _MAX_BEHIND = 40.0  # log likelihood ratio of the best candidate to one that is dropped
 _SEARCH_AGAIN_M = 2.0
 _POOR_FIT = 0.75  # of the best candidate's usual fit: it may be wrong, search again at once
@@ -140,7 +139,7 @@ class GlobalSearch:
         self._move(odom_from_base)
         points = evidence_points(scan)
         if points is not None:
-            if self._searched and len(self._tracker) and np.any(self._since_judged >= _JUDGE_AGAIN):
+            if self._searched and len(self._tracker):
                 self._judge(points, self._view(scan))
             if self._places is None and (not self._searched or self._is_due(points)):
                 # What is further behind, the best place beats by the whole margin in its first view.
