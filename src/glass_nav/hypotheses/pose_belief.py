@@ -37,10 +37,8 @@ from glass_nav.hypotheses.scan_explanation import BeamsExplained
 from glass_nav.sensing.scan import Scan
 
 _NEAR_MISS = 0.5  # of the evidence of a piece that is given back between two poses: the map is drawn to a few cells
-_THING, _UNCHANGED = (
-    2.0,
-    9.0,
-)  # pieces of one thing that was moved; things that were not, for one that was, by the prior
+_THING = 2.0  # pieces of one thing that was moved
+_UNCHANGED = 9.0  # things that were not moved for one that was, by the prior
 _TYPICAL = 100.0  # pieces seen by the time that a robot has come to where places differ
 _NATS = 0.5  # of a piece of wall that the map explains, to one that it does not; see above
 _CHANCE, _MAX_CHANCE = 0.7, 0.9  # share that is explained elsewhere: at least, at most

@@ -97,6 +97,7 @@ class AtlasLocalizer:
     def begin(self) -> None:
         """Start a new search; scans may come before the first meetpoint."""
         self._estimate, self._edges_before = None, 0
+        self._by_both.begin()
         if self._joint is not None:
             self._joint.forget()
         if self._views is not None:

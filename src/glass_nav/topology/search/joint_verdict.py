@@ -50,6 +50,10 @@ class JointVerdict:
         self._views = views
         self._map_from_odom: Optional[np.ndarray] = None  # (3,) by the place that the last plan was for
 
+    def begin(self) -> None:
+        """Start over for another search."""
+        self._map_from_odom = None
+
     def final(self, belief: Belief, depth: int) -> Optional[SearchEstimate]:
         """CONFIRMED or LOST, wherever the robot is; None: not yet."""
         risk = self._params.tolerances.risk
