@@ -22,8 +22,8 @@ Matrix3 mixed(const Matrix3& first, const Matrix3& second, const Ratio& ratio) {
   return result;
 }
 
-/// Of the second of two estimates, by the ratio of its variance to that of the first: close to a choice between them, since
-/// errors that are correlated do not average out.
+/// Of the second of two estimates, by the ratio of its variance to that of the first: close to a choice between them,
+/// since errors that are correlated do not average out.
 double share_by(double ratio) {
   const double squared = ratio * ratio;
   return 1.0 / (1.0 + squared * squared);

@@ -251,8 +251,8 @@ Matrix3 ScanFit::spread_of(const std::vector<Beam>& beams, const std::vector<Pie
   return spread;
 }
 
-/// Adds to a covariance, in metres, what the loss along two axes adds to its linearization there: along its longest one,
-/// and where the walls hold a robot that keeps its heading least.
+/// Adds to a covariance, in metres, what the loss along two axes adds to its linearization there: along its longest
+/// one, and where the walls hold a robot that keeps its heading least.
 void ScanFit::widen(const DistanceField& field, const Vector3& pose, const std::vector<Beam>& beams,
                     const Matrix3& information, double lever_m, double worth_of_beam, Matrix3& covariance) const {
   const Eigen3 found = eigen(covariance);
@@ -263,8 +263,8 @@ void ScanFit::widen(const DistanceField& field, const Vector3& pose, const std::
       0.5 * std::atan2(2.0 * information(0, 1), information(0, 0) - information(1, 1));  // where they hold it most
   const Vector3 slide{-std::sin(across_rad), std::cos(across_rad), 0.0};
   for (const Vector3& along : {axis, slide}) {
-    const double added = added_variance(field, pose, beams, information, lever_m, worth_of_beam, along,
-                                        dot(along, covariance * along));
+    const double added =
+        added_variance(field, pose, beams, information, lever_m, worth_of_beam, along, dot(along, covariance * along));
     covariance.add_outer(along, std::max(0.0, added));
   }
 }
