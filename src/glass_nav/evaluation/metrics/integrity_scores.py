@@ -32,6 +32,7 @@ METRICS = (  # of summary(), in its order
 NEVER = ("time_to_alarm_s", "time_back_s")  # None with a reference: it did not happen before the end of the log
 _ALARMS = (LocalizationState.UNCERTAIN, LocalizationState.LOST)
 _Z_999 = 3.29  # deviations that a normal error stays below with 99.9 %
+_SINGULAR = 1e-12  # ratio of the variances of a covariance, the least to the largest, below which it has no inverse
 
 
 @dataclass(frozen=True)
@@ -201,13 +202,13 @@ def _level_ratio(level: np.ndarray, size: np.ndarray) -> Optional[float]:
 
 
 def _nees(error: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """(S,), NaN where the error or the covariance is not known, infinite where the covariance is zero."""
+    """(S,), NaN where the error or the covariance is not known, infinite where the covariance is singular."""
     found = np.full(len(error), np.nan)
     finite = np.isfinite(error).all(axis=1)
     known = ~np.isnan(error).any(axis=1) & np.isfinite(covariance).all(axis=(1, 2))
     found[known] = np.inf
     values = np.linalg.eigvalsh(np.where((known & finite)[:, None, None], covariance, np.eye(3)))
-    solvable = known & finite & (values[:, 0] > 0.0)
+    solvable = known & finite & (values[:, 0] > _SINGULAR * values[:, -1])
     if solvable.any():
         solved = np.linalg.solve(covariance[solvable], error[solvable][..., None])[..., 0]
         found[solvable] = np.einsum("si,si->s", error[solvable], solved)

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -82,6 +84,13 @@ def test_nees_of_consistent_errors_is_that_of_chi_squared():
 def test_certainty_that_is_wrong_has_an_infinite_nees():
     assert np.isinf(claims([[0.1, 0.0, 0.0]], deviation=0.0).nees).all()
     assert np.isinf(claims([[np.inf, 0.0, 0.0]]).nees).all()
+
+
+def test_a_covariance_of_few_particles_has_no_inverse_and_an_infinite_nees():
+    seen = claims([[0.1, 0.0, 0.0]])
+    along = np.array([0.48, 0.42, 0.77])  # all particles on two lines; rounding leaves a variance of 1e-16 beside them
+    singular = np.outer(along, along) + np.outer([0.1, -0.05, 0.0], [0.1, -0.05, 0.0])
+    assert np.isinf(replace(seen, covariance=singular[None]).nees).all()
 
 
 def test_an_alarm_at_a_small_error_is_false():
