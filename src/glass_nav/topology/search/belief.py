@@ -11,6 +11,7 @@ from glass_nav.hypotheses import pose_tracker
 
 NO_DART = -1
 _MOST_BY_GRAPH = 2.0  # nats by which meetpoints may put one place ahead of another: as many as a missing one takes
+_MOST_BETWEEN = 10.0  # nats by which what the map contradicts may: enough between places that explain as much
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,8 @@ def places(
 
     All evidence tells whether the robot is in the map at all. Between two places of it scans must have their part:
     meetpoints of two copies of a room may differ by how their graph was drawn, and a spurious one speaks for whichever
-    has a node there.
+    has a node there. What the map contradicts tells copies of a room apart, but not a room in which much was moved from
+    one that explains far less.
 
     Args:
         poses: (N, 3) hypotheses; those that are no rivals of each other are one place.
@@ -80,7 +82,8 @@ def places(
         left = left[~same]
     in_map = float(np.logaddexp.reduce(log_mass))
     total = np.logaddexp(in_map, 0.0)
-    among = log_mass + between_nats[first] + np.maximum(graph_nats[first[0]] - graph_nats[first] - _MOST_BY_GRAPH, 0.0)
+    between = np.maximum(between_nats[first], between_nats[first].max() - _MOST_BETWEEN)
+    among = log_mass + between + np.maximum(graph_nats[first[0]] - graph_nats[first] - _MOST_BY_GRAPH, 0.0)
     order = np.argsort(-among, kind="stable")
     share = np.exp(among[order] - np.logaddexp.reduce(among) + in_map - total)
     return np.array(first, np.int64)[order], share, float(np.exp(-total))

@@ -63,6 +63,7 @@ class JointVerdict:
         explained = belief.explained[0]
         if (
             1.0 - share < risk
+            and belief.scan_nats[0] + belief.graph_nats[0] > -np.log(risk)  # the place itself, not the map as a whole
             and (belief.checked_nats[0] >= _MIN_CHECKED or belief.driven_m >= _MIN_DRIVEN_M)
             and (np.isnan(explained) or explained >= self._params.least_explained)
         ):

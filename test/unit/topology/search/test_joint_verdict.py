@@ -96,12 +96,16 @@ def test_places_are_ambiguous_only_after_a_second_visit_to_where_they_differ() -
 
 
 def is_confirmed(
-    scans: "tuple[float, float]", checked: float, graph: "tuple[float, float]" = (0.0, 0.0), driven_m: float = 0.0
+    scans: "tuple[float, float]",
+    checked: float,
+    graph: "tuple[float, float]" = (0.0, 0.0),
+    driven_m: float = 0.0,
+    between: "tuple[float, float]" = (0.0, 0.0),
 ) -> bool:
     """Of two places with such evidence by scans, by those of them that did not choose the first, and by meetpoints."""
     params, matcher = SearchParams(), Matcher(CROSS, SearchParams().tolerances, use_angles=True)
     poses = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]])
-    first, share, elsewhere = belief.places(poses, np.array(scans), np.array(graph), np.zeros(len(poses)))
+    first, share, elsewhere = belief.places(poses, np.array(scans), np.array(graph), np.array(between))
     evidence = np.array(scans)[first], np.full(2, checked), np.array(graph)[first], np.ones(2)
     told = Belief(np.zeros(3), poses, share, elsewhere, *evidence, np.full(2, NO_DART), driven_m, 3)
     verdict = JointVerdict(matcher, SearchForest(matcher, 2), PassedEdges(), params)
@@ -121,6 +125,11 @@ def test_scans_must_have_their_part_in_the_lead_over_another_place(
     scans: "tuple[float, float]", graph: "tuple[float, float]", confirmed: bool
 ) -> None:
     assert is_confirmed(scans, 5.0, graph) == confirmed
+
+
+def test_a_place_that_is_hardly_likelier_than_elsewhere_is_not_confirmed_by_its_lead_over_the_others() -> None:
+    assert is_confirmed((7.5, 10.2), 5.0, between=(0.0, -30.0))
+    assert not is_confirmed((5.5, 8.2), 5.0, between=(0.0, -30.0))
 
 
 @pytest.mark.parametrize(
