@@ -11,7 +11,10 @@ from glass_nav.hypotheses import pose_tracker
 
 NO_DART = -1
 _MOST_BY_GRAPH = 2.0  # nats by which meetpoints may put one place ahead of another: as many as a missing one takes
-_MOST_BETWEEN = 10.0  # nats by which what the map contradicts may: enough between places that explain as much
+_MOST_BETWEEN = (
+    10.0  # nats by which what the map contradicts may: enough between places that explain as much; one less for each by
+)
+# which it contradicts the best place itself: then it is wrong about the rest, too, or beams were mirrored
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,8 @@ def places(
         left = left[~same]
     in_map = float(np.logaddexp.reduce(log_mass))
     total = np.logaddexp(in_map, 0.0)
-    between = np.maximum(between_nats[first], between_nats[first].max() - _MOST_BETWEEN)
+    best = between_nats[first].max()
+    between = np.maximum(between_nats[first], best - np.clip(_MOST_BETWEEN + best, 0.0, _MOST_BETWEEN))
     among = log_mass + between + np.maximum(graph_nats[first[0]] - graph_nats[first] - _MOST_BY_GRAPH, 0.0)
     order = np.argsort(-among, kind="stable")
     share = np.exp(among[order] - np.logaddexp.reduce(among) + in_map - total)

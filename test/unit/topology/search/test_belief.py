@@ -36,9 +36,13 @@ def test_what_tells_places_from_each_other_says_nothing_of_elsewhere() -> None:
 def test_what_the_map_contradicts_decides_between_places_only_so_far() -> None:
     poses = np.array([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0]])  # much was moved in the room of the first
     first, share, _ = belief.places(poses, np.array([10.0, -3.0]), np.zeros(2), np.array([-30.0, -3.0]))
-    assert first.tolist() == [0, 1] and share[0] / share[1] == pytest.approx(np.exp(13.0 - 10.0))
+    assert first.tolist() == [0, 1] and share[0] / share[1] == pytest.approx(np.exp(13.0 - 7.0))
     first, share, _ = belief.places(poses, np.array([4.0, 4.0]), np.zeros(2), np.array([-30.0, -3.0]))
-    assert first.tolist() == [1, 0] and share[0] / share[1] == pytest.approx(np.exp(10.0))
+    assert first.tolist() == [1, 0] and share[0] / share[1] == pytest.approx(np.exp(7.0))
+    _, share, _ = belief.places(poses, np.array([4.0, 4.0]), np.zeros(2), np.array([-30.0, 2.0]))
+    assert share[0] / share[1] == pytest.approx(np.exp(10.0))  # the map is right about the rest
+    _, share, _ = belief.places(poses, np.array([4.0, 4.0]), np.zeros(2), np.array([-30.0, -12.0]))
+    assert share[0] == pytest.approx(share[1])  # it is wrong everywhere
 
 
 def test_where_nothing_speaks_for_any_place_the_robot_is_elsewhere() -> None:
