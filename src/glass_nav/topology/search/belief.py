@@ -11,10 +11,9 @@ from glass_nav.hypotheses import pose_tracker
 
 NO_DART = -1
 _MOST_BY_GRAPH = 2.0  # nats by which meetpoints may put one place ahead of another: as many as a missing one takes
-_MOST_BETWEEN = (
-    10.0  # nats by which what the map contradicts may: enough between places that explain as much; one less for each by
-)
-# which it contradicts the best place itself: then it is wrong about the rest, too, or beams were mirrored
+# Nats by which what the map contradicts may: enough between places that explain as much. Each by which it contradicts
+# the best place itself is one less: then it is wrong about the rest, too, or beams were mirrored.
+_MOST_BETWEEN = 10.0
 
 
 @dataclass(frozen=True)
