@@ -10,7 +10,8 @@ global: starts in the first two thirds of the track without a guess; found when 
 if that is within 0.7 m and 20 degrees. kidnap: kidnapped to another moment of the same track, at least two metres away
 or turned; measures when LOCALIZED is left and when the right place is LOCALIZED again. false_start: an initial pose
 that is right at another moment of the track; measures the same. elsewhere: the track with the map of another one.
-"false places" counts runs in which a place was accepted that is wrong. "stalls" counts scans that took more than 100 ms
+LOCALIZED is left when it is reported of the wrong pose for the last time. "false places" counts runs in which yet
+another place was accepted that is wrong. "stalls" counts scans that took more than 100 ms
 and five times the median of their run. --cells repeats the map until it has so many rows and columns: a place is then
 right in any copy. Exit code 1 if a bar is missed.
 """
@@ -32,6 +33,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):  # a process a core: th
 import numpy as np
 
 import tracks
+from glass_nav.geometry import se2
 from glass_nav.localization.localizer import Localizer
 from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.vocabulary import LocalizationState
@@ -52,6 +54,7 @@ class Told(NamedTuple):
     driven_m: float
     localized: bool
     right: bool
+    jumped: bool  # the pose is not where odometry led from the one before
     cpu_ms: float
 
 
@@ -59,14 +62,20 @@ def follow(
     localizer: Localizer, track: tracks.Track, moments: Sequence[tracks.Moment], most_m: float = np.inf
 ) -> Iterator[Told]:
     """Drive on; the distance counts from the first moment."""
+    map_from_odom: Optional[np.ndarray] = None
     for driven_m, moment in zip(tracks.ways(moments), moments):
         if driven_m > most_m:
             return
         began = time.process_time()
         estimate = localizer.update(moment.scan, moment.odom_from_base)
         cpu_ms = 1e3 * (time.process_time() - began)
-        right = tracks.is_right(tracks.in_first_copy(track, estimate.map_from_base), moment.map_from_base)
-        yield Told(float(driven_m), estimate.state == LocalizationState.LOCALIZED, right, cpu_ms)
+        pose = estimate.map_from_base
+        right = tracks.is_right(tracks.in_first_copy(track, pose), moment.map_from_base)
+        jumped = map_from_odom is not None and not tracks.is_right(
+            pose, se2.compose(map_from_odom, moment.odom_from_base)
+        )
+        map_from_odom = estimate.map_from_odom
+        yield Told(float(driven_m), estimate.state == LocalizationState.LOCALIZED, right, jumped, cpu_ms)
 
 
 def find(track: tracks.Track, seed: int) -> Dict[str, Any]:
@@ -120,17 +129,23 @@ def _recovery(
 ) -> Dict[str, Any]:
     """When the wrong pose is left, and when the right one is found."""
     told: List[Told] = []
-    left_m: Optional[float] = None
+    left_m: Optional[float] = 0.0
     false_m: Optional[float] = None
     back_m: Optional[float] = None
+    given_up = False  # the wrong pose, for another
     for each in follow(localizer, track, moments, BACK_M):
         told.append(each)
-        if left_m is None and (not each.localized or each.right):
-            left_m = each.driven_m
-        if left_m is not None and false_m is None and each.localized and not each.right:
-            false_m = each.driven_m
+        given_up = given_up or each.jumped
         if each.localized and each.right:
             back_m = each.driven_m
+        wrong = each.localized and not each.right
+        if wrong and given_up and false_m is None:
+            false_m = each.driven_m
+        if wrong and not given_up:
+            left_m = None
+        elif left_m is None:
+            left_m = each.driven_m
+        if back_m is not None:
             break
     return {
         "left_m": left_m,
