@@ -365,7 +365,7 @@ class Localizer:
         self._filter.estimate()
         self._filter.resample()
         if registration.worth < 1.0:
-            self._keep_to_odometry(step, _UNSURE_M * registration.worth)
+            self._keep_to_odometry(step, registration.worth)
         suspect = self._filter.suspect
         held = self._integrity.update(
             scan,
@@ -384,17 +384,17 @@ class Localizer:
         """After a step, with the noise of odometry as the model says or as it proved, whichever is larger."""
         return reckoned.carried(step, self._params.odometry, np.maximum(self._integrity.noise_scale, 1.0))
 
-    def _keep_to_odometry(self, step: Optional[np.ndarray], unsure_m: float) -> None:
+    def _keep_to_odometry(self, step: Optional[np.ndarray], worth: float) -> None:
         """The scan hardly fits. If such scans led the pose astray, odometry has it back.
 
         Args:
             step: (3,) of odometry since the last update; None: there was none.
-            unsure_m: least distance that the pose was not sure before the step.
+            worth: of the scan's fit as evidence, 0..1: the less, the nearer to dead reckoning the pose stays.
         """
         reckoned = self._dead_reckoning
-        if reckoned is None or reckoned.distance_m - _length(step) < unsure_m - 1e-6:
+        if reckoned is None or reckoned.distance_m - _length(step) < _UNSURE_M * worth - 1e-6:
             return
-        if reckoned.mahalanobis(self._filter.best.map_from_base[None])[0] > _ASTRAY:
+        if reckoned.mahalanobis(self._filter.best.map_from_base[None])[0] > _ASTRAY * worth:
             self._filter.move_to(reckoned.map_from_base)
 
     def _find(self, scan: Scan, odom_from_base: np.ndarray) -> BeamCases:
