@@ -25,6 +25,7 @@ _WRONG = 0.05  # share of the echoes that are told wrongly, whatever the coating
 _SCAN_SHARE, _SCAN_BEAMS, _MOST_LOG = 0.5, 5.0, 4.0  # beams of one scan are one piece of evidence; it is bounded
 _MOST_REFLECTED = 0.9
 _OTHER_WALL = 2.0  # steepness of a victory: reflectances of other walls differ by factors
+_IN_LINE_RAD = np.radians(10.0)
 _FIRST, _MIRRORED, _SECOND = BeamCase.DIFFUSE - 1, BeamCase.SPECULAR - 1, BeamCase.FIRST_PENETRATION - 1
 
 
@@ -57,6 +58,7 @@ class Coatings:
             past = measured_m - expected.range_m[_FIRST, 0] > 2.0 * gate_m / MIN_COS
         told = apart & past & (at_mirrored != at_behind) & expected.seen_side[[_MIRRORED, _SECOND]].all(axis=0)
         told &= np.isfinite(mirrored_m) & np.isfinite(behind_m)
+        told &= ~_in_line(expected.axis_rad[_SECOND] - expected.axis_rad[_FIRST])
         if not told.any():
             return self
         clear = reflectance(expected.pane_incidence[0][told])
@@ -104,7 +106,7 @@ def of(
         *_beam_vote.pane_echoes(
             measured_m,
             expected.range_m[:, 0],
-            expected.cos_incidence[_MIRRORED, 0],
+            expected.cos_incidence[:, 0],
             expected.axis_rad[_MIRRORED] - expected.axis_rad[_FIRST],
             reflectance(expected.pane_incidence[0]),
             expected.seen_side,
@@ -116,6 +118,11 @@ def of(
             MIN_COS,
         )
     )
+
+
+def _in_line(turned_rad: np.ndarray) -> np.ndarray:
+    """(B,) bool: a surface that is turned so little from a pane may be its next cell, or the next pane of the row."""
+    return np.abs(np.sin(turned_rad)) < np.sin(_IN_LINE_RAD)
 
 
 def _wins(over: np.ndarray, steepness: float) -> np.ndarray:
