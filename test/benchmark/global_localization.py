@@ -141,8 +141,10 @@ def _recovery(
         wrong = each.localized and not each.right
         if wrong and given_up and false_m is None:
             false_m = each.driven_m
-        if not given_up:
-            left_m = None if wrong else each.driven_m if left_m is None else left_m
+        if wrong and not given_up:
+            left_m = None
+        elif left_m is None:
+            left_m = each.driven_m
         if back_m is not None:
             break
     return {

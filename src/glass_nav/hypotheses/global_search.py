@@ -20,6 +20,7 @@ from typing import Callable, Dict, Optional, Sequence, Tuple
 
 import numpy as np
 
+from glass_nav import _distance_field
 from glass_nav.geometry import angles, se2
 from glass_nav.hypotheses import bearing_weights, pose_tracker, scan_alignment
 from glass_nav.hypotheses.bearing_weights import BearingMixture
@@ -290,11 +291,10 @@ def evidence_points(scan: Scan) -> Optional[np.ndarray]:
 
 
 def fit(field: DistanceField, points_m: np.ndarray, poses: np.ndarray, area: Optional[KnownArea] = None) -> np.ndarray:
-    """(K,) how well such points fit at poses (K, 3), 0..1; those that end outside of the known area hardly count."""
+    """(K,) how well such points fit at poses (K, 3), 0..1; those that end outside of the known area hardly count.
+
+    At a pose that the mapper did not see they do not count at all: nobody can tell whether a robot is there.
+    """
     if area is None:
         return scan_alignment.fit(field, points_m, poses, _EVIDENCE_SCALE_M)
-    ends_m = se2.transform_points(poses[:, None], points_m)
-    distance_m = field.distance(ends_m[..., 0], ends_m[..., 1])
-    fits = _EVIDENCE_SCALE_M**2 / (_EVIDENCE_SCALE_M**2 + distance_m**2)
-    unknown = np.where(area.is_unmapped(poses[:, :2]), 0.0, _UNKNOWN_FIT)  # nobody can tell whether a robot is there
-    return np.mean(np.where(area.contains(ends_m), fits, unknown[:, None]), axis=1)
+    return _distance_field.known_fit(field.compiled, area.compiled, points_m, poses, _EVIDENCE_SCALE_M, _UNKNOWN_FIT)

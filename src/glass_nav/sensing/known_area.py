@@ -7,14 +7,17 @@ that ends somewhat behind a wall contradicts it. H rows, W columns, P poses, B b
 
 from __future__ import annotations
 
+from typing import Any, Dict
+
 import numpy as np
 from scipy import ndimage
 
+from glass_nav import _distance_field
 from glass_nav.geometry import se2
 from glass_nav.world.grid_map import UNKNOWN, GridMap
 
 _BESIDE_CELLS = 3  # next to an unknown cell: what is there may be drawn, or end, one or two cells off
-_KNOWN, _UNMAPPED, _FREE, _BESIDE = np.uint8(1), np.uint8(2), np.uint8(4), np.uint8(8)  # flags of a cell
+_KNOWN, _UNMAPPED, _FREE, _BESIDE = np.uint8(1), np.uint8(2), np.uint8(4), np.uint8(8)  # flags of a cell, as compiled
 _NEAR_WALL_M = 0.5  # what is this close to a mapped wall is compared with it, also behind it
 
 
@@ -22,18 +25,14 @@ class KnownArea:
     """The part of one map that beams can be compared with."""
 
     def __init__(self, grid_map: GridMap) -> None:
-        self._grid_map = grid_map
         self.resolution_m = grid_map.resolution_m
         near = int(round(_NEAR_WALL_M / grid_map.resolution_m))
-        self._border = near + 1  # cells around the grid
-        unknown = np.pad(grid_map.occupancy == UNKNOWN, self._border, constant_values=True)
+        border = near + 1  # cells around the grid
+        unknown = np.pad(grid_map.occupancy == UNKNOWN, border, constant_values=True)
         beside = _grown(unknown, _BESIDE_CELLS)
-        known = ~beside | _grown(np.pad(grid_map.occupied, self._border), near)
-        self._flags = (
-            _KNOWN * known + _UNMAPPED * unknown + _FREE * np.pad(grid_map.free, self._border) + _BESIDE * beside
-        ).ravel()
-        self._stride = unknown.shape[1]
-        self._last = np.array(unknown.shape) - 1
+        known = ~beside | _grown(np.pad(grid_map.occupied, border), near)
+        flags = _KNOWN * known + _UNMAPPED * unknown + _FREE * np.pad(grid_map.free, border) + _BESIDE * beside
+        self.compiled = _distance_field.KnownArea(flags, border, grid_map.resolution_m, grid_map.map_from_grid)
 
     def contains(self, points_m: np.ndarray) -> np.ndarray:
         """Whether the map knows something of places.
@@ -71,15 +70,12 @@ class KnownArea:
         """
         return self.contains(se2.transform_points(np.asarray(map_from_base, float)[:, None], points_m))
 
-    def _has(self, flag: np.uint8, points_m: np.ndarray) -> np.ndarray:
-        return (self._flags[self._cell(points_m)] & flag).astype(bool)
+    def __deepcopy__(self, _memo: Dict[int, Any]) -> KnownArea:
+        """Itself: it never changes."""
+        return self
 
-    def _cell(self, points_m: np.ndarray) -> np.ndarray:
-        rows, columns = self._grid_map.cells(points_m)
-        # The outermost cells are unknown. np.clip takes three times as long for the points of a scan.
-        rows = np.minimum(np.maximum(rows + self._border, 0), self._last[0])
-        columns = np.minimum(np.maximum(columns + self._border, 0), self._last[1])
-        return rows * self._stride + columns
+    def _has(self, flag: np.uint8, points_m: np.ndarray) -> np.ndarray:
+        return self.compiled.has(flag, points_m)
 
 
 def _grown(cells: np.ndarray, reach: int) -> np.ndarray:

@@ -61,6 +61,14 @@ class RawScan:
 
 
 @dataclass(frozen=True)
+class ScanTransforms:
+    """Those that a scan is placed by."""
+
+    odom_from_base: np.ndarray  # (3,) at its stamp
+    mounting: Mounting
+
+
+@dataclass(frozen=True)
 class PlacedScan:
     """A scan with all that the filter needs."""
 
@@ -110,29 +118,42 @@ class ScanPlacement:
         assumed = self._limits.is_assumed(raw.range_max_m)
         return range_limits.warning(raw.lidar, raw.range_max_m) if assumed else None
 
+    def transforms(self, raw: RawScan) -> ScanTransforms:
+        """Those at the stamp of a scan, once all that place() needs are known. NoTransform if one is not; ScanError."""
+        found = self._at_stamp(raw)
+        if self._sweep_ns(raw):
+            self._transforms.odom_from_base(raw.stamp_ns + raw.sweep_ns)
+        return found
+
     def missing(self, raw: RawScan) -> Optional[str]:
         """The first transform that the scan lacks, in words; None if place() finds all that it needs."""
         try:
-            self._transforms.odom_from_base(raw.stamp_ns)
-            self._transforms.mounting(raw.lidar, raw.stamp_ns)
-            if self._sweep_ns(raw):
-                self._transforms.odom_from_base(raw.stamp_ns + raw.sweep_ns)
+            self.transforms(raw)
         except NoTransform as err:
             return str(err)
         except ScanError:  # it is there, but of no use: for place() to say
             pass
         return None
 
-    def place(self, raw: RawScan) -> PlacedScan:
+    def place(self, raw: RawScan, transforms: Optional[ScanTransforms] = None) -> PlacedScan:
         """The scan with the odometry at its stamp.
+
+        Args:
+            raw: the scan.
+            transforms: of it; None: they are looked up.
 
         Raises:
             NoTransform: one of its transforms is not known.
             ScanError: it cannot be used, whatever transforms come.
         """
-        odom_from_base = self._transforms.odom_from_base(raw.stamp_ns)
-        mounting = self._transforms.mounting(raw.lidar, raw.stamp_ns)
-        return PlacedScan(raw, self._deskewed(raw, mounted(raw, mounting, self._limits)), mounting, odom_from_base)
+        found = transforms or self._at_stamp(raw)
+        scan = self._deskewed(raw, mounted(raw, found.mounting, self._limits))
+        return PlacedScan(raw, scan, found.mounting, found.odom_from_base)
+
+    def _at_stamp(self, raw: RawScan) -> ScanTransforms:
+        return ScanTransforms(
+            self._transforms.odom_from_base(raw.stamp_ns), self._transforms.mounting(raw.lidar, raw.stamp_ns)
+        )
 
     def scan(self, raw: RawScan) -> Scan:
         """The scan alone; odometry is needed only to deskew it. Raises as place() does."""

@@ -10,7 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Callable, Dict, List, Optional, Set, Tuple
 
-from glass_nav.sensing.scan_placement import PlacedScan, RawScan, ScanPlacement
+from glass_nav.sensing.scan import ScanError
+from glass_nav.sensing.scan_placement import NoTransform, PlacedScan, RawScan, ScanPlacement, ScanTransforms
 
 STALE_SCANS = 20  # that many older scans of one lidar in a row: its clock was set back
 MAX_LIDARS = 16  # a driver that makes up a frame for every scan must not fill the memory
@@ -30,6 +31,14 @@ class ScanCounts:
     superseded: int = 0  # a newer one was ready too: the lidar is faster than the node or tf
     dropped_no_transform: int = 0  # no transform at its stamp within the limit
     waiting: int = 0  # for their transforms, now
+
+
+@dataclass(frozen=True)
+class ReadyScan:
+    """A scan that need not wait any longer."""
+
+    raw: RawScan
+    transforms: Optional[ScanTransforms] = None  # None: one of them is of no use, which place() says
 
 
 class ScanQueue:
@@ -114,27 +123,28 @@ class ScanQueue:
         """Count a scan that is not used, and say why."""
         self._refuse(why, quietly=False)
 
-    def take_ready(self, now_s: float) -> List[RawScan]:
+    def take_ready(self, now_s: float) -> List[ReadyScan]:
         """The newest scan of each lidar that has its transforms, by ascending stamps."""
-        ready: List[RawScan] = []
+        ready: List[ReadyScan] = []
         for lidar, waiting in self._lidars.items():
-            raw, dropped = waiting.take_ready(self._has_transforms, now_s, self._max_wait_s)
+            newest, dropped = waiting.take_ready(self._ready, now_s, self._max_wait_s)
             if dropped:
                 self._say_dropped(dropped[-1], quietly=self._is_starting(now_s))
-            if raw is not None:
+            if newest is not None:
                 self._usable.add(lidar)
-                ready.append(raw)
-        return sorted(ready, key=lambda raw: raw.stamp_ns)
+                ready.append(newest)
+        return sorted(ready, key=lambda scan: scan.raw.stamp_ns)
 
-    def place(self, raw: RawScan) -> PlacedScan:
+    def place(self, ready: ReadyScan) -> PlacedScan:
         """A scan that is ready, with its transforms. ScanError if it cannot be used: refuse() it."""
+        raw = ready.raw
         fault = self._placement.timing_fault(raw)
         if fault is not None:
             self._warn(f"scans are not deskewed: {fault}", _FAULT_PERIOD_S)
         no_limit = self._placement.range_fault(raw)
         if no_limit is not None:
             self._warn(no_limit, _ONCE_S)
-        return self._placement.place(raw)
+        return self._placement.place(raw, ready.transforms)
 
     def restart(self, now_s: float) -> None:
         """Forget what waits and which stamps were used: time has jumped."""
@@ -172,8 +182,14 @@ class ScanQueue:
                 self._lidars.pop(name).drop_all()
         return lidar in self._lidars or len(self._lidars) < MAX_LIDARS
 
-    def _has_transforms(self, raw: RawScan) -> bool:
-        return self._placement.missing(raw) is None
+    def _ready(self, raw: RawScan) -> Optional[ReadyScan]:
+        """The scan with its transforms; None while it lacks one."""
+        try:
+            return ReadyScan(raw, self._placement.transforms(raw))
+        except NoTransform:
+            return None
+        except ScanError:
+            return ReadyScan(raw)
 
     def _say_dropped(self, raw: RawScan, quietly: bool) -> None:
         missing = self._placement.missing(raw)
@@ -211,13 +227,14 @@ class _Waiting:
         return True
 
     def take_ready(
-        self, is_ready: Callable[[RawScan], bool], now_s: float, max_wait_s: float
-    ) -> "Tuple[Optional[RawScan], List[RawScan]]":
+        self, ready_or_none: Callable[[RawScan], Optional[ReadyScan]], now_s: float, max_wait_s: float
+    ) -> "Tuple[Optional[ReadyScan], List[RawScan]]":
         """The scan with the newest stamp that is ready, and those that waited longer than the limit."""
-        ready = next((raw for _, raw in sorted(self._scans, key=_newest_first) if is_ready(raw)), None)
+        newest_first = sorted(self._scans, key=_newest_first)
+        ready = next(filter(None, (ready_or_none(raw) for _, raw in newest_first)), None)
         if ready is not None:
-            self._last_used_ns = ready.stamp_ns
-            newer = [(arrival_s, raw) for arrival_s, raw in self._scans if raw.stamp_ns > ready.stamp_ns]
+            used_ns = self._last_used_ns = ready.raw.stamp_ns
+            newer = [(arrival_s, raw) for arrival_s, raw in self._scans if raw.stamp_ns > used_ns]
             self._counts.superseded += len(self._scans) - len(newer) - 1
             self._keep(newer)
         dropped = [raw for arrival_s, raw in self._scans if now_s - arrival_s > max_wait_s]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from glass_nav.geometry import se2
+from glass_nav import _distance_field
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.known_area import KnownArea
 from glass_nav.sensing.scan import Scan
@@ -30,13 +30,14 @@ def without(
         map_from_base: (3,) pose.
         field, known_area: of the map.
     """
-    bearing = scan.angles_rad[beams] + (map_from_base[2] + scan.base_from_laser[2])
-    ahead = np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
-    before = se2.transform_points(map_from_base, scan.points_in_base()[beams]) - _BEFORE_M * ahead
-    distance_m, along_x, along_y = field.at(before[:, 0], before[:, 1])
-    away = np.stack([along_x, along_y], axis=-1)  # from the wall
-    wall = before - distance_m[:, None] * away
-    side = max(_SIDE_M, _SIDE_CELLS * known_area.resolution_m) * away
-    met = (distance_m < _THICKEST_M) & (np.sum(away * ahead, axis=1) < 0.0)
-    met &= known_area.is_unmapped(wall + side) & known_area.is_free(wall - side)
-    return beams[~met]
+    at_back = _distance_field.end_at_backs(
+        field.compiled,
+        known_area.compiled,
+        scan.points_in_base()[beams],
+        scan.angles_rad[beams] + scan.base_from_laser[2],
+        map_from_base,
+        _BEFORE_M,
+        _THICKEST_M,
+        max(_SIDE_M, _SIDE_CELLS * known_area.resolution_m),
+    )
+    return beams[~at_back]

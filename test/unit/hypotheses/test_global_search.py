@@ -163,6 +163,20 @@ def test_what_the_map_does_not_know_supports_no_place_outside_of_it():
     assert inside > 0.9 and outside == 0.0
 
 
+def test_the_compiled_fit_agrees_with_numpy():
+    building, rng = Building([(0, 0), (6, 0), (6, 4), (0, 4)]), np.random.default_rng(0)
+    grid_map = building.grid_map()
+    grid_map.occupancy[:, :40] = UNKNOWN
+    field, area = DistanceField(grid_map), KnownArea(grid_map)
+    points, poses = rng.uniform(-4.0, 4.0, (150, 2)), rng.uniform([0, 0, -4], [6, 4, 4], (20, 3))
+    ends = se2.transform_points(poses[:, None], points)
+    fits = 0.04 / (0.04 + field.distance(ends[..., 0], ends[..., 1]) ** 2)
+    unknown = np.where(area.is_unmapped(poses[:, :2]), 0.0, 0.4)
+    expected = np.mean(np.where(area.contains(ends), fits, unknown[:, None]), axis=1)
+    assert len(np.unique(unknown)) == 2
+    np.testing.assert_allclose(global_search.fit(field, points, poses, area), expected, rtol=1e-12)
+
+
 def test_the_covariance_is_of_all_places():
     room = Building([(0, 0), (6, 0), (6, 6), (0, 6)])
     told = search_in(room).update(room.scan(np.array([1.0, 3.0, 0.0])), np.zeros(3))

@@ -10,7 +10,7 @@ from glass_nav.sensing.mounting import Mounting
 from glass_nav.sensing.range_limits import RangeLimits
 from glass_nav.sensing.scan import ScanError
 from glass_nav.sensing.scan_placement import ScanPlacement
-from glass_nav.sensing.scan_queue import ScanQueue
+from glass_nav.sensing.scan_queue import ReadyScan, ScanQueue
 
 RANGES_M = np.array([2.0, np.inf, 7.5, np.nan, 0.05])
 FLOAT_MAX = float(np.finfo(np.float32).max)  # what the largest float becomes in a message
@@ -79,7 +79,7 @@ def test_limits_that_are_wrong_are_refused_all_the_same(fields, text):
 def test_a_running_node_warns_of_each_such_lidar_once():
     said = []
     queue = ScanQueue(ScanPlacement(MadeTransforms()), 1.0, 0.0, lambda text, period_s: said.append((text, period_s)))
-    queue.place(raw_scan(range_max_m=np.inf))
+    queue.place(ReadyScan(raw_scan(range_max_m=np.inf)))
     assert said == [
         (
             "range_max of lidar 'laser' is inf m, which is no limit: the longest range seen so far is used instead; "
@@ -88,7 +88,7 @@ def test_a_running_node_warns_of_each_such_lidar_once():
         )
     ]
     queue.use(ScanPlacement(MadeTransforms(), limits=RangeLimits(25.0)), 1.0)
-    queue.place(raw_scan(range_max_m=np.inf))
+    queue.place(ReadyScan(raw_scan(range_max_m=np.inf)))
     assert len(said) == 1
 
 

@@ -12,7 +12,7 @@ from glass_nav.sensing import scan_queue
 from glass_nav.sensing.mounting import Mounting
 from glass_nav.sensing.scan import ScanError
 from glass_nav.sensing.scan_placement import ScanPlacement
-from glass_nav.sensing.scan_queue import ScanQueue
+from glass_nav.sensing.scan_queue import ReadyScan, ScanQueue
 
 MAX_WAIT_S = 1.0
 
@@ -32,7 +32,7 @@ class Queue(ScanQueue):
     def ready(self, now_s: float, until: int) -> List[int]:
         """The stamps of the scans that are ready when transforms are known up to that one."""
         self.transforms.known_until_ns = STAMP_NS + until
-        return [raw.stamp_ns - STAMP_NS for raw in self.take_ready(now_s)]
+        return [scan.raw.stamp_ns - STAMP_NS for scan in self.take_ready(now_s)]
 
 
 def test_the_newest_scan_with_transforms_wins_and_older_ones_go():
@@ -188,11 +188,11 @@ def test_the_period_is_that_of_all_lidars_together():
 
 def test_a_scan_is_placed_or_rejected_when_it_is_ready():
     queue = Queue()
-    np.testing.assert_allclose(queue.place(raw_scan(STAMP_NS + 10**9)).odom_from_base, [1.0, 0.0, 0.0])
+    np.testing.assert_allclose(queue.place(ReadyScan(raw_scan(STAMP_NS + 10**9))).odom_from_base, [1.0, 0.0, 0.0])
     with pytest.raises(ScanError, match="range_max must be finite and > 0 m"):
-        queue.place(raw_scan(range_max_m=0.0))
+        queue.place(ReadyScan(raw_scan(range_max_m=0.0)))
     assert queue.warnings == []
-    queue.place(raw_scan(time_increment_s=0.5))
+    queue.place(ReadyScan(raw_scan(time_increment_s=0.5)))
     assert queue.warnings == ["scans are not deskewed: time_increment 0.5 s times 5 beams is 2 s, allowed 1 s"]
 
 
@@ -237,3 +237,11 @@ def test_after_a_jump_of_time_there_is_a_grace_time_again():
     queue.restart(0.0)
     queue.add(raw_scan(STAMP_NS), 3.0, "there is no map yet")
     assert queue.warnings == []
+
+
+def test_what_a_scan_waited_for_is_not_looked_up_again():
+    queue = Queue()
+    queue.come(10**9)
+    (ready,) = queue.take_ready(0.0)
+    queue.transforms.known_until_ns = 0
+    np.testing.assert_allclose(queue.place(ready).odom_from_base, [1.0, 0.0, 0.0])

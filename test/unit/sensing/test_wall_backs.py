@@ -57,3 +57,22 @@ def test_what_ends_at_no_wall_stays():
 
 def test_no_beams_are_no_beams():
     assert kept(room_beside_a_bridge(), [1.0, 3.0, 0.0], [np.nan]) == []
+
+
+def test_the_compiled_code_agrees_with_numpy():
+    grid_map, rng = room_beside_a_bridge(), np.random.default_rng(0)
+    field, area = DistanceField(grid_map), KnownArea(grid_map)
+    mounting = np.array([0.2, -0.1, 0.4])
+    scan = Scan(0, rng.uniform(0.5, 6.0, 400), rng.uniform(-np.pi, np.pi, 400), 0.0, 30.0, mounting)
+    pose, beams = se2.compose(PLACED, np.array([1.0, 3.0, 0.3])), np.arange(400)
+
+    bearing = scan.angles_rad + mounting[2] + pose[2]
+    ahead = np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
+    before = se2.transform_points(pose, scan.points_in_base()) - 0.25 * ahead
+    distance_m, along_x, along_y = field.at(before[:, 0], before[:, 1])
+    away = np.stack([along_x, along_y], axis=-1)
+    wall = before - distance_m[:, None] * away
+    met = (distance_m < 0.75) & (np.sum(away * ahead, axis=1) < 0.0)
+    met &= area.is_unmapped(wall + 0.15 * away) & area.is_free(wall - 0.15 * away)
+    assert met.any()
+    np.testing.assert_array_equal(wall_backs.without(scan, beams, pose, field, area), beams[~met])

@@ -68,6 +68,35 @@ Pose solve(const Equations& e) {
           scale * (c02 * e.b0 + c12 * e.b1 + c22 * e.b2)};
 }
 
+/// The points of a scan at one pose, a block after the other, and the field there.
+struct Ends {
+  Ends(const Points& points, const Pose& pose)
+      : points_(points), pose_(pose), cos_(std::cos(pose[2])), sin_(std::sin(pose[2])) {}
+
+  /// Goes on to the next block; false after the last one.
+  __attribute__((always_inline)) bool next(const DistanceField& field) {
+    first_ += count;
+    count = std::min(Slopes::kMost, points_.count - first_);
+    const double* from = points_.xy_m + 2 * first_;
+    for (std::size_t i = 0; i < count; ++i) {
+      x_m[i] = pose_[0] + cos_ * from[2 * i] - sin_ * from[2 * i + 1];
+      y_m[i] = pose_[1] + sin_ * from[2 * i] + cos_ * from[2 * i + 1];
+    }
+    at.find(field, x_m, y_m, count);
+    return count > 0;
+  }
+
+  Slopes at;
+  Slopes::Values x_m, y_m;
+  std::size_t count = 0;  // in the present block
+
+ private:
+  const Points& points_;
+  const Pose& pose_;
+  double cos_, sin_;
+  std::size_t first_ = 0;
+};
+
 }  // namespace
 
 void slide(const DistanceField& field, const Points& points, const Steps& steps, Pose& pose) {
@@ -99,19 +128,25 @@ Matrix3 information_at(const DistanceField& field, const Points& points, const P
 }
 
 GLASS_NAV_VECTORIZED double fit_at(const DistanceField& field, const Points& points, const Pose& pose, double scale_m) {
-  const double cos = std::cos(pose[2]), sin = std::sin(pose[2]), square = scale_m * scale_m;
-  Slopes at;
-  Slopes::Values x_m, y_m;
+  const double square = scale_m * scale_m;
+  Ends ends(points, pose);
   double total = 0.0;
-  for (std::size_t first = 0; first < points.count; first += Slopes::kMost) {
-    const std::size_t count = std::min(Slopes::kMost, points.count - first);
-    const double* from = points.xy_m + 2 * first;
-    for (std::size_t i = 0; i < count; ++i) {
-      x_m[i] = pose[0] + cos * from[2 * i] - sin * from[2 * i + 1];
-      y_m[i] = pose[1] + sin * from[2 * i] + cos * from[2 * i + 1];
+  while (ends.next(field)) {
+    for (std::size_t i = 0; i < ends.count; ++i) total += square / (square + ends.at.distance[i] * ends.at.distance[i]);
+  }
+  return total / static_cast<double>(points.count);
+}
+
+GLASS_NAV_VECTORIZED double known_fit_at(const DistanceField& field, const KnownArea& area, const Points& points,
+                                         const Pose& pose, double scale_m, double unknown_fit) {
+  const double square = scale_m * scale_m, unknown = area.has(kUnmapped, pose[0], pose[1]) ? 0.0 : unknown_fit;
+  Ends ends(points, pose);
+  double total = 0.0;
+  while (ends.next(field)) {
+    for (std::size_t i = 0; i < ends.count; ++i) {
+      const double fit = square / (square + ends.at.distance[i] * ends.at.distance[i]);
+      total += area.has(kKnown, ends.x_m[i], ends.y_m[i]) ? fit : unknown;
     }
-    at.find(field, x_m, y_m, count);
-    for (std::size_t i = 0; i < count; ++i) total += square / (square + at.distance[i] * at.distance[i]);
   }
   return total / static_cast<double>(points.count);
 }

@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "distance_field.hpp"
+#include "known_area.hpp"
 
 namespace glass_nav {
 
@@ -34,5 +35,9 @@ Matrix3 information_at(const DistanceField& field, const Points& points, const P
 
 /// Mean over the beams of s^2 / (s^2 + d^2).
 double fit_at(const DistanceField& field, const Points& points, const Pose& pose, double scale_m);
+
+/// The same, but points that end where the map knows nothing count unknown_fit, or 0 where the pose itself is unmapped.
+double known_fit_at(const DistanceField& field, const KnownArea& area, const Points& points, const Pose& pose,
+                    double scale_m, double unknown_fit);
 
 }  // namespace glass_nav

@@ -59,7 +59,7 @@ from glass_nav.ros.loop_clock import LoopClock
 from glass_nav.ros.mailbox import Mailbox
 from glass_nav.ros.scan_input import ScanInput
 from glass_nav.sensing.scan import ScanError
-from glass_nav.sensing.scan_placement import RawScan
+from glass_nav.sensing.scan_queue import ReadyScan
 from glass_nav.topology.atlas import atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import AtlasError
 from glass_nav.vocabulary import LocalizationState, Outcome
@@ -218,13 +218,13 @@ class DriverNode:
             self._driver.surfaces_came()
         preferred = self._surfaces if self._driver.prefers_surfaces else self._scans
         for source in (self._scans, self._surfaces):
-            for raw in source.take_ready(self._clock.now_s):
+            for ready in source.take_ready(self._clock.now_s):
                 if source is preferred:
-                    self._take_scan(source, raw)
+                    self._take_scan(source, ready)
 
-    def _take_scan(self, source: ScanInput, raw: RawScan) -> None:
+    def _take_scan(self, source: ScanInput, ready: ReadyScan) -> None:
         try:
-            placed = source.place(raw)
+            placed = source.place(ready)
         except ScanError as err:
             source.refuse(str(err))
             return

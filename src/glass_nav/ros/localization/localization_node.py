@@ -70,7 +70,7 @@ from glass_nav.ros.mailbox import Mailbox
 from glass_nav.ros.scan_input import ScanInput
 from glass_nav.ros.tf_transforms import TfTransforms
 from glass_nav.sensing.scan import Scan, ScanError
-from glass_nav.sensing.scan_placement import RawScan
+from glass_nav.sensing.scan_queue import ReadyScan
 from glass_nav.srv import LocateRequest
 from glass_nav.world import landmark_file
 from glass_nav.world.grid_map import GridMap
@@ -150,8 +150,8 @@ class LocalizationNode:
                 if stale is not None:
                     self._restart(stale)
             if self._session.refusal is None:
-                for raw in self._scans.take_ready(self._clock.now_s):
-                    self._step(raw)
+                for ready in self._scans.take_ready(self._clock.now_s):
+                    self._step(ready)
             self._send_glass_map()
             self._report()
 
@@ -209,7 +209,7 @@ class LocalizationNode:
         scan, grid_map = self._session.scan, self._session.grid_map
         if request.scan.ranges:
             raw = conversions.raw_scan_from_msg(request.scan)
-            scan = self._in_run_loop(lambda: self._scans.place(raw)).scan
+            scan = self._in_run_loop(lambda: self._scans.place(ReadyScan(raw))).scan
         if grid_map is None or scan is None:
             raise ValueError(f"there is no {'map' if grid_map is None else 'scan'} yet")
         return scan, grid_map
@@ -260,12 +260,12 @@ class LocalizationNode:
 
     # -- scans
 
-    def _step(self, raw: RawScan) -> None:
+    def _step(self, ready: ReadyScan) -> None:
         """Process one scan."""
         try:
-            placed = self._scans.place(raw)
+            placed = self._scans.place(ready)
         except ScanError as err:
-            self._pass_over(raw.stamp_ns, str(err))
+            self._pass_over(ready.raw.stamp_ns, str(err))
             return
         began_cpu_s, began_s = time.process_time(), time.monotonic()
         session, scan, odom_from_base = self._session, placed.scan, placed.odom_from_base
@@ -274,7 +274,7 @@ class LocalizationNode:
         try:
             estimate = session.update(scan, odom_from_base, self._clock.now_s)
         except ValueError as err:  # ScanError, or the filter fails: the robot drives on by odometry
-            self._pass_over(raw.stamp_ns, str(err))
+            self._pass_over(ready.raw.stamp_ns, str(err))
             return
         if estimate is None:
             self._scans.counts.refused += 1
