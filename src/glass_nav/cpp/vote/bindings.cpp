@@ -154,8 +154,7 @@ py::tuple pane_echoes(const Array<double>& measured_m, const Array<double>& rang
   check_rows(range_m, kPaths, beams_only, "ranges must be (4, B)");
   check_rows(cos, kPaths, beams_only, "cosines must be (4, B)");
   check_rows(seen_side, kPaths, beams_only, "seen sides must be (4, B)");
-  for (const py::array& array :
-       {py::array(turned_rad), py::array(reflectance), py::array(unmapped_end)}) {
+  for (const py::array& array : {py::array(turned_rad), py::array(reflectance), py::array(unmapped_end)}) {
     check_rows(array, 1, beams_only, "turns, reflectances and unmapped ends must be (B,)");
   }
   const PaneModel model = panes_of(gains, frequencies, sigma_m, max_range_m, min_cos);

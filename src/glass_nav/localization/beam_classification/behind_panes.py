@@ -4,7 +4,8 @@ Echo powers follow the lidar equation for diffuse targets: T^2 / d^2 from a surf
 R^2 / d^2 along the mirrored path, with R and T from Fresnel's equations. The strongest echo is reported. Behind a
 pane the map often ends: outdoors, or in a room that the mapper did not enter. What is there is unknown, but usually
 something returns an echo. One thing is likely: walls continue. The mirror image of a wall perpendicular to the pane
-lies where the same wall would continue behind it, so both give the same range. The formulation is ours. B beams;
+lies where the same wall would continue behind it, so both give the same range. The same holds for a wall of which the
+map shows only the other face: its near face is somewhere in front of it. The formulation is ours. B beams;
 expected ranges are those of sample 0.
 """
 
@@ -25,7 +26,6 @@ _WRONG = 0.05  # share of the echoes that are told wrongly, whatever the coating
 _SCAN_SHARE, _SCAN_BEAMS, _MOST_LOG = 0.5, 5.0, 4.0  # beams of one scan are one piece of evidence; it is bounded
 _MOST_REFLECTED = 0.9
 _OTHER_WALL = 2.0  # steepness of a victory: reflectances of other walls differ by factors
-_IN_LINE_RAD = np.radians(10.0)
 _FIRST, _MIRRORED, _SECOND = BeamCase.DIFFUSE - 1, BeamCase.SPECULAR - 1, BeamCase.FIRST_PENETRATION - 1
 
 
@@ -56,9 +56,9 @@ class Coatings:
             )
             apart = np.abs(mirrored_m - behind_m) * cos.min(axis=0) > 2.0 * gate_m
             past = measured_m - expected.range_m[_FIRST, 0] > 2.0 * gate_m / MIN_COS
-        told = apart & past & (at_mirrored != at_behind) & expected.seen_side[[_MIRRORED, _SECOND]].all(axis=0)
+            behind = (behind_m - expected.range_m[_FIRST, 0]) * expected.cos_incidence[_FIRST, 0] > 2.0 * gate_m
+        told = apart & past & behind & (at_mirrored != at_behind) & expected.seen_side[[_MIRRORED, _SECOND]].all(axis=0)
         told &= np.isfinite(mirrored_m) & np.isfinite(behind_m)
-        told &= ~_in_line(expected.axis_rad[_SECOND] - expected.axis_rad[_FIRST])
         if not told.any():
             return self
         clear = reflectance(expected.pane_incidence[0][told])
@@ -118,11 +118,6 @@ def of(
             MIN_COS,
         )
     )
-
-
-def _in_line(turned_rad: np.ndarray) -> np.ndarray:
-    """(B,) bool: a surface that is turned so little from a pane may be its next cell, or the next pane of the row."""
-    return np.abs(np.sin(turned_rad)) < np.sin(_IN_LINE_RAD)
 
 
 def _wins(over: np.ndarray, steepness: float) -> np.ndarray:
