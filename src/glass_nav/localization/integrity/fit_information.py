@@ -4,7 +4,12 @@ This is the covariance of the least-squares fit of the beams to the walls at whi
 wall share an error: where the map has drawn it, and how the lidar sees it. That error averages out neither over beams
 nor over scans. So the variance is that of a fit with clustered errors (White, Econometrica 48, 1980; Liang and Zeger,
 Biometrika 73, 1986) at two levels: each piece of wall has its own error, and all walls that face the same way have a
-common one. The size of both is learnt from the residuals after each fit.
+common one. The size of both is learnt from the residuals after each fit. Residuals are measured square to the wall from
+just before it, so that nothing beside the wall enters them.
+
+A map whose walls are all drawn too far to one side shifts the pose with them, and no scan shows it. What scans show is how
+far walls that face different ways disagree, and a shift of that size is added. It is weighted, because it is learnt from
+few directions.
 
 A linearized fit does not know other places where the scan would fit as well, such as farther along a corridor with
 equal doors. So the loss is also evaluated along the axis that is constrained least, and along the direction in which a
@@ -21,7 +26,6 @@ from glass_nav import _integrity
 from glass_nav.sensing.distance_field import DistanceField
 
 FREE_M = 2.0  # deviation in a direction that no wall constrains
-_EDGE_CELLS = 0.29  # deviation of an edge that is drawn in whole cells
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,12 @@ class ScanFit:
             resolution_m: of the map's cells.
         """
         self._field = field
-        self._compiled = _integrity.ScanFit(_EDGE_CELLS * resolution_m)
+        self._compiled = _integrity.ScanFit(resolution_m)
+
+    @property
+    def wall_deviation_m(self) -> float:
+        """Standard deviation of a piece of wall from where the map has it, as it was learnt."""
+        return float(self._compiled.wall_deviation_m)
 
     def of(
         self, points_m: np.ndarray, laser_m: np.ndarray, map_from_base: np.ndarray, beam_share: float, worth: float

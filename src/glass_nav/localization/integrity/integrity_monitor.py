@@ -14,6 +14,7 @@ import numpy as np
 
 from glass_nav import _integrity
 from glass_nav.geometry import angles
+from glass_nav.localization.integrity.dead_reckoning import SURE
 from glass_nav.localization.integrity.fit_information import FitInformation, ScanFit
 from glass_nav.localization.integrity.pose_covariance import PoseCovariance, widened_by
 from glass_nav.localization.particle_filter.motion import OdometryNoise
@@ -22,8 +23,9 @@ from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.known_area import KnownArea
 from glass_nav.sensing.scan import Scan, spread_evenly
 
-_BEAMS = 90  # looked at
+_BEAMS, _LOOKED_AT = 180, 90  # that determine a pose; that are looked at, whether a scan still fits
 _MIN_BEAMS = 10
+_UNIFORM = 3.0**0.5  # half the width of a uniform distribution, in its deviations
 _BESIDE = 3.0  # deviations between the pose and the best fit: the scan no longer fits
 _FARTHER = 3.0  # times as far as after the last update
 _LESS = 0.15  # share of the beams at walls, below that at the last update: the scan no longer fits
@@ -39,6 +41,7 @@ class IntegrityMonitor:
         """
         self._field, self._known_area = field, known_area
         self._fit = ScanFit(field, known_area.resolution_m)
+        self._half_cell_m = 0.5 * known_area.resolution_m
         self._covariance: Optional[PoseCovariance] = None
         self._at_update: Dict[str, Tuple[float, float]] = {}  # of each lidar's last update: beside_of() and share then
         self._other: Optional[np.ndarray] = None  # (3,) how far off another possible place is, in map
@@ -56,7 +59,7 @@ class IntegrityMonitor:
 
     def fits(self, scan: Scan, map_from_base: np.ndarray, step: Optional[np.ndarray], noise: OdometryNoise) -> bool:
         """Whether a scan still fits at the pose (3,) to which a step (3,) of odometry since the last update leads."""
-        self._now = None if self._covariance is None else self._look(scan, map_from_base, 0.0)
+        self._now = None if self._covariance is None else self._look(scan, map_from_base)
         if self._covariance is None or self._now is None or scan.lidar not in self._at_update:
             return True
         beside_then, share_then = self._at_update[scan.lidar]
@@ -89,8 +92,9 @@ class IntegrityMonitor:
         """
         if self._covariance is None:
             return map_from_base
-        self._now = self._look(scan, map_from_base, worth)
-        pose = self._covariance.update(step, map_from_base, self._now if worth > 0.0 else None, noise, worth, slipped)
+        fit = self._look(scan, map_from_base, worth) if worth > 0.0 else None
+        pose = self._covariance.update(step, map_from_base, fit, noise, worth, slipped)
+        self._now = self._look(scan, map_from_base)
         if self._now is not None:
             back = pose - map_from_base
             back[2] = angles.wrap(back[2])
@@ -137,8 +141,19 @@ class IntegrityMonitor:
             covariance = covariance + np.outer(self._other, self._other)
         return covariance
 
-    def _look(self, scan: Scan, map_from_base: np.ndarray, worth: float) -> Optional[FitInformation]:
-        chosen = spread_evenly(scan.answered, _BEAMS)
+    @property
+    def least_level_m(self) -> float:
+        """Least 99.9 % level of a position: how far off walls are drawn.
+
+        In a grid map that is up to half a cell, and all walls that face one way may be off to the same side. Where
+        pieces of walls agree better with each other, they are drawn better: errors of a uniform distribution are at most
+        sqrt(3) of its standard deviations.
+        """
+        return min(self._half_cell_m, _UNIFORM * self._fit.wall_deviation_m)
+
+    def _look(self, scan: Scan, map_from_base: np.ndarray, worth: float = 0.0) -> Optional[FitInformation]:
+        """How a scan fits at a pose; with the worth of its fit, if the pose was fitted to it."""
+        chosen = spread_evenly(scan.answered, _BEAMS if worth > 0.0 else _LOOKED_AT)
         share = len(chosen) / max(int(np.count_nonzero(scan.answered)), 1)
         beams = wall_backs.without(scan, chosen, map_from_base, self._field, self._known_area)
         if len(beams) < _MIN_BEAMS:
@@ -148,4 +163,4 @@ class IntegrityMonitor:
 
 def _beside(fit: FitInformation, covariance: np.ndarray) -> float:
     """Distance of the best fit from a pose with that covariance (3, 3), in deviations of both."""
-    return _integrity.mahalanobis(fit.offset, fit.covariance + covariance)
+    return _integrity.mahalanobis(fit.offset, fit.covariance + covariance + SURE)

@@ -71,7 +71,7 @@ def test_a_corridor_leaves_the_pose_along_it_free():
     points = ends_in_room(pose, x=(-100.0, 100.0), y=(9.0, 11.0))
     near = np.abs(se2.transform_points(pose, points)[:, 0] - 10.0) < 8.0
     along, across, _ = deviations(fit_of(CORRIDOR, points[near], pose))
-    assert along > 0.5 * FREE_M and across < 0.03
+    assert along > 0.5 * FREE_M and across < 0.04
 
 
 def test_a_corridor_with_equal_doors_leaves_the_pose_at_any_of_them():
