@@ -50,7 +50,9 @@ from glass_nav.topology.search.belief import NO_DART
 from glass_nav.topology.search.expected_views import ExpectedViews
 from glass_nav.topology.search.search_estimate import SearchEstimate
 from glass_nav.topology.search.search_params import SearchParams
-from glass_nav.topology.search_session import SearchSession, SearchStatus, SessionParams
+from glass_nav.topology.search_decisions import SearchStatus
+from glass_nav.topology.search_session import SearchSession
+from glass_nav.topology.session_params import SessionParams
 from glass_nav.vocabulary import LocalizationState, Outcome, SearchState
 from glass_nav.world.grid_map import GridMap
 

@@ -11,7 +11,7 @@ from typing import Optional
 from glass_nav import params
 from glass_nav.replay import replay_params
 from glass_nav.topology.search.search_params import SearchParams
-from glass_nav.topology.search_session import SessionParams
+from glass_nav.topology.session_params import SessionParams
 
 NODE_ONLY = frozenset(
     [

@@ -1,1 +1,4 @@
-"""Many replays side by side: contestants, logs and seeds, on several cores or machines."""
+"""Runs several sets of parameters over several logs and seeds, on many cores or machines, and compares them.
+
+compare_runs.py is one run, engine.py distributes them, evaluation/metrics/comparison.py has the statistics.
+"""

@@ -19,7 +19,9 @@ from glass_nav.localization.localizer_params import LocalizerParams
 from glass_nav.simulation.simulation import Simulation
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.search.search_params import SearchParams
-from glass_nav.topology.search_session import SearchSession, SearchStatus, SessionParams
+from glass_nav.topology.search_decisions import SearchStatus
+from glass_nav.topology.search_session import SearchSession
+from glass_nav.topology.session_params import SessionParams
 from glass_nav.world.grid_map import GridMap
 
 

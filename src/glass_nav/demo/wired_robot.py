@@ -24,9 +24,10 @@ from glass_nav.localization.localizer import Estimate, Localizer
 from glass_nav.log_line import LogLine
 from glass_nav.sensing.scan import Scan
 from glass_nav.simulation.simulation import Frame, Simulation
-from glass_nav.topology import search_session
+from glass_nav.topology import search_decisions
 from glass_nav.topology.atlas.atlas import Atlas
-from glass_nav.topology.search_session import SearchSession, SearchStatus
+from glass_nav.topology.search_decisions import SearchStatus
+from glass_nav.topology.search_session import SearchSession
 from glass_nav.vocabulary import DriverPhase
 from glass_nav.world.grid_map import GridMap
 
@@ -67,9 +68,9 @@ class WiredRobot:
             decisions.MeetpointReport: self._hear_meetpoint,
             decisions.DriveStatus: self._hear_driver,
             decisions.GoalEnd: self.ends.append,
-            search_session.SearchStatus: self._hear_search,
-            search_session.Turn: self._hear_turn,
-            search_session.InitialPose: self._hear_pose,
+            search_decisions.SearchStatus: self._hear_search,
+            search_decisions.Turn: self._hear_turn,
+            search_decisions.InitialPose: self._hear_pose,
             decisions.VisitReport: self._hear_visits,
             decisions.Feedback: lambda _: None,
             LogLine: lambda _: None,
@@ -178,10 +179,10 @@ class WiredRobot:
         self.driver.search_reports(status.state)
         self.on_status(status)
 
-    def _hear_turn(self, turn: search_session.Turn) -> None:
+    def _hear_turn(self, turn: search_decisions.Turn) -> None:
         self._tell(self.driver.turn_choice(turn.choice.rank, turn.choice.name, turn.stamp_ns))
 
-    def _hear_pose(self, pose: search_session.InitialPose) -> None:
+    def _hear_pose(self, pose: search_decisions.InitialPose) -> None:
         self.initial_pose = pose.map_from_base
         odom_from_base = self.simulation.reading.odom_from_base  # as at the meetpoint, where the robot still stands
         self._map_from_odom = se2.compose(pose.map_from_base, se2.inverse(odom_from_base))

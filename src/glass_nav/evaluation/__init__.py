@@ -1,1 +1,1 @@
-"""Scores trajectories and cases: errors, tables and pictures."""
+"""How good was it? Figures (metrics), pictures of them (plots), and HTML pages of both (pages)."""

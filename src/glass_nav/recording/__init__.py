@@ -1,1 +1,4 @@
-"""Reads recorded robots: bags and rawlogs to our own types. No roscore, no rospy."""
+"""Recorded robots as our own types, without ROS: bags of ROS 1 and ROS 2, MRPT rawlogs, trajectories, and bags of results.
+
+log_file.py opens any of them as a Recording (recording.py).
+"""

@@ -1,4 +1,8 @@
-"""The nodes: the only package that imports rospy, tf2 and messages. Nothing is decided here."""
+"""The nodes: the only package that imports rospy, tf2 and messages. Nothing is decided here.
+
+There is a package for each node. What they share is here: conversions of messages (conversions.py), the passing of
+messages from callbacks to the run loop (mailbox.py), and how a node starts and ends (shutdown.py).
+"""
 
 import threading
 

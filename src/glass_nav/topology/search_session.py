@@ -9,56 +9,38 @@ an atlas of the map.
 from __future__ import annotations
 
 import logging
-import math
-from dataclasses import dataclass, field, replace
-from enum import Enum
-from pathlib import Path
-from typing import Callable, List, Optional, Tuple, Union
+from dataclasses import dataclass, replace
+from typing import List, Optional
 
 import numpy as np
 
 from glass_nav.log_line import LogLine
-from glass_nav.params import number
 from glass_nav.sensing.scan import Scan
 from glass_nav.topology import frame_relation, search_story
-from glass_nav.topology.atlas import atlas_file
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
-from glass_nav.topology.frame_relation import FrameRelation
+from glass_nav.topology.atlas_source import AtlasSource, ReadAtlas
 from glass_nav.topology.observations import Meetpoint, ObservationError, Traversal
+from glass_nav.topology.report_pairing import ReportPairing
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search.belief import Belief
 from glass_nav.topology.search.search_estimate import SearchEstimate, TurnChoice
 from glass_nav.topology.search.search_params import SearchParams
 from glass_nav.topology.search.served_explanation import ServedExplanation
+from glass_nav.topology.search_decisions import (
+    AtlasRequest,
+    Decision,
+    GoalEnd,
+    GoalOutcome,
+    InitialPose,
+    Progress,
+    SearchStatus,
+    Turn,
+)
+from glass_nav.topology.session_params import SessionParams
 from glass_nav.vocabulary import SearchState
 from glass_nav.world.grid_map import GridMap
 
 ON_THE_WAY_S = 5.0  # from one line between meetpoints to the next
-
-ReadAtlas = Callable[[], Tuple[str, Atlas]]  # where it was found, and the atlas
-
-
-@dataclass(frozen=True)
-class SessionParams:
-    """How searches are begun, fed and reported."""
-
-    check_map: bool = True  # refuse the atlas if another map is served than it was made from
-    end_without_atlas: bool = False  # when the atlas is refused, rather than wait for its map
-    judge_by_scans: bool = True  # as use_scans of the search, which has taken its place
-    search_at_start: bool = True  # with the first meetpoint; else when asked
-    publish_initial_pose: bool = True
-    listed_candidates: int = number(1000, 1, 100_000)  # at most, with their poses
-    # [s] between the stamps of an edge traversal and its meetpoint
-    pairing_tolerance_s: float = number(2.0, 0.0, 100.0)
-    visits_file: str = ""  # the atlas with its statistics is read there and saved there; empty: nowhere
-
-    def __post_init__(self) -> None:
-        if self.listed_candidates < 1:
-            raise ValueError(f"~listed_candidates must be >= 1, got {self.listed_candidates}")
-        if not (math.isfinite(self.pairing_tolerance_s) and self.pairing_tolerance_s > 0.0):
-            raise ValueError(f"~pairing_tolerance_s must be finite and > 0, got {self.pairing_tolerance_s}")
-        if self.visits_file and not self.visits_file.endswith((".json", ".npz")):
-            raise ValueError(f"~visits_file must be a .json or a .npz, got {self.visits_file!r}")
 
 
 @dataclass(frozen=True)
@@ -67,80 +49,6 @@ class Goal:
 
     here: bool = False  # begin at the meetpoint that was reported last; else at the next one
     max_edges: int = 0  # give up after so many edges; 0: no limit
-
-
-class GoalOutcome(Enum):
-    """How a goal ended."""
-
-    SUCCEEDED = "SUCCEEDED"  # CONFIRMED
-    ABORTED = "ABORTED"  # AMBIGUOUS, LOST, or too many edges
-    PREEMPTED = "PREEMPTED"
-
-
-# -- decisions
-
-
-@dataclass(frozen=True)
-class SearchStatus:
-    """The status of the search, to be published."""
-
-    state: SearchState
-    reason: str  # one sentence
-    stamp_ns: int = 0  # of the meetpoint that it follows from; 0: of none
-    estimate: Optional[SearchEstimate] = None  # of the search; None before its first meetpoint
-    poses: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # (K, 3) map_from_base of the first candidates
-    relation: Optional[FrameRelation] = None  # of the frames, if it is CONFIRMED and dead reckoning is known
-    belief: Optional[Belief] = None  # of scans and forest; None: no scan has been evidence yet
-
-    @property
-    def map_from_base(self) -> Optional[np.ndarray]:
-        """(3,) the pose, if it is CONFIRMED."""
-        return self.poses[0] if self.state == SearchState.CONFIRMED else None
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Feedback for the goal."""
-
-    status: SearchStatus
-
-
-@dataclass(frozen=True)
-class Turn:
-    """The answer to a meetpoint."""
-
-    choice: TurnChoice
-    stamp_ns: int  # of the meetpoint
-
-
-@dataclass(frozen=True)
-class InitialPose:
-    """The pose to be handed over to the localization."""
-
-    map_from_base: np.ndarray  # (3,)
-    stamp_ns: int  # of the meetpoint where the robot had this pose
-
-
-@dataclass(frozen=True)
-class GoalEnd:
-    """The goal is over."""
-
-    outcome: GoalOutcome
-    reason: str
-    status: SearchStatus
-
-
-@dataclass(frozen=True)
-class AtlasRequest:
-    """An atlas of this map is to be made, and to be given to SearchSession.atlas_made()."""
-
-    grid_map: GridMap
-
-
-Decision = Union[SearchStatus, Progress, Turn, InitialPose, GoalEnd, LogLine, AtlasRequest]
-
-
-# -- the session
 
 
 class SearchSession:
@@ -154,16 +62,14 @@ class SearchSession:
             p: of the session.
             search: how each search is done.
         """
-        self._read_atlas, self._makes_atlas = read_atlas, read_atlas is None
+        self._source = AtlasSource(read_atlas, p.visits_file)
         self._p, self._search_params = p, search
         self._explanation = ServedExplanation()
-        self._map: Optional[Tuple[GridMap, str]] = None  # that is served, and its name for people
         self._localizer: Optional[AtlasLocalizer] = None
         self._status = SearchStatus(SearchState.NO_ATLAS, "no atlas was read yet")
         self._goal: Optional[Goal] = None
         self._last_meetpoint: Optional[Meetpoint] = None
-        self._unpaired_meetpoint: Optional[Meetpoint] = None
-        self._unpaired_traversal: Optional[Tuple[Traversal, int]] = None  # with its stamp [ns]
+        self._pairing = ReportPairing(p.pairing_tolerance_s)
         self._told = -1, 0  # places left, and the stamp [ns], when the log said so
 
     @property
@@ -174,7 +80,7 @@ class SearchSession:
     @property
     def is_to_end(self) -> bool:
         """Whether the node is to end: the atlas was refused, and no map is awaited."""
-        return self._p.end_without_atlas and self._status.state == SearchState.NO_ATLAS and not self._makes_atlas
+        return self._p.end_without_atlas and self._status.state == SearchState.NO_ATLAS and not self._source.builds
 
     @property
     def localizer(self) -> Optional[AtlasLocalizer]:
@@ -210,7 +116,7 @@ class SearchSession:
         Raises:
             ValueError, OSError: it cannot be used.
         """
-        if self._read_atlas is None:
+        if not self._source.has_atlas:
             return [self._show(SearchState.NO_ATLAS, "an atlas is built as soon as a map is served")]
         loaded = self._load()
         if self._p.search_at_start:
@@ -229,8 +135,8 @@ class SearchSession:
             return self._judge(self._localizer, self._localizer.start(self._judgeable(meetpoint)), meetpoint.stamp_ns)
         if meetpoint.stamp_ns and meetpoint.stamp_ns == self._status.stamp_ns:
             return []  # the driver repeats its report until it hears that the search has begun
-        self._unpaired_meetpoint = meetpoint
-        return self._pair("meetpoint")
+        self._pairing.put_meetpoint(meetpoint)
+        return self._advance("meetpoint")
 
     def scan(self, scan: Scan, odom_from_base: np.ndarray) -> List[Decision]:
         """The robot sees something, wherever it is.
@@ -244,7 +150,7 @@ class SearchSession:
             return []
         is_new, final = localizer.look(scan, odom_from_base)
         if final is not None:
-            self._unpaired_meetpoint, self._unpaired_traversal = None, None
+            self._pairing.clear()
             return self._judge(localizer, final, scan.stamp_ns)
         if not is_new:
             return []
@@ -269,8 +175,8 @@ class SearchSession:
             traversal: the edge.
             stamp_ns: of the report; 0: none.
         """
-        self._unpaired_traversal = traversal, stamp_ns
-        return self._pair("edge_traversal")
+        self._pairing.put_traversal(traversal, stamp_ns)
+        return self._advance("edge_traversal")
 
     def node_visits(self, node: np.ndarray, r_m: np.ndarray) -> List[Decision]:
         """A robot that knows its pose passed nodes (K,), and saw them at these distances (K,) from the obstacles.
@@ -281,15 +187,14 @@ class SearchSession:
         """
         if self._localizer is None or not len(node):
             return []
-        if node.min() < 0 or node.max() >= len(self._localizer.atlas.nodes):
-            text = (
-                f"node_visits refused: nodes must be 0 to {len(self._localizer.atlas.nodes) - 1}, got {node.tolist()}"
-            )
+        atlas = self._localizer.atlas
+        if node.min() < 0 or node.max() >= len(atlas.nodes):
+            text = f"node_visits refused: nodes must be 0 to {len(atlas.nodes) - 1}, got {node.tolist()}"
             return [LogLine(text, logging.WARNING, often=True)]
-        missed, visits = np.isnan(r_m), self._localizer.atlas.visits
-        visits.add_nodes(node[~missed], r_m[~missed])
-        visits.add_misses(node[missed])
-        return self._save_visits(self._localizer)
+        missed = np.isnan(r_m)
+        atlas.visits.add_nodes(node[~missed], r_m[~missed])
+        atlas.visits.add_misses(node[missed])
+        return [*self._source.save_visits(atlas)]
 
     def map_served(self, grid_map: GridMap, name: str) -> List[Decision]:
         """A map is served: it explains scans from now on, and the atlas must be made from it.
@@ -300,16 +205,16 @@ class SearchSession:
         """
         if self.takes_scans:
             self._explanation.take(grid_map)
-        if self._makes_atlas:
-            return self._map_without_atlas(grid_map, name)
+        if self._source.builds:
+            return self._request_atlas(grid_map, name)
         if not self._p.check_map:
             return []
-        self._map = grid_map, name
+        self._source.serve(grid_map, name)
         try:
-            if self._localizer is not None:
-                warning = self._localizer.atlas.check_map(*self._map)
-                return [LogLine(f"the atlas {warning}", logging.WARNING)] if warning else []
-            return [self._load(), self._await_meetpoint("there is another map")]
+            if self._localizer is None:
+                return [self._load(), self._await_meetpoint("there is another map")]
+            warning = self._source.check(self._localizer.atlas)
+            return [LogLine(f"the atlas {warning}", logging.WARNING)] if warning else []
         except (ValueError, OSError) as err:
             self._localizer = None
             status = self._show(SearchState.NO_ATLAS, f"the atlas {err}")
@@ -322,13 +227,13 @@ class SearchSession:
             grid_map: of the request.
             atlas: of the map, or why there is none.
         """
-        if self._map is None or self._map[0] is not grid_map:
+        if not self._source.is_served(grid_map):
             return []  # another map was served since
         if isinstance(atlas, AtlasError):
-            status = self._show(SearchState.NO_ATLAS, f"no atlas can be built from {self._map[1]}: {atlas}")
-            return [LogLine(status.reason, logging.ERROR), status, *self._end_goal(status.reason)]
-        name = self._map[1]
-        self._read_atlas = lambda: (f"the atlas built from {name}", atlas)
+            reason = f"no atlas can be built from {self._source.map_name}: {atlas}"
+            status = self._show(SearchState.NO_ATLAS, reason)
+            return [LogLine(reason, logging.ERROR), status, *self._end_goal(reason)]
+        self._source.take_built(atlas)
         loaded = self._load()
         if self._p.search_at_start:
             return [loaded, self._await_meetpoint("the atlas is made")]
@@ -380,54 +285,30 @@ class SearchSession:
 
     # -- how an event is decided
 
-    def _map_without_atlas(self, grid_map: GridMap, name: str) -> List[Decision]:
-        if self._localizer is not None and self._map is not None:
+    def _request_atlas(self, grid_map: GridMap, name: str) -> List[Decision]:
+        """Ask for an atlas of the served map, unless the present one was built from the same."""
+        if self._localizer is not None:
             try:
                 self._localizer.atlas.check_map(grid_map, name)
                 return []
-            except AtlasError:  # another one
+            except AtlasError:  # of another map
                 self._localizer = None
-        self._map = grid_map, name
+        self._source.serve(grid_map, name)
         status = self._show(SearchState.NO_ATLAS, f"an atlas of {name} is being made")
         return [LogLine(status.reason), status, AtlasRequest(grid_map)]
 
     def _load(self) -> LogLine:
-        """Raises what reading raises, and AtlasError if the atlas is of another map than the one that is served, or the
-        visits are of another atlas.
-        """
-        if self._read_atlas is None:
-            raise AtlasError("no atlas has been built yet")
-        found_at, atlas = self._read_atlas()
-        atlas = self._with_visits(atlas)
-        warning = ""
-        if self._map is not None:
-            try:
-                warning = atlas.check_map(*self._map)
-            except AtlasError as err:
-                raise AtlasError(f"{found_at}: {err}") from err
+        """Load the atlas and forget the search; raises what AtlasSource.load() raises."""
+        atlas, line = self._source.load()
         self._localizer = AtlasLocalizer(atlas, self._search_params, self._explanation if self.takes_scans else None)
-        text = f"{found_at}: {len(atlas.nodes)} nodes, {len(atlas.edges)} edges"
-        return LogLine(f"{text}; it {warning}", logging.WARNING) if warning else LogLine(text)
-
-    def _with_visits(self, atlas: Atlas) -> Atlas:
-        """The atlas with the statistics of the file of visits."""
-        path = self._p.visits_file
-        if not path or not Path(path).exists():
-            return atlas
-        kept = atlas_file.load(path)
-        if not np.array_equal(kept.darts.node, atlas.darts.node) or len(kept.nodes) != len(atlas.nodes):
-            raise AtlasError(
-                f"~visits_file {path}: has visits of another atlas: {len(kept.nodes)} nodes and {len(kept.edges)} "
-                f"edges, got an atlas of {len(atlas.nodes)} and {len(atlas.edges)}; delete it, or name another file"
-            )
-        return replace(atlas, visits=kept.visits)
+        return line
 
     def _await_meetpoint(self, why: str) -> SearchStatus:
         return self._show(SearchState.WAITING, f"the search starts at the next meetpoint: {why}")
 
     def _show(self, state: SearchState, reason: str, stamp_ns: int = 0) -> SearchStatus:
         """Enter a state outside of a search; what was known is discarded."""
-        self._unpaired_meetpoint, self._unpaired_traversal = None, None
+        self._pairing.clear()
         if self._localizer is not None:
             self._localizer.begin()
         self._status = SearchStatus(state, reason, stamp_ns)
@@ -437,38 +318,25 @@ class SearchSession:
         """The meetpoint, without its scan if no map is available to judge the scan by."""
         return meetpoint if self.uses_scans else replace(meetpoint, scan=None)
 
-    def _pair(self, kind: str) -> List[Decision]:
+    def _advance(self, kind: str) -> List[Decision]:
         """Advance the search by one edge once both reports, edge and meetpoint, have arrived."""
-        estimate, meetpoint, driven = self._status.estimate, self._unpaired_meetpoint, self._unpaired_traversal
+        estimate = self._status.estimate
         if self._localizer is None or estimate is None or estimate.done:
-            self._unpaired_meetpoint, self._unpaired_traversal = None, None
+            self._pairing.clear()
             return [LogLine(f"{kind} not used: the search is {self._status.state}", often=True)]
-        if meetpoint is None or driven is None:
+        dropped = self._pairing.drop_older()
+        if dropped is not None:
+            return [dropped]
+        pair = self._pairing.take()
+        if pair is None:
             return []
-        traversal, stamp_ns = driven
-        apart_s = 0.0 if 0 in (meetpoint.stamp_ns, stamp_ns) else abs(meetpoint.stamp_ns - stamp_ns) * 1e-9
-        if apart_s > self._p.pairing_tolerance_s:
-            return [self._drop_older(meetpoint.stamp_ns < stamp_ns, apart_s)]
-        self._unpaired_traversal = None
+        traversal, meetpoint = pair
         try:
             estimate = self._localizer.update(traversal, self._judgeable(meetpoint))
-        except ObservationError as err:  # the meetpoint waits for another traversal
+        except ObservationError as err:
+            self._pairing.put_meetpoint(meetpoint)  # it waits for another traversal
             return [LogLine(f"edge_traversal refused: {err}", logging.WARNING, often=True)]
-        self._unpaired_meetpoint = None
         return self._judge(self._localizer, estimate, meetpoint.stamp_ns)
-
-    def _drop_older(self, meetpoint_is_older: bool, apart_s: float) -> LogLine:
-        if meetpoint_is_older:
-            self._unpaired_meetpoint = None
-        else:
-            self._unpaired_traversal = None
-        return LogLine(
-            f"a {'meetpoint' if meetpoint_is_older else 'traversal'} is dropped: the edge_traversal and the meetpoint "
-            f"at its end are stamped {apart_s:.3f} s apart, allowed ~pairing_tolerance_s "
-            f"{self._p.pairing_tolerance_s:g} s",
-            logging.WARNING,
-            often=True,
-        )
 
     def _judge(self, localizer: AtlasLocalizer, estimate: SearchEstimate, stamp_ns: int) -> List[Decision]:
         """Act on the estimate after a meetpoint."""
@@ -495,28 +363,14 @@ class SearchSession:
         elif estimate.choice is not None:
             decisions.append(Turn(estimate.choice, stamp_ns))
         if status.map_from_base is not None:
-            decisions += self._count_visits(localizer)
+            localizer.count_visits(localizer.atlas.visits)  # what was measured on the confirmed path
+            decisions += self._source.save_visits(localizer.atlas)
             if self._p.publish_initial_pose:
                 decisions.append(InitialPose(status.map_from_base, stamp_ns))
             decisions += self._end_goal(estimate.reason, GoalOutcome.SUCCEEDED)
         elif estimate.done:
             decisions += self._end_goal(estimate.reason)
         return decisions
-
-    def _count_visits(self, localizer: AtlasLocalizer) -> List[Decision]:
-        """Add the measurements of the confirmed path to the statistics of the atlas and its file."""
-        localizer.count_visits(localizer.atlas.visits)
-        return self._save_visits(localizer)
-
-    def _save_visits(self, localizer: AtlasLocalizer) -> List[Decision]:
-        if not self._p.visits_file:
-            return []
-        try:
-            atlas_file.save(localizer.atlas, self._p.visits_file)
-        except OSError as err:
-            text = f"the atlas with its statistics is not saved: {self._p.visits_file}: {err.strerror}"
-            return [LogLine(text, logging.ERROR)]
-        return []
 
     def _end_goal(self, reason: str, outcome: GoalOutcome = GoalOutcome.ABORTED) -> List[Decision]:
         """Finish the current goal, if any, with the present result."""

@@ -1,1 +1,5 @@
-"""The map: grid, landmarks, panes, wall segments, and their files."""
+"""What the map says: the occupancy grid, landmarks, panes of glass, wall segments, and the files of each.
+
+Begin with grid_map.py. Everything is in the frame `map`. Glass is occupied like any wall; nothing here tells them
+apart.
+"""

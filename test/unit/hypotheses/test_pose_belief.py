@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from made_scans import MadeScans
 
-from glass_nav.hypotheses.pose_belief import NEW, Evidence, OfView, PoseBelief
+from glass_nav.hypotheses.pose_belief import PoseBelief
+from glass_nav.hypotheses.pose_evidence import NEW
 from glass_nav.sensing.scan import Scan
 
 TRUTH = np.array([5.0, 0.0, 0.0])
@@ -131,19 +132,6 @@ def test_copies_of_a_room_are_told_apart_by_what_stands_beside_walls_seen_before
     seen(belief, 0.9)
     seen(belief, 0.6)
     assert belief.evidence.nats[0] - belief.evidence.nats[1] == pytest.approx(lead)  # once
-
-
-def test_one_thing_in_the_wrong_place_says_much_where_all_else_was_right_and_little_where_much_was_not() -> None:
-    def lead(changed: float) -> float:
-        """Between two poses of which the second contradicts four pieces of wall more."""
-        first = np.full(2, 100.0 * (1.0 - changed)) - [0.0, 4.0]
-        wrong = 100.0 - first
-        evidence = Evidence.none(2).with_view(OfView(np.zeros(2), first, np.full(2, 100.0), np.zeros(2), wrong))
-        return float(-np.diff(evidence.between_nats)[0])
-
-    assert lead(0.0) > 6.0 > lead(0.1) > lead(0.3) > 0.0
-    missed = Evidence.none(2).with_view(OfView(*np.zeros((3, 2)), np.array([0.0, 4.0]), np.zeros(2)))
-    assert np.diff(missed.between_nats)[0] == pytest.approx(0.5 * 0.5 * 4.0)  # half of it is given back
 
 
 def test_who_would_have_driven_through_walls_is_hardly_there() -> None:

@@ -1,1 +1,1 @@
-"""Figures of trajectories, cases and runs."""
+"""Figures of a run against a reference: errors, beam cases, integrity, nodes passed, and comparisons of runs."""

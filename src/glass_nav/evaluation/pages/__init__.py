@@ -1,1 +1,1 @@
-"""HTML pages of figures and pictures, each one file."""
+"""HTML pages of figures and pictures, each a single file; templates/ has their text."""

@@ -1,1 +1,1 @@
-"""Figures as pictures, by matplotlib without a display."""
+"""Pictures of maps, runs and searches, by matplotlib without a display."""

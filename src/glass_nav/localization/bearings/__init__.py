@@ -1,1 +1,1 @@
-"""The pose from bearings to landmarks, with its error."""
+"""Computes the pose from bearings to landmarks, with its covariance, and where more landmarks would help."""

@@ -1,1 +1,1 @@
-"""The particle filter: motion -> proposal -> weights -> resampling -> pose."""
+"""Which poses are likely? particle_filter.py calls: motion -> registration -> proposal -> weights -> resampling -> pose."""

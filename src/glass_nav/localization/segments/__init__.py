@@ -1,1 +1,1 @@
-"""Corrects a pose by a scan and the wall segments of a map, with quality measures."""
+"""Corrects a rough pose by one scan and the wall segments of a map: `glass_nav locate` and the service ~locate."""

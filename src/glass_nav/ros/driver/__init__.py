@@ -1,1 +1,1 @@
-"""driver_node."""
+"""driver_node: parameters, conversions of its messages, markers, and the action of move_base."""

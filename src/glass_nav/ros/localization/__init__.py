@@ -1,1 +1,1 @@
-"""localization_node, also startable as amcl."""
+"""localization_node, also startable as amcl: parameters, inputs, publishers, dynamic_reconfigure."""

@@ -1,1 +1,1 @@
-"""simulator_node."""
+"""simulator_node: the simulation as topics, in simulated time."""

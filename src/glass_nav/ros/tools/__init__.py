@@ -1,1 +1,1 @@
-"""Small programs around the nodes: map server, bag player, live doctor, demo, launch file reader."""
+"""Programs beside the nodes: map server, bag player, live doctor, demo, rviz fitted to the map, reader of launch files."""

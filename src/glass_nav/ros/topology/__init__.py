@@ -1,1 +1,1 @@
-"""topology_node."""
+"""topology_node: parameters, conversions of its messages, markers, and the memory of scans."""

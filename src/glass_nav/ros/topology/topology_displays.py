@@ -22,8 +22,8 @@ from glass_nav.shapes import Shape
 from glass_nav.topology import search_scene, search_story
 from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
+from glass_nav.topology.search_decisions import SearchStatus
 from glass_nav.topology.search_scene import SearchScene
-from glass_nav.topology.search_session import SearchStatus
 from glass_nav.vocabulary import ATLAS_RGB, FOREST_RGB, NODE_RGB, SEARCH_RGB
 
 NAMESPACES = ("atlas", "nodes", *(state.lower() for state in SEARCH_RGB), "forest", "text", *search_scene.NAMESPACES)

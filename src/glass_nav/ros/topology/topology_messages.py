@@ -18,7 +18,7 @@ from glass_nav.topology.observations import UNKNOWN, Meetpoint, ObservationError
 from glass_nav.topology.search import mismatches
 from glass_nav.topology.search.belief import RuledOut
 from glass_nav.topology.search.search_estimate import TurnChoice
-from glass_nav.topology.search_session import SearchStatus, Turn
+from glass_nav.topology.search_decisions import SearchStatus, Turn
 
 AS_CHOSEN = -1  # rank of a traversal: that of the last turn_choice
 

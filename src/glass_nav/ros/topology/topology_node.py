@@ -55,12 +55,13 @@ from glass_nav.ros.mailbox import Mailbox
 from glass_nav.ros.topology import topology_displays, topology_messages, topology_params
 from glass_nav.ros.topology.scan_memory import ScanMemory
 from glass_nav.ros.topology.topology_params import TopologyParams
-from glass_nav.topology import observations, search_session
+from glass_nav.topology import observations, search_decisions
 from glass_nav.topology.atlas import atlas_builder, atlas_file, shipped_atlases
 from glass_nav.topology.atlas.atlas import Atlas, AtlasError
 from glass_nav.topology.observations import ObservationError
+from glass_nav.topology.search_decisions import Decision, GoalOutcome, SearchStatus
 from glass_nav.topology.search_scene import SearchScene
-from glass_nav.topology.search_session import Decision, GoalOutcome, SearchSession, SearchStatus
+from glass_nav.topology.search_session import Goal, SearchSession
 
 SERVICE_TIMEOUT_S = 30.0
 FROM_MAP = "map"  # in place of a file: the atlas is made of the map that is served
@@ -97,12 +98,12 @@ class TopologyNode:
         self._server.register_goal_callback(lambda: self._inbox.put("commands", self._accept_goal))
         self._server.register_preempt_callback(lambda: self._inbox.put("commands", self._preempt))
         self._carry_out_as = {
-            search_session.SearchStatus: self._publish,
-            search_session.Progress: self._send_feedback,
-            search_session.Turn: self._publish_turn,
-            search_session.InitialPose: self._publish_pose,
-            search_session.GoalEnd: self._end_goal,
-            search_session.AtlasRequest: self._make_atlas,
+            search_decisions.SearchStatus: self._publish,
+            search_decisions.Progress: self._send_feedback,
+            search_decisions.Turn: self._publish_turn,
+            search_decisions.InitialPose: self._publish_pose,
+            search_decisions.GoalEnd: self._end_goal,
+            search_decisions.AtlasRequest: self._make_atlas,
             LogLine: self._log.write,
         }
         self._carry_out(self._session.start())
@@ -203,7 +204,7 @@ class TopologyNode:
     def _accept_goal(self) -> None:
         if self._server.is_new_goal_available():  # it was not cancelled since, nor accepted for an earlier call
             goal = self._server.accept_new_goal()
-            self._carry_out(self._session.goal(search_session.Goal(goal.here, goal.max_edges)))
+            self._carry_out(self._session.goal(Goal(goal.here, goal.max_edges)))
 
     def _preempt(self) -> None:
         if self._server.is_preempt_requested() and not self._server.is_new_goal_available():
@@ -238,7 +239,7 @@ class TopologyNode:
     def _atlas_name(self) -> str:
         return str(rospy.get_param("~atlas", self._p.atlas))
 
-    def _make_atlas(self, request: search_session.AtlasRequest) -> None:
+    def _make_atlas(self, request: search_decisions.AtlasRequest) -> None:
         """Build the atlas outside of the run loop; for a large map it takes a minute."""
 
         @contextmanager
@@ -289,17 +290,17 @@ class TopologyNode:
             topology_displays.search_markers(localizer, status, self._scene, frame, self._atlas_markers)
         )
 
-    def _send_feedback(self, progress: search_session.Progress) -> None:
+    def _send_feedback(self, progress: search_decisions.Progress) -> None:
         status = topology_messages.status_msg(progress.status, self._p.global_frame_id)
         self._server.publish_feedback(LocalizeGloballyFeedback(status))
 
-    def _publish_turn(self, turn: search_session.Turn) -> None:
+    def _publish_turn(self, turn: search_decisions.Turn) -> None:
         self._turns.publish(topology_messages.turn_choice_msg(turn, self._base_frame))
 
-    def _publish_pose(self, pose: search_session.InitialPose) -> None:
+    def _publish_pose(self, pose: search_decisions.InitialPose) -> None:
         self._poses.publish(self._pose_msg(pose.map_from_base, pose.stamp_ns))
 
-    def _end_goal(self, end: search_session.GoalEnd) -> None:
+    def _end_goal(self, end: search_decisions.GoalEnd) -> None:
         status, frame = end.status, self._p.global_frame_id
         result = LocalizeGloballyResult(
             status=topology_messages.status_msg(status, frame),

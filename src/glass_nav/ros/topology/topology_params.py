@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Dict, List, Mapping, Tuple
 
 from glass_nav.topology.search.search_params import SearchParams
-from glass_nav.topology.search_session import SessionParams
+from glass_nav.topology.session_params import SessionParams
 
 
 @dataclass(frozen=True)

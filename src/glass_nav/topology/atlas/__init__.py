@@ -1,1 +1,4 @@
-"""The hierarchical atlas: its arrays, its files, and how it is built from a map."""
+"""The hierarchical atlas: the Voronoi graph of a map with what a robot measures along it.
+
+atlas.py has its arrays, atlas_builder.py makes one from a map, atlas_file.py reads and writes it.
+"""

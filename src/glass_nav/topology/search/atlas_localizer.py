@@ -16,7 +16,7 @@ from typing import List, Optional, Tuple
 import numpy as np
 
 from glass_nav.geometry import angles, se2
-from glass_nav.hypotheses.pose_belief import MapScans
+from glass_nav.hypotheses.map_scans import MapScans
 from glass_nav.sensing.scan import Scan
 from glass_nav.topology.atlas.atlas import Atlas, Visits
 from glass_nav.topology.observations import Meetpoint, Traversal

@@ -13,8 +13,8 @@ from typing import Dict, List, Optional, Tuple
 import numpy as np
 
 from glass_nav.geometry import angles, se2
-from glass_nav.hypotheses import pose_belief
-from glass_nav.hypotheses.pose_belief import MapScans
+from glass_nav.hypotheses import pose_evidence
+from glass_nav.hypotheses.map_scans import MapScans
 from glass_nav.topology.atlas.atlas import Atlas
 
 _COMPARED = 500  # new pairs for each step: 0.15 s
@@ -91,7 +91,7 @@ class ExpectedViews:
                     new.setdefault(a, {})[b] = index
         for a, others in new.items():
             rows = list(others.values())
-            found = pose_belief.expected_nats(self._scans, first[rows[0]], second[rows])
+            found = pose_evidence.expected_nats(self._scans, first[rows[0]], second[rows])
             found = np.where(found < _DIFFERENT, 0.0, found)
             self._known.update(zip(((a, b) for b in others), found.tolist()))
         return np.where(been, 0.0, np.array([self._known.get(pair, 0.0) for pair in pairs]))

@@ -14,7 +14,9 @@ from typing import Dict, List, Optional, Tuple
 import numpy as np
 
 from glass_nav.geometry import se2
-from glass_nav.hypotheses.pose_belief import NEW, MapScans, PoseBelief
+from glass_nav.hypotheses.map_scans import MapScans
+from glass_nav.hypotheses.pose_belief import PoseBelief
+from glass_nav.hypotheses.pose_evidence import NEW
 from glass_nav.sensing.scan import Scan
 from glass_nav.topology.observations import Meetpoint
 from glass_nav.topology.search import belief

@@ -6,15 +6,15 @@ risk. It is LOST if only elsewhere is left, and AMBIGUOUS if nothing can tell th
 
 from __future__ import annotations
 
-from typing import Optional, Tuple
+from dataclasses import dataclass
+from typing import Optional
 
 import numpy as np
 
 from glass_nav.geometry import angles, se2
 from glass_nav.hypotheses import pose_tracker
-from glass_nav.topology.atlas.atlas import Atlas
 from glass_nav.topology.observations import Meetpoint
-from glass_nav.topology.search import ambiguity, vote
+from glass_nav.topology.search import ambiguity, nearest_darts, vote
 from glass_nav.topology.search.belief import NO_DART, Belief
 from glass_nav.topology.search.expected_views import ExpectedViews
 from glass_nav.topology.search.matching import Matcher
@@ -28,10 +28,31 @@ _MIN_CHECKED, _MIN_DRIVEN_M = 1.0, 1.0  # before a place is confirmed: nats by s
 # 4 m of wall give, or a distance over which odometry agreed with it
 _LOST_SEARCHES, _LOST_M = 3, 3.0  # of the whole map, and driven, before it is given up
 _PLACED = 8  # places, the likeliest first, whose node is looked up though it does not match
-_NODE_M, _EDGE_RAD = 0.7, 0.6  # from where a pose expects a meetpoint, and the directions of its edges in the mean
-_WORTH = 0.25  # share of the doubt that a turn removes by itself; else a difference farther away is the better goal
+_MIN_REMOVED = 0.25  # share of the doubt that a turn must remove; else a difference farther away is the better goal
 _STILL_LIKELY = 0.3  # share of the likeliest place's probability
 _MAX_SHOWN = 0.9995  # of a probability in words
+
+
+@dataclass(frozen=True)
+class _PlacesLeft:
+    """What the rules look at: the places left when the robot is at a meetpoint, the likeliest first."""
+
+    belief: Belief
+    depth: int  # edges driven
+    here: Meetpoint
+    left: np.ndarray  # (L,) indices of the places left in the belief
+    known: np.ndarray  # (C,) those of them that the atlas has, one for each dart
+    dart: np.ndarray  # (C,) along which the robot came there
+
+    @property
+    def poses(self) -> np.ndarray:
+        """(C, 3) of the robot at the known places."""
+        return np.asarray(self.belief.poses[self.known])
+
+    @property
+    def share(self) -> np.ndarray:
+        """(C,) probabilities of the known places."""
+        return np.asarray(self.belief.share[self.known])
 
 
 class JointVerdict:
@@ -72,106 +93,114 @@ class JointVerdict:
             return self._estimate(SearchState.CONFIRMED, reason, depth, dart, None, belief.poses[0].copy())
         if 1.0 - belief.elsewhere < risk and belief.searches >= _LOST_SEARCHES and belief.driven_m >= _LOST_M:
             reason = f"no place in the map explains what was seen: the best one {explained:.0%} of the walls"
-            return self._estimate(SearchState.LOST, reason, depth, np.zeros(0, np.int64), None)
+            return self._estimate(SearchState.LOST, reason, depth, np.zeros(0, np.int64))
         return None
 
     def at_meetpoint(self, belief: Belief, depth: int) -> SearchEstimate:
-        """The verdict after the last meetpoint of the forest."""
+        """The verdict after the last meetpoint of the forest: that of the first rule which applies."""
         final = self.final(belief, depth)
         if final is not None:
             return final
+        at = self._places_left(belief, depth)
+        if len(at.left) < 2 or not len(at.dart):
+            return self._alone(at)
+        if self._views is not None and belief.odom_from_base is not None:
+            self._views.arrive(belief.odom_from_base)
+        return (
+            self._by_vote(at)
+            or self._towards_difference(at)
+            or self._by_proof(at)
+            or self._new_edge(at, SearchState.SEARCHING, "no turn is known to tell them apart; next a new edge")
+        )
+
+    # -- the rules
+
+    def _places_left(self, belief: Belief, depth: int) -> _PlacesLeft:
+        """The places left, with the darts of those that the atlas has at the last meetpoint."""
         here = self._forest.meetpoints[-1]
         left = belief.left(self._params.tolerances.risk)
         at = belief.dart[left].copy()
         unmatched = np.flatnonzero(at == NO_DART)[:_PLACED]
-        at[unmatched] = darts_near(self._atlas, belief.poses[left[unmatched]], here)
+        at[unmatched] = nearest_darts.like(self._atlas, belief.poses[left[unmatched]], here)
         known, at = left[at != NO_DART], at[at != NO_DART]
         dart, first = np.unique(at, return_index=True)
         order = np.argsort(first)
-        dart, known = dart[order], known[first[order]]
-        places = f"{self._place(belief)}, {len(left)} place{'s' * (len(left) != 1)} left"
-        if len(left) < 2 or not len(dart):
-            state = SearchState.TENTATIVE if len(left) == 1 else SearchState.SEARCHING
-            choice = TurnChoice(self._least_passed(here), here.degree)
-            reason = f"{places}; next a new edge, to see more walls"
-            return self._estimate(state, reason, depth, dart, choice)
-        poses, share = belief.poses[known], belief.share[known]
-        if self._views is not None and belief.odom_from_base is not None:
-            self._views.arrive(belief.odom_from_base)
-        voted = None
-        if len(dart) > 1 and known[0] == left[0]:  # the likeliest place has a vote
-            voted = vote.expected(self._matcher, dart, share, self._views, poses)
-        is_worth = voted is not None and (self._views is None or voted.removed >= _WORTH)
-        if voted is not None and voted.splits and is_worth:
-            if self._views is not None:
-                (there,) = self._views.at(self._matcher.departures(dart[:1], voted.rank) ^ 1)
-                self._views.aim(se2.compose(se2.inverse(poses[0]), there))
-            reason = f"{places}; next the turn that leaves the least doubt per metre"
-            return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(voted.rank, here.degree))
-        towards = None if is_worth else self._towards_difference(belief, left, known, dart, here)
-        if towards is not None:
-            rank, edges = towards
-            reason = f"{places}; next towards the nearest difference, {edges} edge{'s' * (edges != 1)} away"
-            return self._estimate(SearchState.SEARCHING, reason, depth, dart, TurnChoice(rank, here.degree))
-        if len(dart) > 1 and 1.0 - belief.share[known].sum() < self._params.tolerances.risk:
-            proof = ambiguity.prove(self._matcher, dart, views=self._views)
-            if proof.ranks is not None and self._views is None:
-                reason = f"{places}; next towards the nearest difference, {len(proof.ranks)} edges away"
-                return self._estimate(
-                    SearchState.SEARCHING, reason, depth, dart, TurnChoice(proof.ranks[0], here.degree)
-                )
-            if proof.indistinguishable and depth > 0:
-                reason = f"{len(dart)} places match, and no turn can tell them apart"
-                return self._estimate(SearchState.AMBIGUOUS, reason, depth, dart, None)
-            if self._views is not None and not self._views.is_exhausted and self._has_passed_all(here):
-                if self._views.has_looked_again:
-                    reason = f"{len(dart)} places match, and two visits to where they differ did not tell them apart"
-                    return self._estimate(SearchState.AMBIGUOUS, reason, depth, dart, None)
-                self._views.look_again()
-        reason = f"{places}; no turn is known to tell them apart; next a new edge"
-        return self._estimate(
-            SearchState.SEARCHING, reason, depth, dart, TurnChoice(self._least_passed(here), here.degree)
-        )
+        return _PlacesLeft(belief, depth, here, left, known[first[order]], dart[order])
 
-    def _towards_difference(
-        self, belief: Belief, left: np.ndarray, known: np.ndarray, dart: np.ndarray, here: Meetpoint
-    ) -> Optional[Tuple[int, int]]:
-        """The turn to where the followed place would look different from the other places left, and how many edges away
-        that is; None: there is no such meetpoint where the robot has not been.
+    def _alone(self, at: _PlacesLeft) -> SearchEstimate:
+        """One place is left, or the atlas has none of those left: only more walls can confirm one."""
+        state = SearchState.TENTATIVE if len(at.left) == 1 else SearchState.SEARCHING
+        return self._new_edge(at, state, "next a new edge, to see more walls")
 
-        Args:
-            left: (L,) indices of the places left.
-            known: (C,) those of them that have a dart.
-            dart: (C,) which one.
+    def _by_vote(self, at: _PlacesLeft) -> Optional[SearchEstimate]:
+        """The turn that leaves the least doubt, if it removes enough of it by itself."""
+        if len(at.dart) < 2 or at.known[0] != at.left[0]:  # the likeliest place has no vote
+            return None
+        voted = vote.expected(self._matcher, at.dart, at.share, self._views, at.poses)
+        if not voted.splits:
+            return None
+        if self._views is not None:
+            if voted.removed < _MIN_REMOVED:
+                return None
+            (there,) = self._views.at(self._matcher.departures(at.dart[:1], voted.rank) ^ 1)
+            self._views.aim(se2.compose(se2.inverse(at.poses[0]), there))
+        return self._turn(at, voted.rank, "the turn that leaves the least doubt per metre")
+
+    def _towards_difference(self, at: _PlacesLeft) -> Optional[SearchEstimate]:
+        """The turn to where the followed place would look different from the other places left; None: there is no such
+        meetpoint where the robot has not been.
         """
         if self._views is None:
             return None
+        belief, left = at.belief, at.left
         lead = left[self._followed(belief, belief.poses[left], belief.share[left])]
-        along = dict(zip(known.tolist(), dart.tolist())).get(int(lead), NO_DART)
-        begin = along if along != NO_DART else self._dart_beside(belief.poses[lead], here)
+        along = dict(zip(at.known.tolist(), at.dart.tolist())).get(int(lead), NO_DART)
+        begin = along if along != NO_DART else nearest_darts.beside(self._atlas, belief.poses[lead], at.here)
         if begin == NO_DART:
-            lead = known[0]
-            along = begin = int(dart[0])
+            lead = at.known[0]
+            along = begin = int(at.dart[0])
         pose, others = belief.poses[lead], belief.poses[left[left != lead]]
         found = vote.towards_difference(self._matcher, self._views, begin, pose, others)
         if found is None:
             return None
-        if len(found.ranks) == 1:
+        edges = len(found.ranks)
+        if edges == 1:
             self._views.aim(found.base_from_there)
-        if along != NO_DART:
-            return found.ranks[0], len(found.ranks)
-        departure = self._matcher.ring_from(begin)[found.ranks[0]]  # the atlas has another degree here
-        ahead = self._atlas.darts.bearing_rad[departure] - pose[2]
-        return int(np.abs(angles.wrap(here.bearings_rad - ahead)).argmin()), len(found.ranks)
+        rank = found.ranks[0]
+        if along == NO_DART:  # the atlas has another degree here
+            ahead = self._atlas.darts.bearing_rad[self._matcher.ring_from(begin)[rank]] - pose[2]
+            rank = int(np.abs(angles.wrap(at.here.bearings_rad - ahead)).argmin())
+        return self._turn(at, rank, f"towards the nearest difference, {edges} edge{'s' * (edges != 1)} away")
 
-    def _dart_beside(self, pose: np.ndarray, here: Meetpoint) -> int:
-        """A dart of the node where a robot with pose (3,) stands, whatever its degree; NO_DART: none is near."""
-        if not len(here.bearings_rad):
-            return NO_DART
-        off_m = np.hypot(*(self._atlas.nodes.position_m - se2.transform_points(pose, here.centre_m)).T)
-        node = int(off_m.argmin())
-        ring = self._atlas.rings[node]
-        return int(ring[0]) if len(ring) and off_m[node] < _NODE_M else NO_DART
+    def _by_proof(self, at: _PlacesLeft) -> Optional[SearchEstimate]:
+        """AMBIGUOUS if nothing can tell the places apart; without scans also the way to what can."""
+        if len(at.dart) < 2 or 1.0 - at.share.sum() >= self._params.tolerances.risk:
+            return None
+        proof = ambiguity.prove(self._matcher, at.dart, views=self._views)
+        if proof.ranks is not None and self._views is None:
+            return self._turn(at, proof.ranks[0], f"towards the nearest difference, {len(proof.ranks)} edges away")
+        match = f"{len(at.dart)} places match, and"
+        if proof.indistinguishable and at.depth > 0:
+            return self._estimate(SearchState.AMBIGUOUS, f"{match} no turn can tell them apart", at.depth, at.dart)
+        if self._views is not None and not self._views.is_exhausted and self._has_passed_all(at.here):
+            if self._views.has_looked_again:
+                reason = f"{match} two visits to where they differ did not tell them apart"
+                return self._estimate(SearchState.AMBIGUOUS, reason, at.depth, at.dart)
+            self._views.look_again()
+        return None
+
+    def _turn(self, at: _PlacesLeft, rank: int, towards: str) -> SearchEstimate:
+        choice = TurnChoice(rank, at.here.degree)
+        return self._estimate(SearchState.SEARCHING, f"{self._in_words(at)}; next {towards}", at.depth, at.dart, choice)
+
+    def _new_edge(self, at: _PlacesLeft, state: SearchState, why: str) -> SearchEstimate:
+        choice = TurnChoice(self._least_passed(at.here), at.here.degree)
+        return self._estimate(state, f"{self._in_words(at)}; {why}", at.depth, at.dart, choice)
+
+    # -- what they need
+
+    def _in_words(self, at: _PlacesLeft) -> str:
+        return f"{self._place(at.belief)}, {len(at.left)} place{'s' * (len(at.left) != 1)} left"
 
     def _estimate(
         self,
@@ -179,7 +208,7 @@ class JointVerdict:
         reason: str,
         depth: int,
         dart: np.ndarray,
-        choice: Optional[TurnChoice],
+        choice: Optional[TurnChoice] = None,
         pose: Optional[np.ndarray] = None,
     ) -> SearchEstimate:
         return SearchEstimate(state, reason, depth, dart, np.zeros(len(dart), np.int64), choice, pose)
@@ -221,22 +250,3 @@ class JointVerdict:
             return here.degree // 2
         least = np.flatnonzero(times == times.min())
         return int(least[len(least) // 2]) if least[0] > 0 or len(least) == 1 else int(least[-1])
-
-
-def darts_near(atlas: Atlas, poses: np.ndarray, meetpoint: Meetpoint) -> np.ndarray:
-    """(K,) the dart that is the reference edge of a meetpoint where a robot with pose (K, 3) stands, by its place and the
-    directions of its edges alone; NO_DART where no node of that degree is near.
-    """
-    bearings = meetpoint.bearings_rad if len(meetpoint.bearings_rad) else np.array([np.pi])
-    dart = np.full(len(poses), NO_DART, np.int64)
-    for k, pose in enumerate(poses):
-        off_m = np.hypot(*(atlas.nodes.position_m - se2.transform_points(pose, meetpoint.centre_m)).T)
-        node = int(off_m.argmin())
-        ring = atlas.rings[node]
-        if off_m[node] >= _NODE_M or len(ring) != meetpoint.degree:
-            continue
-        turned = ring[(np.arange(len(ring))[:, None] + np.arange(len(bearings))) % len(ring)]
-        off_rad = np.abs(angles.wrap(atlas.darts.bearing_rad[turned] - pose[2] - bearings)).mean(axis=1)
-        if off_rad.min() < _EDGE_RAD:
-            dart[k] = ring[off_rad.argmin()]
-    return dart

@@ -13,8 +13,8 @@ from glass_nav.topology.observations import Meetpoint, ObservationError, Travers
 from glass_nav.topology.search.atlas_localizer import AtlasLocalizer
 from glass_nav.topology.search.search_estimate import TurnChoice
 from glass_nav.topology.search.search_params import SearchParams
+from glass_nav.topology.search_decisions import SearchStatus
 from glass_nav.topology.search_scene import SearchScene
-from glass_nav.topology.search_session import SearchStatus
 from glass_nav.vocabulary import SearchState
 
 

@@ -8,7 +8,7 @@ import pytest
 from made_scans import MadeScans
 
 from glass_nav.topology.observations import Meetpoint
-from glass_nav.topology.search import belief, joint_verdict
+from glass_nav.topology.search import belief
 from glass_nav.topology.search.belief import NO_DART, Belief
 from glass_nav.topology.search.expected_views import ExpectedViews
 from glass_nav.topology.search.joint_verdict import JointVerdict
@@ -21,28 +21,6 @@ from glass_nav.vocabulary import SearchState
 CROSS = made_atlases.corridors(
     [(0.0, 0.0), (5.0, 0.0), (0.0, 5.0), (-5.0, 0.0), (0.0, -5.0)], [1.0] * 5, [(0, 1), (0, 2), (0, 3), (0, 4)]
 )
-BEARINGS_RAD = np.array([3.0, 1.4, 0.2, -1.7])  # a little off
-
-
-@pytest.mark.parametrize("quarter, dart", [(0, 4), (1, 6), (2, 0), (3, 2)])
-def test_the_edge_that_it_came_along_is_told_by_all_directions_together(quarter: int, dart: int) -> None:
-    pose = np.array([[0.1, -0.1, 0.5 * np.pi * quarter]])
-    meetpoint = Meetpoint(4, 3.0, bearings_rad=BEARINGS_RAD)  # r is far off, too
-    assert joint_verdict.darts_near(CROSS, pose, meetpoint).tolist() == [dart]
-    assert joint_verdict.darts_near(CROSS, pose, Meetpoint(4, 3.0)).tolist() == [dart]
-
-
-@pytest.mark.parametrize(
-    "pose, degree",
-    [
-        pytest.param([1.0, 0.0, 0.0], 4, id="too far away"),
-        pytest.param([0.0, 0.0, 0.0], 3, id="another degree"),
-        pytest.param([0.0, 0.0, 0.8], 4, id="turned"),
-    ],
-)
-def test_no_edge_is_told_where_the_atlas_has_no_such_node(pose: "list[float]", degree: int) -> None:
-    meetpoint = Meetpoint(degree, 1.0, bearings_rad=BEARINGS_RAD[:degree])
-    assert joint_verdict.darts_near(CROSS, np.array([pose]), meetpoint).tolist() == [NO_DART]
 
 
 def two_rows(here: Meetpoint) -> "tuple[JointVerdict, PassedEdges]":

@@ -1,1 +1,1 @@
-"""The pictures of a report, a file per picture; report_pictures.py has their order."""
+"""The pictures of a report, a file for each; report_pictures.py has their order."""

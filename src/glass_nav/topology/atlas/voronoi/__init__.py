@@ -1,1 +1,1 @@
-"""The stages of voronoi_graph.py, in order: bounds, ridges, pruning, meetpoints, graph."""
+"""The stages of voronoi_graph.py, in this order: bounds, ridges, pruning, meetpoints, graph."""
