@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import sys
 import xml.etree.ElementTree as ElementTree
 from typing import Any, Dict, List, Optional
@@ -14,6 +15,18 @@ EXAMPLES = (
     "glass_nav replay run.bag --map floor.yaml --out results",
     "glass_nav doctor run.bag --map floor.yaml",
 )
+COMMANDS = {  # and their modules
+    "atlas": "atlas",
+    "compare": "compare",
+    "doctor": "doctor",
+    "landmarks": "landmarks",
+    "locate": "locate",
+    "map": "maps",
+    "params": "params",
+    "replay": "replay",
+    "report": "report",
+    "simulate": "simulate",
+}
 DONE, FAILED, USAGE, BAD_INPUT, INTERRUPTED = 0, 1, 2, 3, 130
 
 
@@ -27,26 +40,14 @@ def main(argv: Optional[List[str]] = None) -> int:
         0 done, 1 done and found wanting (a limit missed, a fault found), 2 wrong usage, 3 bad input (a line on stderr
         says what), 130 interrupted.
     """
+    words = sys.argv[1:] if argv is None else argv
     try:
-        from glass_nav.cli import atlas, compare, doctor, landmarks, locate, maps, params, replay, report, simulate
+        modules = _modules(words)
     except ImportError as err:
         if not str(err.name).startswith("glass_nav"):
             raise
         print(f"glass_nav: {err.name or err} is missing: build the package and source its setup.bash", file=sys.stderr)
         return BAD_INPUT
-    modules: Dict[str, Any] = {
-        "atlas": atlas,
-        "compare": compare,
-        "doctor": doctor,
-        "landmarks": landmarks,
-        "locate": locate,
-        "map": maps,
-        "params": params,
-        "replay": replay,
-        "report": report,
-        "simulate": simulate,
-    }  # each: see replay.py
-    words = sys.argv[1:] if argv is None else argv
     parser = _parser(modules)
     complete(parser)
     if not words:
@@ -64,6 +65,12 @@ def main(argv: Optional[List[str]] = None) -> int:
     except SystemExit as err:  # argparse has written what is wrong
         return int(err.code or 0)
     return _run(f"glass_nav {arguments.command}", modules[arguments.command], arguments)
+
+
+def _modules(words: List[str]) -> Dict[str, Any]:
+    """The subcommands by name: the one that is called, or all, whose imports take half a second. Each: see replay.py."""
+    called = [name for name in words[:1] if name in COMMANDS]
+    return {name: importlib.import_module(f"glass_nav.cli.{COMMANDS[name]}") for name in called or COMMANDS}
 
 
 def complete(parser: argparse.ArgumentParser) -> None:

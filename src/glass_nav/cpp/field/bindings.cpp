@@ -190,10 +190,9 @@ py::array_t<bool> end_at_backs(const DistanceField& field, const KnownArea& area
   const double cos = std::cos(pose[2]), sin = std::sin(pose[2]);
   for (std::size_t b = 0; b < points.count; ++b) {
     const double x_m = points.xy_m[2 * b], y_m = points.xy_m[2 * b + 1], bearing = bearings_rad.data()[b] + pose[2];
-    result.mutable_data()[b] =
-        ends_at_back(field, area, {before_m, thickest_m, side_m},
-                     {pose[0] + cos * x_m - sin * y_m, pose[1] + sin * x_m + cos * y_m},
-                     {std::cos(bearing), std::sin(bearing)});
+    result.mutable_data()[b] = ends_at_back(field, area, {before_m, thickest_m, side_m},
+                                            {pose[0] + cos * x_m - sin * y_m, pose[1] + sin * x_m + cos * y_m},
+                                            {std::cos(bearing), std::sin(bearing)});
   }
   return result;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -44,83 +45,105 @@ class DistanceField {
   double distance(double x_m, double y_m) const { return distance(square(x_m, y_m)); }
 
   /// Distances of one point after the other from many frames. All are computed in loops that compilers turn into vector
-  /// instructions, and a point lies in few cells for all of the frames, so that those stay in the cache.
+  /// instructions, and a point lies in few cells for all of the frames, so that those stay in the cache. In floats,
+  /// which are micrometres off, since cells are counted from the first of these.
   class Frames {
    public:
     static constexpr std::size_t kMost = 64;
 
-    /// @param poses  x, y, yaw in the map of each, at most kMost
+    /// @param poses  x, y, yaw in the map of each, at least one and at most kMost
     Frames(const DistanceField& field, const std::array<double, 3>* poses, std::size_t count)
-        : field_(field), count_(count) {
+        : field_(field),
+          count_(count),
+          first_column_(field.column(poses[0][0], poses[0][1])),
+          first_row_(field.row(poses[0][0], poses[0][1])) {
       for (std::size_t k = 0; k < count; ++k) {
         const std::array<double, 3>& pose = poses[k];
-        column_[k] = field.column(pose[0], pose[1]);
-        row_[k] = field.row(pose[0], pose[1]);
-        cos_[k] = std::cos(pose[2] - field.yaw_) * field.per_m_;
-        sin_[k] = std::sin(pose[2] - field.yaw_) * field.per_m_;
-        moved_ = farther(moved_, std::hypot(column_[k] - column_[0], row_[k] - row_[0]));
+        column_[k] = static_cast<float>(field.column(pose[0], pose[1]) - first_column_);
+        row_[k] = static_cast<float>(field.row(pose[0], pose[1]) - first_row_);
+        cos_[k] = static_cast<float>(std::cos(pose[2] - field.yaw_) * field.per_m_);
+        sin_[k] = static_cast<float>(std::sin(pose[2] - field.yaw_) * field.per_m_);
+        moved_ = farther(moved_, std::hypot(column_[k], row_[k]));
         turned_ = farther(turned_, std::hypot(cos_[k] - cos_[0], sin_[k] - sin_[0]));
       }
     }
 
     __attribute__((always_inline)) void distances(double x_m, double y_m, float* distance_m) const {
-      std::array<double, kMost> column, row;
-      for (std::size_t k = 0; k < count_; ++k) {
-        column[k] = column_[k] + cos_[k] * x_m - sin_[k] * y_m;
-        row[k] = row_[k] + sin_[k] * x_m + cos_[k] * y_m;
-      }
-      if (all_inside(column[0], row[0], moved_ + turned_ * std::hypot(x_m, y_m))) {
-        distances_inside(column, row, distance_m);
+      const auto x = static_cast<float>(x_m), y = static_cast<float>(y_m);
+      const double apart = moved_ + turned_ * std::sqrt(x_m * x_m + y_m * y_m),
+                   margin = apart + kRounding * (1.0 + apart);
+      // The least column and row in which the point may lie.
+      const double left = std::floor(first_column_ + (cos_[0] * x - sin_[0] * y) - margin);
+      const double below = std::floor(first_row_ + (sin_[0] * x + cos_[0] * y) - margin);
+      const double widest = 2.0 * margin + 2.0;
+      const bool is_inside =
+          left >= 0.0 && left + widest < field_.width_ && below >= 0.0 && below + widest < field_.height_;
+      if (!is_inside) {  // or not a number
+        distances_outside(x, y, distance_m);
         return;
       }
+      Values column, row;
+      const auto from_left = static_cast<float>(first_column_ - left),
+                 from_below = static_cast<float>(first_row_ - below);
       for (std::size_t k = 0; k < count_; ++k) {
-        distance_m[k] = static_cast<float>(field_.distance(field_.square_at(column[k], row[k])));
+        column[k] = column_[k] + from_left + (cos_[k] * x - sin_[k] * y);
+        row[k] = row_[k] + from_below + (sin_[k] * x + cos_[k] * y);
       }
+      const float* corner = field_.distance_m_.data() + static_cast<std::size_t>(below) * (field_.width_ + 2) +
+                            static_cast<std::size_t>(left);
+      distances_inside(corner, column, row, distance_m);
     }
 
    private:
-    using Values = std::array<double, kMost>;
+    static constexpr double kRounding = 1e-3;  // [cells]
+
+    using Values = std::array<float, kMost>;
+
+    /// Of two neighbouring cells.
+    struct Pair {
+      float left, right;
+    };
 
     /// NaN if one is.
     static double farther(double one, double other) { return std::isnan(one) || one >= other ? one : other; }
 
-    /// Whether points that are at most so far from one lie in the grid. Not if one of these is NaN.
-    bool all_inside(double column, double row, double apart) const {
-      constexpr double kRounding = 1e-6;
-      const double margin = apart + kRounding;
-      return column > margin && column + margin < field_.width_ + 0.999 && row > margin &&
-             row + margin < field_.height_ + 0.999;
+    /// One after the other; some of the points may lie outside of the grid.
+    void distances_outside(float x, float y, float* distance_m) const {
+      for (std::size_t k = 0; k < count_; ++k) {
+        const double column = first_column_ + column_[k] + (cos_[k] * x - sin_[k] * y);
+        const double row = first_row_ + row_[k] + (sin_[k] * x + cos_[k] * y);
+        distance_m[k] = static_cast<float>(field_.distance(field_.square_at(column, row)));
+      }
     }
 
-    __attribute__((always_inline)) void distances_inside(const Values& column, const Values& row,
+    /// @param from  the cell that columns and rows are counted from
+    __attribute__((always_inline)) void distances_inside(const float* from, const Values& column, const Values& row,
                                                          float* distance_m) const {
       std::array<std::int32_t, kMost> corner;
-      std::array<float, kMost> right, up;
-      std::array<std::array<float, kMost>, 4> at;
+      std::array<Pair, kMost> lower_row, upper_row;
+      Values right, up;
       const std::int32_t stride = field_.width_ + 2;
       for (std::size_t k = 0; k < count_; ++k) {
         const auto left = static_cast<std::int32_t>(column[k]), below = static_cast<std::int32_t>(row[k]);
         corner[k] = below * stride + left;
-        right[k] = static_cast<float>(column[k] - left);
-        up[k] = static_cast<float>(row[k] - below);
+        right[k] = column[k] - static_cast<float>(left);
+        up[k] = row[k] - static_cast<float>(below);
       }
       for (std::size_t k = 0; k < count_; ++k) {
-        const float* from = field_.distance_m_.data() + corner[k];
-        at[0][k] = from[0];
-        at[1][k] = from[1];
-        at[2][k] = from[stride];
-        at[3][k] = from[stride + 1];
+        std::memcpy(&lower_row[k], from + corner[k], sizeof(Pair));
+        std::memcpy(&upper_row[k], from + corner[k] + stride, sizeof(Pair));
       }
       for (std::size_t k = 0; k < count_; ++k) {
-        const float lower = at[0][k] + (at[1][k] - at[0][k]) * right[k];
-        const float upper = at[2][k] + (at[3][k] - at[2][k]) * right[k];
+        const float lower = lower_row[k].left + (lower_row[k].right - lower_row[k].left) * right[k];
+        const float upper = upper_row[k].left + (upper_row[k].right - upper_row[k].left) * right[k];
         distance_m[k] = lower + (upper - lower) * up[k];
       }
     }
 
     const DistanceField& field_;
     std::size_t count_;
-    Values column_, row_, cos_, sin_;
+    double first_column_, first_row_;
+    Values column_, row_, cos_, sin_;    // from the first frame [cells]; [cells / m]
     double moved_ = 0.0, turned_ = 0.0;  // how far the frames are from the first [cells, cells / m]; NaN if one is
   };
 

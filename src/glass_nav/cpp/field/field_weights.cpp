@@ -26,15 +26,17 @@ LogDensity::LogDensity(double sigma_m, double z_hit, double z_rand)
 GLASS_NAV_VECTORIZED void log_weights_at(const DistanceField& field, const Points& points,
                                          const std::vector<Pose>& poses, const LogDensity& density, double* log_w) {
   using Frames = DistanceField::Frames;
-  std::array<float, Frames::kMost> distance_m;
-  std::fill_n(log_w, poses.size(), 0.0);
+  static_assert(Frames::kMost == LogDensity::kMost);
+  LogDensity::Values distance_m, sum;
   for (std::size_t first = 0; first < poses.size(); first += Frames::kMost) {
     const std::size_t count = std::min(Frames::kMost, poses.size() - first);
     const Frames from_poses(field, poses.data() + first, count);
+    sum.fill(0.0F);
     for (std::size_t i = 0; i < points.count; ++i) {
       from_poses.distances(points.xy_m[2 * i], points.xy_m[2 * i + 1], distance_m.data());
-      for (std::size_t k = 0; k < count; ++k) log_w[first + k] += density.at(distance_m[k]);
+      density.add_to(sum, distance_m, count);
     }
+    std::copy_n(sum.begin(), count, log_w + first);
   }
 }
 

@@ -3,7 +3,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include "distance_field.hpp"
@@ -16,14 +19,26 @@ class LogDensity {
  public:
   LogDensity(double sigma_m, double z_hit, double z_rand);
 
-  float at(float distance_m) const {
-    const float place = std::min(distance_m * per_m_, kParts);
-    const int left = static_cast<int>(place);
-    return parts_[left].value + (place - static_cast<float>(left)) * parts_[left].growth;
+  static constexpr std::size_t kMost = 64;
+  using Values = std::array<float, kMost>;
+
+  /// Adds the log density at each of the distances [m], `count` of them, to its sum.
+  __attribute__((always_inline)) void add_to(Values& sum, const Values& distance_m, std::size_t count) const {
+    std::array<std::int32_t, kMost> number;
+    std::array<Part, kMost> part;
+    Values place, share;
+    for (std::size_t k = 0; k < count; ++k) place[k] = std::min(distance_m[k] * per_m_, kParts);
+    for (std::size_t k = 0; k < count; ++k) {
+      number[k] = static_cast<std::int32_t>(place[k]);
+      share[k] = place[k] - static_cast<float>(number[k]);
+    }
+    const Part* parts = parts_.data();
+    for (std::size_t k = 0; k < count; ++k) std::memcpy(&part[k], parts + number[k], sizeof(Part));
+    for (std::size_t k = 0; k < count; ++k) sum[k] += part[k].value + share[k] * part[k].growth;
   }
 
  private:
-  static constexpr float kParts = 2048.0F;
+  static constexpr float kParts = 1024.0F;
   static constexpr double kMaxSigmas = 10.0;  // beyond, the density is that at so many
 
   struct Part {

@@ -14,8 +14,8 @@ enum CellFlag : std::uint8_t { kKnown = 1, kUnmapped = 2, kFree = 4, kBeside = 8
 
 class KnownArea {
  public:
-  /// flags: (height, width) of the cells of a grid and of a border around it. map_from_grid: x, y, yaw of the outer corner
-  /// of the grid's first cell.
+  /// flags: (height, width) of the cells of a grid and of a border around it. map_from_grid: x, y, yaw of the outer
+  /// corner of the grid's first cell.
   KnownArea(const std::uint8_t* flags, int height, int width, int border, double resolution_m,
             const std::array<double, 3>& map_from_grid)
       : height_(height),

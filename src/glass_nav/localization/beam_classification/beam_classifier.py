@@ -38,7 +38,7 @@ from glass_nav.world.pane import Pane
 
 _DEPTH_SHARE = 0.5  # of a wall's drawn thickness at which beams end, until it is learnt
 _BEHIND_M = 0.15  # a surface: a beam that ends there passed it
-_FEWER_SAMPLES = 3  # times, where no particle is weighed by the cases
+_FEWER_SAMPLES = 3  # times, where the pose is known well, or no particle is weighed by the cases
 
 
 @dataclass(frozen=True)
@@ -102,9 +102,10 @@ class BeamClassifier:
             scan: one revolution of a lidar.
             map_from_base: (3,) pose that the preliminary samples surround.
             covariance: (3, 3) of that pose.
-            for_weights: whether particles are weighed by the cases; if not, fewer samples vote.
+            for_weights: whether particles are weighed by the cases; if not, fewer samples vote, as around a pose that is
+                known to within the least spread of the samples.
         """
-        samples = preliminary_samples.around(map_from_base, covariance, self._samples(for_weights))
+        samples = preliminary_samples.around(map_from_base, covariance, self._samples(covariance, for_weights))
         behind_m = case_votes.reach_m(self.residuals, self._params.vote)
         if for_weights:  # the glass map learns from them, too
             behind_m = max(behind_m, glass_map.reach_m(self.residuals))
@@ -200,9 +201,9 @@ class BeamClassifier:
         """Linearity of the cells around a surface below which the surface has no normal."""
         return self._params.vote.normal_min_linearity
 
-    def _samples(self, for_weights: bool) -> PreliminarySamples:
+    def _samples(self, covariance: np.ndarray, for_weights: bool) -> PreliminarySamples:
         samples = self._params.samples
-        if for_weights or self._params.vote.vote_mode == "paper":
+        if self._params.vote.vote_mode == "paper" or (for_weights and samples.is_exceeded_by(covariance)):
             return samples
         return replace(samples, sample_count=-(-samples.sample_count // _FEWER_SAMPLES))
 

@@ -46,6 +46,11 @@ class PreliminarySamples:
                 f"{self.sample_max_heading_rad}] rad, got {self.sample_min_heading_rad}"
             )
 
+    def is_exceeded_by(self, covariance: np.ndarray) -> bool:
+        """Whether a pose with that covariance (3, 3) is known less well than the least spread of the samples."""
+        x, y, heading = np.sqrt(np.diag(covariance)).tolist()
+        return max(x, y) > self.sample_min_radius_m or heading > self.sample_min_heading_rad
+
 
 def around(map_from_base: np.ndarray, covariance: np.ndarray, shape: PreliminarySamples) -> np.ndarray:
     """The predicted pose and rings around it at regular angular intervals.

@@ -35,11 +35,14 @@ def test_beams_that_pass_a_pane_are_told_from_those_that_end_at_it(passes):
     assert told.mean() > 0.85 and (cases.case == case)[told].mean() > 0.95
 
 
-def test_fewer_samples_vote_where_no_particle_is_weighed():
+def test_fewer_samples_vote_where_the_pose_is_known_well_or_no_particle_is_weighed():
     scan, _ = seen(False)
     classifier = BeamClassifier(PARAMS, MAP)
-    counts = [classifier.classify(scan, POSE, NARROW, each)[1].range_m.shape[1] for each in (True, False)]
-    assert counts == [37, 13]
+
+    def voters(covariance, for_weights):
+        return classifier.classify(scan, POSE, covariance, for_weights)[1].range_m.shape[1]
+
+    assert [voters(NARROW, True), voters(NARROW, False), voters(0.2 * NARROW, True)] == [37, 13, 13]
     paper = BeamClassifier(replace(PARAMS, vote=replace(PARAMS.vote, vote_mode="paper")), MAP)
     assert paper.classify(scan, POSE, NARROW, False)[1].range_m.shape[1] == 37
 
