@@ -22,7 +22,7 @@ _OTHER_SURFACE_M = 0.3  # between two expected ranges: an edge lies between them
 _REPORTED_GATES = 2.0  # the samples that won the vote may be one gate away from the reported pose
 _UNSEEN_SIDE = 0.002  # probability that a beam meets a wall from an unmapped side, over that from the mapped side
 _MIN_SEEN_THROUGH = 0.05  # a cell may hold a post and the edge of the pane beside it
-_MIRROR_MIN_SHARE = 0.7  # of the vote: a beam that is called mirrored wrongly costs more than an uncertain one
+_MIRROR_MIN_SHARE = 0.65  # of the vote: a beam that is called mirrored wrongly costs more than an uncertain one
 _TEMPER = 0.2  # of a sample's evidence: the errors of beams are correlated, and the best sample shall not vote alone
 _REACH, _ROUNDS = 2, 3  # of the pull between neighbouring beams
 _BY_SAMPLE = ("range_m", "cos_incidence", "thickness_m")  # fields of ExpectedRanges that hold all samples
@@ -34,6 +34,7 @@ _FACE_M = 0.5  # a wall drawn from its other side has its near face at most so f
 _OTHER_WALL, _SAME_WALL = 2.0, 4.0  # steepness of a victory: reflectances of other walls differ by factors
 _WALL_GOES_ON = 0.5  # probability that a wall which a pane adjoins goes on behind it, where the map knows nothing
 _GOES_ON_SIGMAS, _PERPENDICULAR_RAD = 2.0, np.radians(10.0)  # how straight it does
+_CORNER_COS = 0.5  # of the incidence on a surface whose normal is not known
 _FIRST, _MIRRORED, _SECOND = BeamCase.DIFFUSE - 1, BeamCase.SPECULAR - 1, BeamCase.FIRST_PENETRATION - 1
 
 
@@ -221,8 +222,14 @@ def _echoes(
     coatings: Coatings,
 ) -> PaneEchoes:
     """As behind_panes.of()."""
-    first_m, mirrored_m, behind_m, third_m = expected.range_m[:, 0]
-    goes_on = np.where(unmapped_end & _is_perpendicular(expected), _WALL_GOES_ON, 0.0)
+    first_m, mirrored_m, behind_m, _ = expected.range_m[:, 0]
+    back_cos, drawn = _backs(measured_m, expected)
+    at_back = np.isfinite(back_cos)
+    goes_on = np.where(unmapped_end & (_is_perpendicular(expected) | at_back), _WALL_GOES_ON, 0.0)
+    stands = np.where(at_back, 1.0, goes_on)
+    corner = np.isnan(expected.axis_rad[_MIRRORED] - expected.axis_rad[_FIRST])
+    target_cos = np.where(corner, _CORNER_COS, np.maximum(expected.cos_incidence[_MIRRORED, 0], MIN_COS))
+    than_wall = np.where(at_back, np.sqrt(target_cos / np.maximum(back_cos, MIN_COS)), 1.0)
     clear = reflectance(expected.pane_incidence[0])
     mirrored, loses = np.zeros((2, len(clear)))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -233,8 +240,8 @@ def _echoes(
             # Up to this range whatever stands behind the pane is brighter than the mirrored echo.
             reach_m = np.minimum(np.minimum(mirrored_m / over, behind_m), max_range_m)
             nothing_there = np.where(unmapped_end, np.exp(-_UNMAPPED_PER_M * np.maximum(reach_m - first_m, 0.0)), 1.0)
-            over_wall = _wins(over, _SAME_WALL)
-            wins = goes_on * over_wall + (1.0 - goes_on) * nothing_there * _wins(
+            over_wall = _wins(over * than_wall, _SAME_WALL)
+            wins = stands * over_wall + (1.0 - stands) * nothing_there * _wins(
                 over * behind_m / mirrored_m, _OTHER_WALL
             )
             mirrored += frequency * seen * np.nan_to_num(wins)
@@ -243,14 +250,37 @@ def _echoes(
         past_m = measured_m - first_m
         reached = np.where(unmapped_end, np.exp(-_UNMAPPED_PER_M * np.maximum(past_m, 0.0)), 1.0)
         density = np.where(unmapped_end, _UNMAPPED_PER_M, _NEW_PER_M)
-        for range_m, seen_side in zip((behind_m, third_m), expected.seen_side[_SECOND:]):
-            at_face = (measured_m <= range_m) & (measured_m >= range_m - _FACE_M) & ~seen_side
-            density = np.where(at_face, 1.0 / _FACE_M, density)
+        density = np.where(drawn, 1.0 / _FACE_M, density)
         sigma_m = _GOES_ON_SIGMAS * sigma_m / np.maximum(expected.cos_incidence[_MIRRORED, 0], MIN_COS)
         off = np.where(np.isfinite(mirrored_m), (measured_m - mirrored_m) / sigma_m, np.inf)
         wall = goes_on * loses * np.exp(-0.5 * off**2) / (np.sqrt(2.0 * np.pi) * sigma_m)
         behind = np.isfinite(measured_m) & (past_m > 0.0)
     return PaneEchoes(mirrored, np.where(behind, reached * density + np.nan_to_num(wall), 0.0))
+
+
+def _backs(measured_m: np.ndarray, expected: ExpectedRanges) -> Tuple[np.ndarray, np.ndarray]:
+    """(B,) cos of the incidence on a wall drawn from its other side, if the beam may have ended there, else NaN; (B,) bool:
+    the wall is drawn on this beam, not only on a neighbour.
+    """
+    ranges_m, cos, seen = (
+        expected.range_m[_SECOND:, 0],
+        expected.cos_incidence[_SECOND:, 0],
+        expected.seen_side[_SECOND:],
+    )
+    with np.errstate(invalid="ignore"):
+        before_m = ranges_m - measured_m
+        met = ~seen & (before_m >= 0.0) & (before_m <= _FACE_M)
+        nothing_near = ~(np.abs(before_m) <= _FACE_M).any(axis=0)
+        own = np.where(met[0], cos[0], np.where(met[1], cos[1], np.nan))
+        back_cos = own.copy()
+        for shift in range(-_REACH, _REACH + 1):
+            at = np.arange(len(own)) + shift
+            inside = (at >= 0) & (at < len(own))
+            at = np.clip(at, 0, len(own) - 1)
+            near = inside & (np.abs(measured_m[at] - measured_m) < _FACE_M)
+            take = nothing_near & near & np.isnan(back_cos)
+            back_cos[take] = own[at][take]
+    return back_cos, ~np.isnan(own)
 
 
 def _wins(over: np.ndarray, steepness: float) -> np.ndarray:

@@ -144,7 +144,7 @@ py::tuple seen_from(const Array<std::uint8_t>& beam_case, const Array<double>& e
   return cases.tuple();
 }
 
-py::tuple pane_echoes(const Array<double>& measured_m, const Array<double>& range_m, const Array<double>& mirrored_cos,
+py::tuple pane_echoes(const Array<double>& measured_m, const Array<double>& range_m, const Array<double>& cos,
                       const Array<double>& turned_rad, const Array<double>& reflectance, const Array<bool>& seen_side,
                       const Array<bool>& unmapped_end, const Array<double>& gains, const Array<double>& frequencies,
                       double sigma_m, double max_range_m, double min_cos) {
@@ -152,20 +152,30 @@ py::tuple pane_echoes(const Array<double>& measured_m, const Array<double>& rang
   const std::size_t beams = static_cast<std::size_t>(measured_m.size());
   const Offers beams_only{0, beams, nullptr, nullptr, nullptr, nullptr};
   check_rows(range_m, kPaths, beams_only, "ranges must be (4, B)");
+  check_rows(cos, kPaths, beams_only, "cosines must be (4, B)");
   check_rows(seen_side, kPaths, beams_only, "seen sides must be (4, B)");
-  for (const py::array& array :
-       {py::array(mirrored_cos), py::array(turned_rad), py::array(reflectance), py::array(unmapped_end)}) {
-    check_rows(array, 1, beams_only, "cosines, turns, reflectances and unmapped ends must be (B,)");
+  for (const py::array& array : {py::array(turned_rad), py::array(reflectance), py::array(unmapped_end)}) {
+    check_rows(array, 1, beams_only, "turns, reflectances and unmapped ends must be (B,)");
   }
   const PaneModel model = panes_of(gains, frequencies, sigma_m, max_range_m, min_cos);
+  std::vector<PaneBeam> at_panes(beams);
+  for (std::size_t b = 0; b < beams; ++b) {
+    PaneBeam& beam = at_panes[b];
+    for (std::size_t path = 0; path < kPaths; ++path) {
+      beam.range_m[path] = range_m.data()[path * beams + b];
+      beam.cos[path] = cos.data()[path * beams + b];
+    }
+    beam.measured_m = measured_m.data()[b];
+    beam.turned_rad = turned_rad.data()[b];
+    beam.reflectance = reflectance.data()[b];
+    beam.second_seen = seen_side.data()[2 * beams + b];
+    beam.third_seen = seen_side.data()[3 * beams + b];
+    beam.unmapped_end = unmapped_end.data()[b];
+  }
+  find_backs(at_panes);
   py::array_t<double> mirrored(shape), unmapped(shape);
   for (std::size_t b = 0; b < beams; ++b) {
-    std::array<double, kPaths> ends;
-    for (std::size_t path = 0; path < kPaths; ++path) ends[path] = range_m.data()[path * beams + b];
-    const PaneEcho echo =
-        pane_echo({measured_m.data()[b], ends, mirrored_cos.data()[b], turned_rad.data()[b], reflectance.data()[b],
-                   seen_side.data()[2 * beams + b], seen_side.data()[3 * beams + b], unmapped_end.data()[b]},
-                  model);
+    const PaneEcho echo = pane_echo(at_panes[b], model);
     mirrored.mutable_data()[b] = echo.mirrored;
     unmapped.mutable_data()[b] = echo.unmapped;
   }
@@ -306,7 +316,7 @@ PYBIND11_MODULE(_beam_vote, module) {
   module.def("seen_from", &seen_from, py::arg("case"), py::arg("expected_m"), py::arg("weight"), py::arg("measured_m"),
              py::arg("range_m"), py::arg("cos"), py::arg("thickness_m"), py::arg("gate_m"), py::arg("depth_share"),
              py::arg("min_cos"));
-  module.def("pane_echoes", &pane_echoes, py::arg("measured_m"), py::arg("range_m"), py::arg("mirrored_cos"),
+  module.def("pane_echoes", &pane_echoes, py::arg("measured_m"), py::arg("range_m"), py::arg("cos"),
              py::arg("turned_rad"), py::arg("reflectance"), py::arg("seen_side"), py::arg("unmapped_end"),
              py::arg("gains"), py::arg("frequencies"), py::arg("sigma_m"), py::arg("max_range_m"), py::arg("min_cos"));
   module.def("reflectance", &reflectance, py::arg("incidence_rad"), py::arg("index"));

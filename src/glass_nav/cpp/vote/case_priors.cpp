@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace glass_nav {
 namespace {
@@ -27,22 +28,41 @@ std::array<double, kPaths> ends_in_walls(const Offers& offers, std::size_t sampl
   return ends;
 }
 
+namespace {
+
+std::vector<PaneBeam> beams_at_panes(const Offers& offers, const PoseView& view, const PaneModel& panes,
+                                     double depth_share) {
+  const std::size_t beams = offers.beams, plane = offers.samples * beams;
+  std::vector<PaneBeam> result(beams);
+  for (std::size_t b = 0; b < beams; ++b) {
+    PaneBeam& beam = result[b];
+    beam.measured_m = offers.measured_m[b];
+    beam.range_m = ends_in_walls(offers, 0, b, depth_share, panes.min_cos);
+    for (std::size_t path = 0; path < kPaths; ++path) beam.cos[path] = offers.cos[path * plane + b];
+    beam.turned_rad = view.axis_rad[kMirrored * beams + b] - view.axis_rad[kFirst * beams + b];
+    beam.reflectance = view.reflectance[b];
+    beam.second_seen = view.seen_side[kSecond * beams + b];
+    beam.third_seen = view.seen_side[kThird * beams + b];
+    beam.unmapped_end = view.unmapped_end[b];
+  }
+  find_backs(result);
+  return result;
+}
+
+}  // namespace
+
 void case_priors(const Offers& offers, const PoseView& view, const PaneModel& panes, const PriorModel& model,
                  double depth_share, double* prior) {
-  const std::size_t beams = offers.beams, plane = offers.samples * beams;
+  const std::size_t beams = offers.beams;
+  const std::vector<PaneBeam> pane_beams = beams_at_panes(offers, view, panes, depth_share);
   for (std::size_t b = 0; b < beams; ++b) {
-    const double mirrored_cos = offers.cos[kMirrored * plane + b];
-    const double turned_rad = view.axis_rad[kMirrored * beams + b] - view.axis_rad[kFirst * beams + b];
-    const PaneEcho echo = pane_echo({offers.measured_m[b], ends_in_walls(offers, 0, b, depth_share, panes.min_cos),
-                                     mirrored_cos, turned_rad, view.reflectance[b], view.seen_side[kSecond * beams + b],
-                                     view.seen_side[kThird * beams + b], view.unmapped_end[b]},
-                                    panes);
+    const PaneEcho echo = pane_echo(pane_beams[b], panes);
     const double through = std::min(std::max(view.seen_through[b], kMinSeenThrough), 1.0);
     const double passes = through * view.there[b] * (1.0 - view.returns[b]), gone = through * (1.0 - view.there[b]);
     const double mirrored = passes * echo.mirrored;
     const double behind = (passes - mirrored) * (1.0 - model.uncertain_behind);
     const double again = view.seen_through[beams + b] * (1.0 - model.porous_returns);
-    const double peak_m = std::sqrt(2.0 * kPi) * panes.sigma_m / std::max(mirrored_cos, panes.min_cos);
+    const double peak_m = std::sqrt(2.0 * kPi) * panes.sigma_m / std::max(pane_beams[b].cos[kMirrored], panes.min_cos);
     const std::array<double, kPaths + kOthers> of_beam{1.0 - passes - gone, mirrored, behind * (1.0 - again),
                                                        behind * again,      gone,     passes * echo.unmapped * peak_m};
     for (std::size_t row = 0; row < of_beam.size(); ++row) {

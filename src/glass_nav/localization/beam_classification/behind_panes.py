@@ -4,7 +4,8 @@ Echo powers follow the lidar equation for diffuse targets: T^2 / d^2 from a surf
 R^2 / d^2 along the mirrored path, with R and T from Fresnel's equations. The strongest echo is reported. Behind a
 pane the map often ends: outdoors, or in a room that the mapper did not enter. What is there is unknown, but usually
 something returns an echo. One thing is likely: walls continue. The mirror image of a wall perpendicular to the pane
-lies where the same wall would continue behind it, so both give the same range. The formulation is ours. B beams;
+lies where the same wall would continue behind it, so both give the same range. The same holds for a wall of which the
+map shows only the other face: its near face is somewhere in front of it. The formulation is ours. B beams;
 expected ranges are those of sample 0.
 """
 
@@ -55,7 +56,8 @@ class Coatings:
             )
             apart = np.abs(mirrored_m - behind_m) * cos.min(axis=0) > 2.0 * gate_m
             past = measured_m - expected.range_m[_FIRST, 0] > 2.0 * gate_m / MIN_COS
-        told = apart & past & (at_mirrored != at_behind) & expected.seen_side[[_MIRRORED, _SECOND]].all(axis=0)
+            behind = (behind_m - expected.range_m[_FIRST, 0]) * expected.cos_incidence[_FIRST, 0] > 2.0 * gate_m
+        told = apart & past & behind & (at_mirrored != at_behind) & expected.seen_side[[_MIRRORED, _SECOND]].all(axis=0)
         told &= np.isfinite(mirrored_m) & np.isfinite(behind_m)
         if not told.any():
             return self
@@ -104,7 +106,7 @@ def of(
         *_beam_vote.pane_echoes(
             measured_m,
             expected.range_m[:, 0],
-            expected.cos_incidence[_MIRRORED, 0],
+            expected.cos_incidence[:, 0],
             expected.axis_rad[_MIRRORED] - expected.axis_rad[_FIRST],
             reflectance(expected.pane_incidence[0]),
             expected.seen_side,

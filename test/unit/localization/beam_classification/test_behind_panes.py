@@ -53,6 +53,34 @@ def test_in_front_of_a_wall_drawn_from_its_other_side_its_near_face_may_stand():
     assert echoes(measured_m=8.7, second=9.0)[1] < 0.1
 
 
+UNSEEN = np.array([True, True, False, True])  # the second surface is met from a side that no mapper saw
+
+
+def test_a_mirrored_echo_has_to_win_over_a_wall_drawn_from_its_other_side():
+    behind = {"second": 6.2, "seen_side": UNSEEN, "incidence": np.radians(78.0), "unmapped_end": True}
+    chances = [
+        echoes(**behind, cos=np.array([1.0, target_cos, 1.0, 1.0])[:, None, None])[0] for target_cos in (1.0, 0.5, 0.25)
+    ]
+    assert chances == sorted(chances, reverse=True) and chances[0] - chances[-1] > 0.1
+    unknown_orientation = echoes(**behind, target_rad=np.nan)
+    assert unknown_orientation[0] == pytest.approx(chances[1])
+    assert unknown_orientation[1] > 3.0 * echoes(**{**behind, "seen_side": True})[1]
+
+
+def test_past_the_end_of_what_is_drawn_a_wall_stands_where_the_neighbours_met_it():
+    def chance_of_last(second_m, measured_m):
+        expected = expect(
+            np.full(3, 2.0), np.full(3, 6.0), np.array(second_m), cos=0.5, incidence=np.radians(70.0), seen_side=UNSEEN
+        )
+        found = behind_panes.of(np.array(measured_m), expected, SIGMA_M, RANGE_MAX_M, 2.0, np.zeros(3, bool))
+        return found.mirrored[-1]
+
+    alone = chance_of_last([NEVER, NEVER, NEVER], [6.0, 6.0, 6.0])
+    assert chance_of_last([NEVER, 6.2, NEVER], [6.0, 6.0, 6.0]) < alone
+    assert chance_of_last([NEVER, 6.2, NEVER], [6.0, 6.0, 5.0]) == alone  # ended elsewhere
+    assert chance_of_last([6.2, NEVER, NEVER], [6.0, 6.0, 6.0]) < alone
+
+
 @pytest.mark.parametrize("measured_m", [np.inf, np.nan, -np.inf, 1.5])
 def test_a_beam_that_did_not_return_from_behind_says_nothing_of_what_is_there(measured_m):
     assert echoes(measured_m=measured_m)[1] == 0.0
@@ -68,5 +96,7 @@ def test_how_much_panes_mirror_is_learnt_from_echoes_that_are_not_in_doubt(measu
         coatings = coatings.learn(np.full(1, measured_m), expected, SIGMA_M, 0.15, 2.0)
     before, after = UNKNOWN_COATINGS.frequencies(), coatings.frequencies()
     assert (after[-1] > before[-1]) == stronger
+    next_pane = expect(first=2.0, mirrored=6.0, second=2.5, incidence=np.radians(65.0), cos=0.4)
+    assert coatings.learn(np.full(1, measured_m), next_pane, SIGMA_M, 0.15, 2.0) is coatings
     doubtful = expect(first=2.0, mirrored=6.0, second=6.1, incidence=np.radians(65.0))
     assert coatings.learn(np.array([6.0]), doubtful, SIGMA_M, 0.15, 2.0) is coatings
