@@ -15,12 +15,12 @@ _SAME_WALL_M, _SAME_WALL_COS = 0.5, np.cos(np.radians(25.0))  # of neighbouring 
 _PIECE_M = 1.0  # of a wall: pieces err by themselves
 _SIDES = 8  # directions that walls face
 _BEFORE_WALL_M = 0.25  # where the field is looked at: there it has one direction
-_BEFORE_CELLS = 1.5  # the same once the pose is known, square to the wall
+_BEFORE_CELLS = 1.5  # the same square to the wall
 _KERNEL_SCALES = 3.0  # residuals beyond are not of that wall
 _CLOSE_M = 0.3  # residuals that tell how much map and lidar disagree
 _NEAR_M = 0.15  # the kernel of a scan that may fit beside the pose
 _EDGE_CELLS = 0.29  # deviation of an edge that is drawn in whole cells
-_MIN_DEVIATION_M = 0.0005  # of walls and of their pieces
+_MIN_DEVIATION_M, _MIN_SQUARE_M = 0.002, 0.0005  # of walls and of their pieces
 _PRIOR_WEIGHT, _MEMORY = 10.0, 0.98  # beams that _EDGE_CELLS is worth, and weight of the past per scan
 _FITTED = 2.0  # sides whose error the fit takes up: their offset is a shift of the robot
 _PRIOR_BEAMS = 0.01  # weight of FREE_M
@@ -35,13 +35,14 @@ _STEP_WIDTHS_M = np.gradient(_STEPS_M)
 class SlowScanFit:
     """Learns how much map and lidar disagree, and says how well each scan determines its pose."""
 
-    def __init__(self, field: DistanceField, resolution_m: float) -> None:
+    def __init__(self, field: DistanceField, resolution_m: float, square: bool = False) -> None:
         """
         Args:
             field: distances to the walls.
             resolution_m: of the map's cells.
+            square: measure residuals of fitted scans square to the walls.
         """
-        self._field = field
+        self._field, self._square = field, square
         self._edge_m, self._before_m = _EDGE_CELLS * resolution_m, _BEFORE_CELLS * resolution_m
         self._scale_m = self._edge_m  # of what is left between beams and walls
         self._squares = np.full(4, _PRIOR_WEIGHT * self._edge_m**2)  # what fits left: offset, sides, pieces, beams
@@ -66,7 +67,7 @@ class SlowScanFit:
         beams /= np.maximum(np.sqrt(np.einsum("bi,bi->b", beams, beams)), 1e-9)[:, None]
         before = -_BEFORE_WALL_M * beams
         normals, steepness, distance_m = self._wall_at(arms_m + before + map_from_base[:2])
-        for _ in range(2 if matched else 0):
+        for _ in range(2 if matched and self._square else 0):
             before = self._before_m * normals
             normals, steepness, distance_m = self._wall_at(arms_m + before + map_from_base[:2])
         facing = -np.einsum("bi,bi->b", beams, normals)
@@ -104,7 +105,8 @@ class SlowScanFit:
             variance += self._variance(size) * sums.T @ sums
         covariance = inverse @ variance @ inverse
         if matched:
-            covariance = covariance + _COMMON * (self._variance(1) + self._variance(2)) * np.eye(3)
+            if self._square:
+                covariance = covariance + _COMMON * (self._variance(1) + self._variance(2)) * np.eye(3)
             covariance = self._widened(covariance, weighted.T @ jacobian, arms_m, map_from_base, lever_m, len(first))
         to_yaw = np.array([1.0, 1.0, 1.0 / lever_m])
         weighted = near[:, None] * jacobian
@@ -148,7 +150,10 @@ class SlowScanFit:
         self._add(0, total * offset_m**2, total)
 
     def _variance(self, size: int) -> float:
-        return max(self._squares[size] / max(self._freedom[size], 1e-3), _MIN_DEVIATION_M**2)
+        return max(
+            self._squares[size] / max(self._freedom[size], 1e-3),
+            (_MIN_SQUARE_M if self._square else _MIN_DEVIATION_M) ** 2,
+        )
 
     def _add(self, size: int, squares: float, freedom: float) -> None:
         total = self._squares, self._freedom
@@ -184,7 +189,7 @@ class SlowScanFit:
                 map_from_base[1] + _STEPS_M[:, None] * axis[1] + sin * x + cos * y,
             )
             squared = distance_m**2
-            kernel = max(_KERNEL_SCALES * self._scale_m, _ANOTHER_M) ** 2
+            kernel = max(_KERNEL_SCALES * self._scale_m, _ANOTHER_M if self._square else 0.0) ** 2
             share = 0.5 * _KERNEL_SCALES**2 * pieces / len(arms_m)
             loss = share * np.sum(squared / (squared + kernel), axis=1)
             linearized = share * float(axis @ information @ axis) / kernel * _STEPS_M**2

@@ -62,7 +62,7 @@ py::tuple fit_of(ScanFit& fit, const DistanceField& field, const Array& points_m
 PYBIND11_MODULE(_integrity, module) {
   using namespace glass_nav;
   py::class_<ScanFit>(module, "ScanFit")
-      .def(py::init<double>(), py::arg("resolution_m"))
+      .def(py::init<double, bool>(), py::arg("resolution_m"), py::arg("square"))
       .def("of", &fit_of, py::arg("field"), py::arg("points_m"), py::arg("laser_m"), py::arg("map_from_base"),
            py::arg("beam_share"), py::arg("worth"))
       .def_property_readonly("wall_deviation_m", &ScanFit::wall_deviation_m);
@@ -72,10 +72,10 @@ PYBIND11_MODULE(_integrity, module) {
       py::arg("first"), py::arg("second"));
   module.def(
       "widened_by",
-      [](const Array& covariance, const Array& spread, const Array& usual) {
-        return array_of(widened_by(matrix_of(covariance), matrix_of(spread), matrix_of(usual)));
+      [](const Array& covariance, const Array& spread) {
+        return array_of(widened_by(matrix_of(covariance), matrix_of(spread)));
       },
-      py::arg("covariance"), py::arg("spread"), py::arg("usual"));
+      py::arg("covariance"), py::arg("spread"));
   module.def(
       "share_of_second",
       [](const Array& first, const Array& second) {

@@ -52,17 +52,9 @@ Matrix3 better_of(const Matrix3& first, const Matrix3& second) {
   });
 }
 
-Matrix3 widened_by(const Matrix3& covariance, const Matrix3& spread, const Matrix3& usual) {
-  const Matrix3 root = cholesky(covariance + usual + Matrix3::diagonal(kSmallest));
-  const Eigen3 of_spread = eigen(whitened(root, spread));
-  const Matrix3 axes = root * of_spread.axes, claimed = whitened(root, covariance);
-  Matrix3 result = covariance;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Vector3 unit{of_spread.axes(0, k), of_spread.axes(1, k), of_spread.axes(2, k)};
-    const double value = of_spread.values[k], doubt = value * -std::expm1(-(value / kFar) * (value / kFar));
-    result.add_outer({axes(0, k), axes(1, k), axes(2, k)}, std::max(doubt - dot(unit, claimed * unit), 0.0));
-  }
-  return result;
+Matrix3 widened_by(const Matrix3& covariance, const Matrix3& spread) {
+  return mixed(covariance, spread,
+               [](double value) { return std::max(value * -std::expm1(-(value / kFar) * (value / kFar)), 1.0); });
 }
 
 Matrix3 carried(double yaw_rad, const Matrix3& covariance, const Vector3& step, const Matrix3& noise,

@@ -13,8 +13,8 @@ Matrix3 share_of_second(const Matrix3& first, const Matrix3& second);
 /// Covariance of the first estimate with that share of the second, however their errors are correlated.
 Matrix3 better_of(const Matrix3& first, const Matrix3& second);
 
-/// A covariance, in directions in which a spread is far larger than both it and the usual spread, that spread.
-Matrix3 widened_by(const Matrix3& covariance, const Matrix3& spread, const Matrix3& usual);
+/// A covariance, in directions in which a spread is far larger that spread.
+Matrix3 widened_by(const Matrix3& covariance, const Matrix3& spread);
 
 /// Covariance of a pose with that yaw after a step, in the robot's frame before it, which adds noise in that frame; its
 /// variances are scaled.

@@ -11,14 +11,14 @@ constexpr double kFreeM = 2.0;                                          // FREE_
 constexpr double kSameWallM = 0.5, kSameWallCos = 0.90630778703664996;  // of neighbouring beams: 25 degrees
 constexpr double kPieceM = 1.0;                                         // of a wall: pieces err by themselves
 constexpr double kBeforeWallM = 0.25;                                   // where the field is looked at
-constexpr double kBeforeCells = 1.5;                                    // the same once the pose is known
+constexpr double kBeforeCells = 1.5;                                    // the same square to the wall
 constexpr int kSquare = 2;                                              // looks until that is square to the wall
 constexpr double kEdgeCells = 0.29;                                     // deviation of an edge drawn in whole cells
 constexpr double kKernelScales = 3.0;                                   // residuals beyond are not of that wall
 constexpr double kCloseM = 0.3;                                         // residuals that the scale is learnt from
 constexpr double kNearM = 0.15;                                         // kernel where the scan may fit beside the pose
 constexpr double kMadToDeviation = 1.4826;                              // of a normal distribution
-constexpr double kMinDeviationM = 0.0005;                               // of walls and of their pieces
+constexpr double kMinDeviationM = 0.002, kMinSquareM = 0.0005;          // of walls and of their pieces
 constexpr double kPriorWeight = 10.0, kMemory = 0.98;                   // beams that edge_m is worth; past per scan
 constexpr double kFitted = 2.0;                                         // sides whose error the fit takes up
 constexpr double kPriorBeams = 0.01;                                    // weight of kFreeM
@@ -62,8 +62,11 @@ struct ScanFit::Piece {
   std::size_t first, last;  // beams [first, last)
 };
 
-ScanFit::ScanFit(double resolution_m)
-    : edge_m_(kEdgeCells * resolution_m), before_m_(kBeforeCells * resolution_m), scale_m_(edge_m_) {
+ScanFit::ScanFit(double resolution_m, bool square_to_walls)
+    : square_(square_to_walls),
+      edge_m_(kEdgeCells * resolution_m),
+      before_m_(kBeforeCells * resolution_m),
+      scale_m_(edge_m_) {
   squares_.fill(kPriorWeight * square(edge_m_));
   freedom_.fill(kPriorWeight);
 }
@@ -72,7 +75,7 @@ FitInformation ScanFit::of(const DistanceField& field, const SeenScan& scan, dou
   const bool matched = worth > 0.0;
   const Vector3& pose = scan.map_from_base;
   const double cos = std::cos(pose[2]), sin = std::sin(pose[2]);
-  const int looks = matched ? kSquare : 0;
+  const int looks = matched && square_ ? kSquare : 0;
   const double laser_x = cos * scan.laser_m[0] - sin * scan.laser_m[1];
   const double laser_y = sin * scan.laser_m[0] + cos * scan.laser_m[1];
   std::vector<Beam> beams(scan.count);
@@ -138,7 +141,7 @@ FitInformation ScanFit::of(const DistanceField& field, const SeenScan& scan, dou
   const Matrix3 inverted = inverse(information + Matrix3::diagonal(kPriorBeams));
   Matrix3 covariance = inverted * spread_of(beams, pieces, beam_share) * inverted;
   if (matched) {
-    covariance = covariance + Matrix3::diagonal(kCommon * square(wall_deviation_m()));
+    if (square_) covariance = covariance + Matrix3::diagonal(kCommon * square(wall_deviation_m()));
     for (double& value : covariance.values) value /= worth;
     const double pieces_per_beam = static_cast<double>(pieces.size()) / static_cast<double>(beams.size());
     widen(field, pose, beams, information, lever_m, worth * pieces_per_beam, covariance);
@@ -287,7 +290,7 @@ void ScanFit::widen(const DistanceField& field, const Vector3& pose, const std::
 double ScanFit::added_variance(const DistanceField& field, const Vector3& pose, const std::vector<Beam>& beams,
                                const Matrix3& information, double lever_m, double worth_of_beam, const Vector3& axis,
                                double variance) const {
-  const double kernel = square(std::max(kKernelScales * scale_m_, kAnotherM));
+  const double kernel = square(std::max(kKernelScales * scale_m_, square_ ? kAnotherM : 0.0));
   const double share = 0.5 * square(kKernelScales) * worth_of_beam;
   const double curvature = share * dot(axis, information * axis) / kernel;
   std::array<double, 2 * kSteps + 1> loss{}, linearized{};
@@ -309,7 +312,7 @@ double ScanFit::added_variance(const DistanceField& field, const Vector3& pose, 
 double ScanFit::wall_deviation_m() const { return std::sqrt(variance(kSide) + variance(kPiece)); }
 
 double ScanFit::variance(Size size) const {
-  return std::max(squares_[size] / std::max(freedom_[size], 1e-3), square(kMinDeviationM));
+  return std::max(squares_[size] / std::max(freedom_[size], 1e-3), square(square_ ? kMinSquareM : kMinDeviationM));
 }
 
 void ScanFit::add(Size size, double squares, double freedom) {

@@ -28,8 +28,8 @@ struct FitInformation {
 /// Learns how much map and lidar disagree, and says how well each scan determines its pose.
 class ScanFit {
  public:
-  /// resolution_m: of the map's cells.
-  explicit ScanFit(double resolution_m);
+  /// resolution_m: of the map's cells. square: residuals of fitted scans are measured square to the walls.
+  ScanFit(double resolution_m, bool square);
 
   /// beam_share: of all beams that the pose was fitted to, how many these are. worth: of the fit as evidence, up to 1;
   /// 0: the pose was not fitted to this scan.
@@ -56,6 +56,7 @@ class ScanFit {
                         const Matrix3& information, double lever_m, double worth_of_beam, const Vector3& axis,
                         double variance) const;
 
+  bool square_;
   double edge_m_, before_m_;              // deviation of an edge drawn in whole cells; where the field is looked at
   double scale_m_;                        // of what is left between beams and walls
   std::array<double, kSizes> squares_{};  // what fits left, by the size of what errs together

@@ -4,12 +4,12 @@ This is the covariance of the least-squares fit of the beams to the walls at whi
 wall share an error: where the map has drawn it, and how the lidar sees it. That error averages out neither over beams
 nor over scans. So the variance is that of a fit with clustered errors (White, Econometrica 48, 1980; Liang and Zeger,
 Biometrika 73, 1986) at two levels: each piece of wall has its own error, and all walls that face the same way have a
-common one. The size of both is learnt from the residuals after each fit. Residuals are measured square to the wall from
-just before it, so that nothing beside the wall enters them.
+common one. The size of both is learnt from the residuals after each fit.
 
-A map whose walls are all drawn too far to one side shifts the pose with them, and no scan shows it. What scans show is how
-far walls that face different ways disagree, and a shift of that size is added. It is weighted, because it is learnt from
-few directions.
+The residual of a beam is measured from a point before the wall. That point lies either on the beam, where it may be near
+other things that the beam passed by, or square to the wall and close to it. The latter resolves errors of a millimetre.
+Then one more error shows: walls that are all drawn off to one side move the pose with them, and no scan notices. It is
+estimated from how far pieces of walls are drawn off from each other.
 
 A linearized fit does not know other places where the scan would fit as well, such as farther along a corridor with
 equal doors. So the loss is also evaluated along the axis that is constrained least, and along the direction in which a
@@ -42,14 +42,15 @@ class FitInformation:
 class ScanFit:
     """Learns how much map and lidar disagree, and says how well each scan determines its pose."""
 
-    def __init__(self, field: DistanceField, resolution_m: float) -> None:
+    def __init__(self, field: DistanceField, resolution_m: float, square: bool = False) -> None:
         """
         Args:
             field: distances to the walls.
             resolution_m: of the map's cells.
+            square: measure residuals of fitted scans square to the walls.
         """
         self._field = field
-        self._compiled = _integrity.ScanFit(resolution_m)
+        self._compiled = _integrity.ScanFit(resolution_m, square)
 
     @property
     def wall_deviation_m(self) -> float:

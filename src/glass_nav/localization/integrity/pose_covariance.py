@@ -21,7 +21,7 @@ import numpy as np
 
 from glass_nav import _integrity
 from glass_nav.geometry import angles, se2
-from glass_nav.localization.integrity.dead_reckoning import SURE, DeadReckoning
+from glass_nav.localization.integrity.dead_reckoning import DeadReckoning
 from glass_nav.localization.integrity.fit_information import FitInformation
 from glass_nav.localization.particle_filter.motion import OdometryNoise
 
@@ -154,9 +154,9 @@ def better_of(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 def widened_by(covariance: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """(3, 3): a covariance, in directions in which a spread (3, 3) is far larger that spread.
 
-    Particles spread as their proposal does, even around a sure pose: only far beyond, they are in doubt themselves.
+    Particles spread as their proposal does, whatever the scan determines: only far beyond, they are in doubt themselves.
     """
-    return _integrity.widened_by(covariance, spread, SURE)
+    return _integrity.widened_by(covariance, spread)
 
 
 def _turned(yaw: float) -> np.ndarray:

@@ -71,7 +71,7 @@ def test_a_corridor_leaves_the_pose_along_it_free():
     points = ends_in_room(pose, x=(-100.0, 100.0), y=(9.0, 11.0))
     near = np.abs(se2.transform_points(pose, points)[:, 0] - 10.0) < 8.0
     along, across, _ = deviations(fit_of(CORRIDOR, points[near], pose))
-    assert along > 0.5 * FREE_M and across < 0.04
+    assert along > 0.5 * FREE_M and across < 0.03
 
 
 def test_a_corridor_with_equal_doors_leaves_the_pose_at_any_of_them():
@@ -141,7 +141,7 @@ def test_the_compiled_fit_agrees_with_numpy(seed):
     rng = np.random.default_rng(seed)
     grid_map = ROOM if seed % 2 else CORRIDOR
     field = DistanceField(grid_map)
-    compiled, slow = (kind(field, RESOLUTION_M) for kind in (ScanFit, SlowScanFit))
+    compiled, slow = (kind(field, RESOLUTION_M, square=seed % 4 > 1) for kind in (ScanFit, SlowScanFit))
     for matched in rng.uniform(size=12) < 0.7:
         pose = INSIDE + rng.normal(0.0, [0.5, 0.3, 0.5])
         points_m = ends_in_room(
