@@ -4,13 +4,9 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 
 namespace glass_nav {
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr WallNormals::Normal kNone{kNaN, kNaN, 0.0F, kNaN};
 
 /// The occupied cells with a side towards a cell that is not occupied; outside the grid nothing is.
 std::vector<std::uint8_t> boundary_of(const std::vector<std::uint8_t>& occupied, int width, int height) {
@@ -139,7 +135,7 @@ class Patch {
 WallNormals::Normal normal_at(int x, int y, Patch& patch) {
   constexpr double kWorthRefining = 0.7;  // below it there is no line to refine
   const Line shape = patch.shape_at(x, y);
-  if (shape.linearity == 0.0) return kNone;
+  if (shape.linearity == 0.0) return WallNormals::none();
   const Line line = shape.linearity < kWorthRefining ? shape : patch.refined(x, y, shape);
   const double sign = line.along_rad > 0.0 ? 1.0 : -1.0;
   const double nx = sign * std::sin(line.along_rad), ny = -sign * std::cos(line.along_rad);
@@ -175,13 +171,6 @@ WallNormals::WallNormals(const std::vector<std::uint8_t>& occupied, int width, i
   Patch patch(boundary, width, height);
   collect(boundary,
           [&](int x, int y) { return near.contains(x, y) ? normal_at(x, y, patch) : before.at(y * width_ + x); });
-}
-
-WallNormals::Normal WallNormals::at(std::int32_t cell) const {
-  const std::size_t word = static_cast<std::size_t>(cell) / kBits;
-  const std::uint64_t bit = std::uint64_t{1} << (static_cast<std::size_t>(cell) % kBits);
-  if ((boundary_[word] & bit) == 0) return kNone;
-  return normals_[before_[word] + __builtin_popcountll(boundary_[word] & (bit - 1))];
 }
 
 }  // namespace glass_nav

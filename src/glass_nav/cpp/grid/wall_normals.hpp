@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "cell_box.hpp"
@@ -31,11 +32,30 @@ class WallNormals {
   WallNormals(const std::vector<std::uint8_t>& occupied, int width, int height, const WallNormals& before,
               const CellBox& changed);
 
-  /// Normal of one cell; {NaN, NaN, 0, NaN} for a cell inside a wall or without neighbours.
-  Normal at(std::int32_t cell) const;
+  static constexpr Normal none() {
+    constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+    return {kNaN, kNaN, 0.0F, kNaN};
+  }
+
+  /// Normal of one cell; none() for a cell inside a wall or without neighbours.
+  Normal at(std::int32_t cell) const {
+    const std::size_t word = static_cast<std::size_t>(cell) / kBits;
+    const std::uint64_t bit = std::uint64_t{1} << (static_cast<std::size_t>(cell) % kBits);
+    if ((boundary_[word] & bit) == 0) return none();
+    return normals_[before_[word] + set_bits(boundary_[word] & (bit - 1))];
+  }
 
  private:
   static constexpr std::size_t kBits = 64;
+
+  /// How many there are: in pairs, fours, bytes, and then all. Compilers call a function for that where they may not
+  /// use the instruction.
+  static std::size_t set_bits(std::uint64_t word) {
+    word -= (word >> 1) & 0x5555555555555555U;
+    word = (word & 0x3333333333333333U) + ((word >> 2) & 0x3333333333333333U);
+    word = (word + (word >> 4)) & 0x0F0F0F0F0F0F0F0FU;
+    return static_cast<std::size_t>((word * 0x0101010101010101U) >> 56);
+  }
 
   template <class NormalAt>
   void collect(const std::vector<std::uint8_t>& boundary, const NormalAt& normal_at);

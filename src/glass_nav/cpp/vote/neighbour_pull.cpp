@@ -36,7 +36,8 @@ void pull_neighbours(const double* measured_m, std::size_t beams, double pull, d
       }
       double sum = 0.0;
       for (std::size_t row = 0; row < kRows; ++row) {
-        sum += next[b][row] = alone[b][row] * std::exp(pull * around[row] / std::max(count, 1.0));
+        const double drawn = around[row] > 0.0 ? std::exp(pull * around[row] / count) : 1.0;
+        sum += next[b][row] = alone[b][row] * drawn;
       }
       for (double& value : next[b]) value /= sum;
     }

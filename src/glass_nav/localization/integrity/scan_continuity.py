@@ -6,7 +6,7 @@ moment ago, and the other way round. Surfaces are counted and not beams, since a
 everything else stays. Some surfaces always contradict each other: people, edges of objects, and more so glass; the
 usual number is learnt. Odometry may have missed a part of the motion, so the scans are also compared with the motion
 of the tracked pose. A break counts only if the next scan contradicts the one before it as well, because a crowd in
-front of the lidar makes a single scan look like another place. The formulation is ours. P pieces of surfaces.
+front of the lidar makes a single scan look like another place. The formulation is ours. P pieces of surfaces, B beams.
 """
 
 from __future__ import annotations
@@ -28,8 +28,25 @@ _TURNS_RAD = (-0.05, 0.05, -0.1, 0.1, -0.2, 0.2)  # that odometry may have misse
 _MAX_STEP_M = 1.0  # farther apart two scans need not have anything in common
 
 
+class Sweep:
+    """What a scan says about where there are surfaces, and where there are none."""
+
+    def __init__(self, scan: Scan) -> None:
+        self.base_from_laser = scan.base_from_laser
+        pieces = one_of_each_piece(scan)
+        ranges_m, bearings = scan.ranges_m[pieces], scan.angles_rad[pieces]
+        self.ends_m = np.column_stack(
+            [ranges_m * np.cos(bearings), ranges_m * np.sin(bearings)]
+        )  # (P, 2) from the lidar
+        answered = scan.answered
+        order = np.argsort(scan.angles_rad[answered])
+        self.beams_rad = scan.angles_rad[answered][order]  # (B,) ascending, of all that returned
+        self.ranges_m = scan.ranges_m[answered][order]  # (B,)
+
+
 class _View(NamedTuple):
-    scan: Scan
+    lidar: str
+    sweep: Sweep
     odom_from_base: np.ndarray  # (3,) odometry at the scan
     map_from_base: np.ndarray  # (3,) tracked pose after it
 
@@ -52,7 +69,7 @@ class ScanContinuity:
         """
         if np.count_nonzero(scan.answered) < _MIN_BEAMS:
             return False
-        now = _View(scan, np.array(odom_from_base, float), np.array(map_from_base, float))
+        now = _View(scan.lidar, Sweep(scan), np.array(odom_from_base, float), np.array(map_from_base, float))
         before, last = self._before, self._last
         self._before, self._last = None, now
         excess = -np.inf if last is None else self._excess(last, now)
@@ -73,12 +90,12 @@ class ScanContinuity:
     def _excess(self, before: _View, after: _View) -> float:
         """Share of contradictions above the usual one; -inf: the two cannot be compared."""
         step = se2.compose(se2.inverse(before.odom_from_base), after.odom_from_base)
-        if before.scan.lidar != after.scan.lidar or se2.travelled(step)[0] > _MAX_STEP_M:
+        if before.lidar != after.lidar or se2.travelled(step)[0] > _MAX_STEP_M:
             return -np.inf
         least = np.inf
         tracked = se2.compose(se2.inverse(before.map_from_base), after.map_from_base)
         for each in (step, tracked, *(step + [0.0, 0.0, turn_rad] for turn_rad in _TURNS_RAD)):
-            least = min(least, contradictions(before.scan, after.scan, each) - self._usual)
+            least = min(least, contradictions(before.sweep, after.sweep, each) - self._usual)
             if least <= self._limit:  # explained
                 break
         return least
@@ -90,35 +107,26 @@ class ScanContinuity:
         self._deviation += weight * (abs(excess) - self._deviation)
 
 
-def contradictions(before: Scan, after: Scan, step: np.ndarray) -> float:
+def contradictions(before: Sweep, after: Sweep, step: np.ndarray) -> float:
     """Of the pieces of surfaces that two scans, taken a step (3,) apart, met: the share that the other looked through."""
     before_from_after = se2.compose(
         se2.inverse(before.base_from_laser), se2.compose(np.asarray(step, float), after.base_from_laser)
     )
-    seen = _looked_through(before, _ends(after), before_from_after)
-    missed = _looked_through(after, _ends(before), se2.inverse(before_from_after))
+    seen = _looked_through(before, after.ends_m, before_from_after)
+    missed = _looked_through(after, before.ends_m, se2.inverse(before_from_after))
     return float(np.concatenate([seen, missed]).mean())
 
 
-def _ends(scan: Scan) -> np.ndarray:
-    """(P, 2) end points [m] in the frame of the lidar, one on each piece of a surface."""
-    beams = one_of_each_piece(scan)
-    ranges_m, bearings = scan.ranges_m[beams], scan.angles_rad[beams]
-    return np.column_stack([ranges_m * np.cos(bearings), ranges_m * np.sin(bearings)])
-
-
-def _looked_through(scan: Scan, points_m: np.ndarray, laser_from_points: np.ndarray) -> np.ndarray:
+def _looked_through(sweep: Sweep, points_m: np.ndarray, laser_from_points: np.ndarray) -> np.ndarray:
     """(N,) bool: all beams of the scan that pass close to a point (N, 2) end behind it."""
     points_m = se2.transform_points(laser_from_points, points_m)
     range_m = np.hypot(points_m[:, 0], points_m[:, 1])
     bearing = np.arctan2(points_m[:, 1], points_m[:, 0])
-    answered = scan.answered
-    order = np.argsort(scan.angles_rad[answered])
-    beams_rad, ends_m = scan.angles_rad[answered][order], scan.ranges_m[answered][order]
-    turned = beams_rad[0] + np.mod(bearing - beams_rad[0] + _TOLERANCE_RAD, 2.0 * np.pi) - _TOLERANCE_RAD
-    first = np.searchsorted(beams_rad, turned - _TOLERANCE_RAD)
-    last = np.searchsorted(beams_rad, turned + _TOLERANCE_RAD)
-    nearest_m = _minimum_between(ends_m, first, last)
+    start_rad = sweep.beams_rad[0]
+    turned = start_rad + np.mod(bearing - start_rad + _TOLERANCE_RAD, 2.0 * np.pi) - _TOLERANCE_RAD
+    first = np.searchsorted(sweep.beams_rad, turned - _TOLERANCE_RAD)
+    last = np.searchsorted(sweep.beams_rad, turned + _TOLERANCE_RAD)
+    nearest_m = _minimum_between(sweep.ranges_m, first, last)
     return np.isfinite(nearest_m) & (range_m + _TOLERANCE_M + _TOLERANCE_SHARE * range_m < nearest_m)
 
 

@@ -95,8 +95,9 @@ def test_a_post_that_was_not_there_contradicts_and_so_does_one_that_has_gone(bea
     before = L_ROOM.scan(np.array([2.0, 1.5, 0.3]))
     hit = np.abs(np.mod(before.angles_rad - bearing + np.pi, 2.0 * np.pi) - np.pi) < 0.2
     after = replace(before, ranges_m=np.where(hit, 0.5, before.ranges_m))
-    share = scan_continuity.contradictions(before, after, np.zeros(3))
-    assert share == scan_continuity.contradictions(after, before, np.zeros(3))
+    one, other = scan_continuity.Sweep(before), scan_continuity.Sweep(after)
+    share = scan_continuity.contradictions(one, other, np.zeros(3))
+    assert share == scan_continuity.contradictions(other, one, np.zeros(3))
     pieces = len(one_of_each_piece(before)) + len(one_of_each_piece(after))
     assert 1 <= round(share * pieces) <= 4  # of the post, which is 0.2 m wide, however many beams met it
-    assert scan_continuity.contradictions(before, before, np.zeros(3)) == 0.0
+    assert scan_continuity.contradictions(one, one, np.zeros(3)) == 0.0
