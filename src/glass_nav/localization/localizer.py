@@ -55,7 +55,7 @@ class Estimate:
 
     stamp_ns: int
     map_from_base: np.ndarray  # (3,) pose of the best cluster
-    covariance: np.ndarray  # (3, 3) of that cluster, x [m], y [m], yaw [rad]
+    covariance: np.ndarray  # (3, 3) of its error, x [m], y [m], yaw [rad]
     map_from_odom: np.ndarray  # (3,) what tf needs
     report_beams: Callable[[], BeamReport]  # by what the filter knows when it is called
     particles: np.ndarray  # (P, 3) poses in map
@@ -436,6 +436,7 @@ class Localizer:
             judged = seen.evidence.without_crowd()
             self._quality.observe(judged.inlier_ratio, judged.judged_share)
         covariance = self._integrity.at(step, self._params.odometry, best.covariance)
+        claimed = self._integrity.claimed_at(step, self._params.odometry, best.covariance)
         judgement = self._quality.judge(best, covariance)
         trusted = judgement.state == LocalizationState.LOCALIZED
         if seen is not None and trusted and self._filter.fits:
@@ -447,7 +448,7 @@ class Localizer:
         return Estimate(
             scan.stamp_ns,
             map_from_base,
-            covariance,
+            claimed,
             self._map_from_odom,
             report_beams,
             self._filter.particles,
@@ -456,13 +457,16 @@ class Localizer:
             seen is not None,
             judgement.confidence,
             judgement.places,
-            protection_level.of(map_from_base, covariance, self._grid_map.resolution_m),
+            protection_level.of(map_from_base, claimed, self._integrity.least_level_m),
         )
 
     def _look_for_panes(self, scan: Scan, estimate: Estimate) -> None:
         """Panes that the map lacks are surfaces from the next scan on."""
         trusted = estimate.state == LocalizationState.LOCALIZED
-        if trusted and self._panes.observe(scan, estimate.map_from_base, estimate.covariance):
+        if not trusted:
+            return
+        covariance = self._integrity.at(None, self._params.odometry, self._filter.best.covariance)
+        if self._panes.observe(scan, estimate.map_from_base, covariance):
             self._draw_panes()
 
     def _draw_panes(self) -> None:

@@ -85,8 +85,8 @@ class Publishers:
             self._poses.publish(conversions.pose_msg(estimate, self._frame))
         if self._surfaces.get_num_connections():
             self._surfaces.publish(conversions.surface_scan_msg(placed, estimate.surface_scan))
-        is_heard = self._status.get_num_connections() > 0
-        if is_heard or estimate.updated or self._status_pace.is_due(now_s, UNHEARD_STATUS_S):
+        is_news = estimate.updated or self._status.get_num_connections() > 0
+        if self._status_pace.is_due(now_s, 0.0 if is_news else UNHEARD_STATUS_S):
             self._status.publish(
                 conversions.status_msg(
                     estimate.stamp_ns,
