@@ -45,7 +45,6 @@ from glass_nav.world.pane import Pane
 _FOUND = np.array([0.1, 0.1, 0.05])  # deviations [m, m, rad] of a place that was found among all others
 _ASTRAY = 3.0  # deviations of dead reckoning from which a pose that scans do not support is given up
 _UNSURE_M = 0.5  # driven since the pose was sure, times the worth of a scan: then it no longer overrules odometry
-_LOST_M = 3.0  # driven since the pose was sure: from then on a scan that may fit by chance does not move it
 _SHOWN = 500  # candidates drawn for particlecloud
 
 
@@ -395,7 +394,8 @@ class Localizer:
         reckoned = self._dead_reckoning
         if reckoned is None or reckoned.distance_m - _length(step) < _UNSURE_M * worth - 1e-6:
             return
-        most = 0.0 if worth == 0.0 and reckoned.distance_m > _LOST_M else _ASTRAY
+        off_map = bool(self._known_area.is_unmapped(reckoned.map_from_base[:2]))
+        most = 0.0 if worth == 0.0 and off_map else _ASTRAY
         if reckoned.mahalanobis(self._filter.best.map_from_base[None])[0] > most:
             self._filter.move_to(reckoned.map_from_base)
 
