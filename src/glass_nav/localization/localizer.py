@@ -457,7 +457,7 @@ class Localizer:
             seen is not None,
             judgement.confidence,
             judgement.places,
-            protection_level.of(map_from_base, claimed, self._integrity.least_level_m),
+            protection_level.of(map_from_base, covariance, 0.5 * self._grid_map.resolution_m),
         )
 
     def _look_for_panes(self, scan: Scan, estimate: Estimate) -> None:
