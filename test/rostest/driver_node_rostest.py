@@ -369,7 +369,7 @@ class Driver(unittest.TestCase):
         result = self.await_end(self.second)
         self.assertEqual(result.code, GotoNodeResult.NO_MOVE_BASE)
         self.assertEqual(
-            result.reason, "no action server /second/move_base within 1 s: start move_base, or set ~backend to internal"
+            result.reason, "no action server /second/move_base within 5 s: start move_base, or set ~backend to internal"
         )
         player = MoveBasePlayer()
         for outcome, code, words in (

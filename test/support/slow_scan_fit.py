@@ -15,15 +15,18 @@ _SAME_WALL_M, _SAME_WALL_COS = 0.5, np.cos(np.radians(25.0))  # of neighbouring 
 _PIECE_M = 1.0  # of a wall: pieces err by themselves
 _SIDES = 8  # directions that walls face
 _BEFORE_WALL_M = 0.25  # where the field is looked at: there it has one direction
+_BEFORE_CELLS = 1.5  # the same square to the wall
 _KERNEL_SCALES = 3.0  # residuals beyond are not of that wall
 _CLOSE_M = 0.3  # residuals that tell how much map and lidar disagree
 _NEAR_M = 0.15  # the kernel of a scan that may fit beside the pose
 _EDGE_CELLS = 0.29  # deviation of an edge that is drawn in whole cells
-_MIN_DEVIATION_M = 0.002  # of walls and of their pieces
+_MIN_DEVIATION_M, _MIN_SQUARE_M = 0.002, 0.0005  # of walls and of their pieces
 _PRIOR_WEIGHT, _MEMORY = 10.0, 0.98  # beams that _EDGE_CELLS is worth, and weight of the past per scan
 _FITTED = 2.0  # sides whose error the fit takes up: their offset is a shift of the robot
 _PRIOR_BEAMS = 0.01  # weight of FREE_M
 _UNMAPPED_BEAMS = 1.0, 4.0  # least and most that may have ended at another thing as near as a piece of a wall errs
+_COMMON = 0.5  # of the variances of walls, in that of what all walls err by
+_ANOTHER_M = 0.1  # as far off, a beam may have met another thing
 _STEPS_M = np.array([0.04, 0.08, 0.13, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0])
 _STEPS_M = np.concatenate([-_STEPS_M[::-1], [0.0], _STEPS_M])
 _STEP_WIDTHS_M = np.gradient(_STEPS_M)
@@ -32,14 +35,15 @@ _STEP_WIDTHS_M = np.gradient(_STEPS_M)
 class SlowScanFit:
     """Learns how much map and lidar disagree, and says how well each scan determines its pose."""
 
-    def __init__(self, field: DistanceField, resolution_m: float) -> None:
+    def __init__(self, field: DistanceField, resolution_m: float, square: bool = False) -> None:
         """
         Args:
             field: distances to the walls.
             resolution_m: of the map's cells.
+            square: measure residuals of fitted scans square to the walls.
         """
-        self._field = field
-        self._edge_m = _EDGE_CELLS * resolution_m
+        self._field, self._square = field, square
+        self._edge_m, self._before_m = _EDGE_CELLS * resolution_m, _BEFORE_CELLS * resolution_m
         self._scale_m = self._edge_m  # of what is left between beams and walls
         self._squares = np.full(4, _PRIOR_WEIGHT * self._edge_m**2)  # what fits left: offset, sides, pieces, beams
         self._freedom = np.full(4, _PRIOR_WEIGHT)  # beams, less what the fits took up
@@ -61,13 +65,13 @@ class SlowScanFit:
         arms_m = points_m @ turn  # from the robot to the ends, in map's axes
         beams = arms_m - laser_m @ turn
         beams /= np.maximum(np.sqrt(np.einsum("bi,bi->b", beams, beams)), 1e-9)[:, None]
-        before = arms_m - _BEFORE_WALL_M * beams
-        distance_m, along_x, along_y = self._field.at(before[:, 0] + map_from_base[0], before[:, 1] + map_from_base[1])
-        normals = np.stack([along_x, along_y], axis=1)  # away from the wall
-        steepness = np.sqrt(along_x**2 + along_y**2)
-        normals /= np.maximum(steepness, 1e-9)[:, None]
+        before = -_BEFORE_WALL_M * beams
+        normals, steepness, distance_m = self._wall_at(arms_m + before + map_from_base[:2])
+        for _ in range(2 if matched and self._square else 0):
+            before = self._before_m * normals
+            normals, steepness, distance_m = self._wall_at(arms_m + before + map_from_base[:2])
         facing = -np.einsum("bi,bi->b", beams, normals)
-        residual_m = _BEFORE_WALL_M * facing - distance_m  # of the end behind the wall
+        residual_m = np.einsum("bi,bi->b", before, normals) - distance_m  # of the end behind the wall
         steepness = np.where(facing > 0.0, np.minimum(steepness, 1.0), 0.0)  # 0: the beam ended far behind a wall
         if matched:
             left_m = np.abs(residual_m)
@@ -84,7 +88,7 @@ class SlowScanFit:
         jacobian = np.column_stack([normals, lever / lever_m])  # of x [m], y [m], yaw times lever_m [m]
         weighted = weight[:, None] * jacobian
         inverse = np.linalg.inv(weighted.T @ jacobian + _PRIOR_BEAMS * np.eye(3))
-        side = np.round(np.arctan2(along_y, along_x) * (_SIDES / (2.0 * np.pi))).astype(int) % _SIDES
+        side = np.round(np.arctan2(normals[:, 1], normals[:, 0]) * (_SIDES / (2.0 * np.pi))).astype(int) % _SIDES
         first = _first_of_each_piece(points_m, normals)
         if matched:
             piece = np.cumsum(np.bincount(first, minlength=len(points_m))) - 1
@@ -101,11 +105,20 @@ class SlowScanFit:
             variance += self._variance(size) * sums.T @ sums
         covariance = inverse @ variance @ inverse
         if matched:
+            if self._square:
+                covariance = covariance + _COMMON * (self._variance(1) + self._variance(2)) * np.eye(3)
             covariance = self._widened(covariance, weighted.T @ jacobian, arms_m, map_from_base, lever_m, len(first))
         to_yaw = np.array([1.0, 1.0, 1.0 / lever_m])
         weighted = near[:, None] * jacobian
         offset = np.linalg.solve(weighted.T @ jacobian + _PRIOR_BEAMS * np.eye(3), weighted.T @ -residual_m) * to_yaw
         return FitInformation(covariance * np.outer(to_yaw, to_yaw), offset, float(near.mean()))
+
+    def _wall_at(self, points: np.ndarray) -> "tuple[np.ndarray, np.ndarray, np.ndarray]":
+        """Of the wall nearest to points (B, 2): its normals (B, 2), steepness (B,) of the field, distances (B,) [m]."""
+        distance_m, along_x, along_y = self._field.at(points[:, 0], points[:, 1])
+        steepness = np.sqrt(along_x**2 + along_y**2)
+        normals = np.stack([along_x, along_y], axis=1) / np.maximum(steepness, 1e-9)[:, None]
+        return normals, steepness, distance_m
 
     def _learn(self, weight: np.ndarray, residual_m: np.ndarray, piece: np.ndarray, side: np.ndarray) -> None:
         """Split what is left between walls and scan after the fit into an offset, sides, pieces and beams: a nested
@@ -137,7 +150,10 @@ class SlowScanFit:
         self._add(0, total * offset_m**2, total)
 
     def _variance(self, size: int) -> float:
-        return max(self._squares[size] / max(self._freedom[size], 1e-3), _MIN_DEVIATION_M**2)
+        return max(
+            self._squares[size] / max(self._freedom[size], 1e-3),
+            (_MIN_SQUARE_M if self._square else _MIN_DEVIATION_M) ** 2,
+        )
 
     def _add(self, size: int, squares: float, freedom: float) -> None:
         total = self._squares, self._freedom
@@ -173,7 +189,7 @@ class SlowScanFit:
                 map_from_base[1] + _STEPS_M[:, None] * axis[1] + sin * x + cos * y,
             )
             squared = distance_m**2
-            kernel = (_KERNEL_SCALES * self._scale_m) ** 2
+            kernel = max(_KERNEL_SCALES * self._scale_m, _ANOTHER_M if self._square else 0.0) ** 2
             share = 0.5 * _KERNEL_SCALES**2 * pieces / len(arms_m)
             loss = share * np.sum(squared / (squared + kernel), axis=1)
             linearized = share * float(axis @ information @ axis) / kernel * _STEPS_M**2

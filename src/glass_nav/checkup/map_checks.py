@@ -16,7 +16,8 @@ MISMATCH = "map-mismatch"
 SCANS = 16  # that are looked for, spread over the log
 _MIN_SCANS, _MIN_POINTS = 5, 20
 _MAX_POINTS, _COARSE = 150, 60
-_FOUND, _REFINED = 300, 40
+_FOUND, _REFINED = 100, 40  # places of a scan that are compared by more of its points, and those that are aligned
+_MAX_BEHIND = 0.15  # of the scores of these places behind the best one
 _MIN_FIT = 0.72  # median over the scans; own maps give 0.75 to 0.99, others 0.44 to 0.71
 _GOOD_FIT, _FAIR_FIT = 0.9, 0.85  # mirrored and scaled ones are not tried then
 _SCALED_FIT = 0.75  # of scans that fit a map but for its scale
@@ -54,7 +55,7 @@ class ScansOnMap:
         return np.array([self._best(points * factor) for points in self._points[::every]])
 
     def _best(self, points: np.ndarray) -> float:
-        places = self._matcher.search(points[:: max(1, len(points) // _COARSE)], _FOUND)
+        places = self._matcher.search(points[:: max(1, len(points) // _COARSE)], _FOUND, _MAX_BEHIND)
         if not len(places.poses):
             return 0.0
         near = scan_alignment.fit(self._field, points, places.poses, scale_m=0.15)

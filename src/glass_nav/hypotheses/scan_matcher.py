@@ -72,19 +72,20 @@ class ScanMatcher:
         distance = field.distance(points[..., 0], points[..., 1])
         return np.rint(_HIGHEST * _SCALE_M**2 / (_SCALE_M**2 + distance**2)).astype(np.uint8)
 
-    def search(self, points_m: np.ndarray, keep: int) -> Places:
+    def search(self, points_m: np.ndarray, keep: int, max_behind: float = 1.0) -> Places:
         """Find at most this number of places, one for each square of 0.8 m and each of the headings.
 
         Args:
             points_m: (B, 2) finite end points of beams in the robot's frame.
             keep: >= 1.
+            max_behind: of scores behind the best; less saves time.
         """
-        search = self.begin(points_m, keep)
+        search = self.begin(points_m, keep, max_behind)
         search.advance(_ALL)
         return search.places
 
     def begin(self, points_m: np.ndarray, keep: int, max_behind: float = 1.0) -> SlicedSearch:
-        """A search as of search() that is done in slices; max_behind: of scores behind the best, which saves time."""
+        """A search as of search() that is done in slices."""
         search = _grid.ScanSearch(self._grid, points_m / self._cell_m, _HEADINGS_RAD, keep, min(max_behind, 1.0))
         return SlicedSearch(search, self._map_from_grid, self._cell_m)
 

@@ -189,7 +189,7 @@ class DocumentLocalizer:
             updated,
             judgement.confidence,
             judgement.places,
-            protection_level.of(map_from_base, best.covariance, self._resolution_m),
+            protection_level.of(map_from_base, best.covariance, 0.5 * self._resolution_m),
         )
 
 

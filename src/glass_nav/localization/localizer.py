@@ -45,6 +45,7 @@ from glass_nav.world.pane import Pane
 _FOUND = np.array([0.1, 0.1, 0.05])  # deviations [m, m, rad] of a place that was found among all others
 _ASTRAY = 3.0  # deviations of dead reckoning from which a pose that scans do not support is given up
 _UNSURE_M = 0.5  # driven since the pose was sure, times the worth of a scan: then it no longer overrules odometry
+_LOST_M = 3.0  # driven since the pose was sure: from then on a scan that may fit by chance does not move it
 _SHOWN = 500  # candidates drawn for particlecloud
 
 
@@ -54,7 +55,7 @@ class Estimate:
 
     stamp_ns: int
     map_from_base: np.ndarray  # (3,) pose of the best cluster
-    covariance: np.ndarray  # (3, 3) of that cluster, x [m], y [m], yaw [rad]
+    covariance: np.ndarray  # (3, 3) of its error, x [m], y [m], yaw [rad]
     map_from_odom: np.ndarray  # (3,) what tf needs
     report_beams: Callable[[], BeamReport]  # by what the filter knows when it is called
     particles: np.ndarray  # (P, 3) poses in map
@@ -365,7 +366,7 @@ class Localizer:
         self._filter.estimate()
         self._filter.resample()
         if registration.worth < 1.0:
-            self._keep_to_odometry(step, _UNSURE_M * registration.worth)
+            self._keep_to_odometry(step, registration.worth)
         suspect = self._filter.suspect
         held = self._integrity.update(
             scan,
@@ -384,17 +385,18 @@ class Localizer:
         """After a step, with the noise of odometry as the model says or as it proved, whichever is larger."""
         return reckoned.carried(step, self._params.odometry, np.maximum(self._integrity.noise_scale, 1.0))
 
-    def _keep_to_odometry(self, step: Optional[np.ndarray], unsure_m: float) -> None:
+    def _keep_to_odometry(self, step: Optional[np.ndarray], worth: float) -> None:
         """The scan hardly fits. If such scans led the pose astray, odometry has it back.
 
         Args:
             step: (3,) of odometry since the last update; None: there was none.
-            unsure_m: least distance that the pose was not sure before the step.
+            worth: of the scan's fit as evidence, 0..1.
         """
         reckoned = self._dead_reckoning
-        if reckoned is None or reckoned.distance_m - _length(step) < unsure_m - 1e-6:
+        if reckoned is None or reckoned.distance_m - _length(step) < _UNSURE_M * worth - 1e-6:
             return
-        if reckoned.mahalanobis(self._filter.best.map_from_base[None])[0] > _ASTRAY:
+        most = 0.0 if worth == 0.0 and reckoned.distance_m > _LOST_M else _ASTRAY
+        if reckoned.mahalanobis(self._filter.best.map_from_base[None])[0] > most:
             self._filter.move_to(reckoned.map_from_base)
 
     def _find(self, scan: Scan, odom_from_base: np.ndarray) -> BeamCases:
@@ -434,6 +436,7 @@ class Localizer:
             judged = seen.evidence.without_crowd()
             self._quality.observe(judged.inlier_ratio, judged.judged_share)
         covariance = self._integrity.at(step, self._params.odometry, best.covariance)
+        claimed = self._integrity.claimed_at(step, self._params.odometry, best.covariance)
         judgement = self._quality.judge(best, covariance)
         trusted = judgement.state == LocalizationState.LOCALIZED
         if seen is not None and trusted and self._filter.fits:
@@ -445,7 +448,7 @@ class Localizer:
         return Estimate(
             scan.stamp_ns,
             map_from_base,
-            covariance,
+            claimed,
             self._map_from_odom,
             report_beams,
             self._filter.particles,
@@ -454,13 +457,16 @@ class Localizer:
             seen is not None,
             judgement.confidence,
             judgement.places,
-            protection_level.of(map_from_base, covariance, self._grid_map.resolution_m),
+            protection_level.of(map_from_base, claimed, self._integrity.least_level_m),
         )
 
     def _look_for_panes(self, scan: Scan, estimate: Estimate) -> None:
         """Panes that the map lacks are surfaces from the next scan on."""
         trusted = estimate.state == LocalizationState.LOCALIZED
-        if trusted and self._panes.observe(scan, estimate.map_from_base, estimate.covariance):
+        if not trusted:
+            return
+        covariance = self._integrity.at(None, self._params.odometry, self._filter.best.covariance)
+        if self._panes.observe(scan, estimate.map_from_base, covariance):
             self._draw_panes()
 
     def _draw_panes(self) -> None:

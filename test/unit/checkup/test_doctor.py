@@ -34,7 +34,7 @@ def simulated(tmp_path_factory):
                 "simulate",
                 "glass_atrium",
                 "--path",
-                "ring",
+                "half",
                 "--beams",
                 "181",
                 "--rate",

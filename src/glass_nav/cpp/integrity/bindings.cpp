@@ -62,9 +62,10 @@ py::tuple fit_of(ScanFit& fit, const DistanceField& field, const Array& points_m
 PYBIND11_MODULE(_integrity, module) {
   using namespace glass_nav;
   py::class_<ScanFit>(module, "ScanFit")
-      .def(py::init<double>(), py::arg("edge_m"))
+      .def(py::init<double, bool>(), py::arg("resolution_m"), py::arg("square"))
       .def("of", &fit_of, py::arg("field"), py::arg("points_m"), py::arg("laser_m"), py::arg("map_from_base"),
-           py::arg("beam_share"), py::arg("worth"));
+           py::arg("beam_share"), py::arg("worth"))
+      .def_property_readonly("wall_deviation_m", &ScanFit::wall_deviation_m);
   module.def(
       "better_of",
       [](const Array& first, const Array& second) { return array_of(better_of(matrix_of(first), matrix_of(second))); },

@@ -11,15 +11,20 @@ constexpr double kFreeM = 2.0;                                          // FREE_
 constexpr double kSameWallM = 0.5, kSameWallCos = 0.90630778703664996;  // of neighbouring beams: 25 degrees
 constexpr double kPieceM = 1.0;                                         // of a wall: pieces err by themselves
 constexpr double kBeforeWallM = 0.25;                                   // where the field is looked at
+constexpr double kBeforeCells = 1.5;                                    // the same square to the wall
+constexpr int kSquare = 2;                                              // looks until that is square to the wall
+constexpr double kEdgeCells = 0.29;                                     // deviation of an edge drawn in whole cells
 constexpr double kKernelScales = 3.0;                                   // residuals beyond are not of that wall
 constexpr double kCloseM = 0.3;                                         // residuals that the scale is learnt from
 constexpr double kNearM = 0.15;                                         // kernel where the scan may fit beside the pose
 constexpr double kMadToDeviation = 1.4826;                              // of a normal distribution
-constexpr double kMinDeviationM = 0.002;                                // of walls and of their pieces
+constexpr double kMinDeviationM = 0.002, kMinSquareM = 0.0005;          // of walls and of their pieces
 constexpr double kPriorWeight = 10.0, kMemory = 0.98;                   // beams that edge_m is worth; past per scan
 constexpr double kFitted = 2.0;                                         // sides whose error the fit takes up
 constexpr double kPriorBeams = 0.01;                                    // weight of kFreeM
 constexpr double kLeastUnmapped = 1.0, kMostUnmapped = 4.0;             // beams that ended at another thing
+constexpr double kCommon = 0.5;                                         // share of that in what all walls err by
+constexpr double kAnotherM = 0.1;                                       // as far off, a beam may have met another thing
 constexpr double kSmallest = 1e-9;
 constexpr int kSteps = 10;  // to each side of the pose, along the direction that is constrained least
 constexpr std::array<double, kSteps> kStepsM{0.04, 0.08, 0.13, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0};
@@ -57,8 +62,12 @@ struct ScanFit::Piece {
   std::size_t first, last;  // beams [first, last)
 };
 
-ScanFit::ScanFit(double edge_m) : edge_m_(edge_m), scale_m_(edge_m) {
-  squares_.fill(kPriorWeight * edge_m * edge_m);
+ScanFit::ScanFit(double resolution_m, bool square_to_walls)
+    : square_(square_to_walls),
+      edge_m_(kEdgeCells * resolution_m),
+      before_m_(kBeforeCells * resolution_m),
+      scale_m_(edge_m_) {
+  squares_.fill(kPriorWeight * square(edge_m_));
   freedom_.fill(kPriorWeight);
 }
 
@@ -66,6 +75,7 @@ FitInformation ScanFit::of(const DistanceField& field, const SeenScan& scan, dou
   const bool matched = worth > 0.0;
   const Vector3& pose = scan.map_from_base;
   const double cos = std::cos(pose[2]), sin = std::sin(pose[2]);
+  const int looks = matched && square_ ? kSquare : 0;
   const double laser_x = cos * scan.laser_m[0] - sin * scan.laser_m[1];
   const double laser_y = sin * scan.laser_m[0] + cos * scan.laser_m[1];
   std::vector<Beam> beams(scan.count);
@@ -81,13 +91,19 @@ FitInformation ScanFit::of(const DistanceField& field, const SeenScan& scan, dou
     const double range_m = std::max(std::sqrt(square(along_x) + square(along_y)), kSmallest);
     along_x /= range_m;
     along_y /= range_m;
-    const Slope at =
-        field.at(beam.arm_x - kBeforeWallM * along_x + pose[0], beam.arm_y - kBeforeWallM * along_y + pose[1]);
-    const double slope = std::sqrt(square(at.along_x) + square(at.along_y));
-    beam.normal_x = at.along_x / std::max(slope, kSmallest);
-    beam.normal_y = at.along_y / std::max(slope, kSmallest);
+    double before_x = -kBeforeWallM * along_x, before_y = -kBeforeWallM * along_y, slope = 0.0;
+    Slope at{};
+    for (int look = 0; look <= looks; ++look) {
+      at = field.at(beam.arm_x + before_x + pose[0], beam.arm_y + before_y + pose[1]);
+      slope = std::sqrt(square(at.along_x) + square(at.along_y));
+      beam.normal_x = at.along_x / std::max(slope, kSmallest);
+      beam.normal_y = at.along_y / std::max(slope, kSmallest);
+      if (look == looks) break;
+      before_x = before_m_ * beam.normal_x;  // not along the beam, which may pass by other things
+      before_y = before_m_ * beam.normal_y;
+    }
+    beam.residual_m = before_x * beam.normal_x + before_y * beam.normal_y - at.distance;
     const double facing = -(along_x * beam.normal_x + along_y * beam.normal_y);
-    beam.residual_m = kBeforeWallM * facing - at.distance;
     beam.steepness = facing > 0.0 ? std::min(slope, 1.0) : 0.0;
     const int turn = static_cast<int>(std::nearbyint(std::atan2(at.along_y, at.along_x) * (kSides / (2.0 * kPi))));
     beam.side = (turn + kSides) % kSides;
@@ -125,6 +141,7 @@ FitInformation ScanFit::of(const DistanceField& field, const SeenScan& scan, dou
   const Matrix3 inverted = inverse(information + Matrix3::diagonal(kPriorBeams));
   Matrix3 covariance = inverted * spread_of(beams, pieces, beam_share) * inverted;
   if (matched) {
+    if (square_) covariance = covariance + Matrix3::diagonal(kCommon * square(wall_deviation_m()));
     for (double& value : covariance.values) value /= worth;
     const double pieces_per_beam = static_cast<double>(pieces.size()) / static_cast<double>(beams.size());
     widen(field, pose, beams, information, lever_m, worth * pieces_per_beam, covariance);
@@ -273,7 +290,7 @@ void ScanFit::widen(const DistanceField& field, const Vector3& pose, const std::
 double ScanFit::added_variance(const DistanceField& field, const Vector3& pose, const std::vector<Beam>& beams,
                                const Matrix3& information, double lever_m, double worth_of_beam, const Vector3& axis,
                                double variance) const {
-  const double kernel = square(kKernelScales * scale_m_);
+  const double kernel = square(std::max(kKernelScales * scale_m_, square_ ? kAnotherM : 0.0));
   const double share = 0.5 * square(kKernelScales) * worth_of_beam;
   const double curvature = share * dot(axis, information * axis) / kernel;
   std::array<double, 2 * kSteps + 1> loss{}, linearized{};
@@ -292,8 +309,10 @@ double ScanFit::added_variance(const DistanceField& field, const Vector3& pose, 
   return variance_of(loss) - std::max(variance_of(linearized), variance);
 }
 
+double ScanFit::wall_deviation_m() const { return std::sqrt(variance(kSide) + variance(kPiece)); }
+
 double ScanFit::variance(Size size) const {
-  return std::max(squares_[size] / std::max(freedom_[size], 1e-3), square(kMinDeviationM));
+  return std::max(squares_[size] / std::max(freedom_[size], 1e-3), square(square_ ? kMinSquareM : kMinDeviationM));
 }
 
 void ScanFit::add(Size size, double squares, double freedom) {

@@ -28,12 +28,15 @@ struct FitInformation {
 /// Learns how much map and lidar disagree, and says how well each scan determines its pose.
 class ScanFit {
  public:
-  /// edge_m: deviation of an edge that is drawn in whole cells.
-  explicit ScanFit(double edge_m);
+  /// resolution_m: of the map's cells. square: residuals of fitted scans are measured square to the walls.
+  ScanFit(double resolution_m, bool square);
 
   /// beam_share: of all beams that the pose was fitted to, how many these are. worth: of the fit as evidence, up to 1;
   /// 0: the pose was not fitted to this scan.
   FitInformation of(const DistanceField& field, const SeenScan& scan, double beam_share, double worth);
+
+  /// Of a piece of wall from where the map has it.
+  double wall_deviation_m() const;
 
  private:
   static constexpr int kSides = 8;  // directions that walls face
@@ -53,7 +56,9 @@ class ScanFit {
                         const Matrix3& information, double lever_m, double worth_of_beam, const Vector3& axis,
                         double variance) const;
 
-  double edge_m_, scale_m_;               // the scale is that of what is left between beams and walls
+  bool square_;
+  double edge_m_, before_m_;              // deviation of an edge drawn in whole cells; where the field is looked at
+  double scale_m_;                        // of what is left between beams and walls
   std::array<double, kSizes> squares_{};  // what fits left, by the size of what errs together
   std::array<double, kSizes> freedom_{};  // beams, less what the fits took up
 };

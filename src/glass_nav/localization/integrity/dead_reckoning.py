@@ -16,7 +16,7 @@ from glass_nav.geometry import angles, se2
 from glass_nav.localization.particle_filter import motion
 from glass_nav.localization.particle_filter.motion import OdometryNoise
 
-_MIN_DEVIATION = np.array([0.01, 0.01, np.radians(0.2)])  # of a sure pose: m, m, rad
+SURE = np.diag(np.square([0.01, 0.01, np.radians(0.2)]))  # (3, 3) of a sure pose: nothing depends on less
 _AS_IT_IS = np.ones(3)  # noise
 
 
@@ -45,7 +45,7 @@ class DeadReckoning:
         """(K,) distances of poses (K, 3) in map from this one, in standard deviations."""
         off = poses - self.map_from_base
         off[:, 2] = angles.wrap(off[:, 2])
-        root = np.linalg.cholesky(self.covariance + np.diag(_MIN_DEVIATION**2))
+        root = np.linalg.cholesky(self.covariance + SURE)
         return np.sqrt(np.sum(np.linalg.solve(root, off.T) ** 2, axis=0))
 
     def log_likelihood(self, poses: np.ndarray, least: float = -np.inf) -> np.ndarray:

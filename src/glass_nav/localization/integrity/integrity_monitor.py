@@ -2,7 +2,8 @@
 
 The covariance has four parts: the spread of the particles; the fit of the scan, with the disagreement of map and
 lidar (fit_information.py); odometry since the last fit (pose_covariance.py); and the distance to a better fit, if the
-scan fits best beside the pose, or at a place that a second scan has to confirm.
+scan fits best beside the pose, or at a place that a second scan has to confirm. The covariance that is reported is a
+narrower one (claimed_covariance.py).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from glass_nav import _integrity
 from glass_nav.geometry import angles
+from glass_nav.localization.integrity.claimed_covariance import ClaimedCovariance
 from glass_nav.localization.integrity.fit_information import FitInformation, ScanFit
 from glass_nav.localization.integrity.pose_covariance import PoseCovariance, widened_by
 from glass_nav.localization.particle_filter.motion import OdometryNoise
@@ -40,6 +42,7 @@ class IntegrityMonitor:
         self._field, self._known_area = field, known_area
         self._fit = ScanFit(field, known_area.resolution_m)
         self._covariance: Optional[PoseCovariance] = None
+        self._claimed = ClaimedCovariance(field, known_area)
         self._at_update: Dict[str, Tuple[float, float]] = {}  # of each lidar's last update: beside_of() and share then
         self._other: Optional[np.ndarray] = None  # (3,) how far off another possible place is, in map
         self._now: Optional[FitInformation] = None  # of the present scan at the carried pose
@@ -47,6 +50,7 @@ class IntegrityMonitor:
     def start(self, covariance: np.ndarray) -> None:
         """The pose was placed anew, with a covariance (3, 3)."""
         self._covariance = PoseCovariance(covariance)
+        self._claimed.start(covariance)
         self._now = self._other = None
         self._at_update = {}
 
@@ -91,6 +95,7 @@ class IntegrityMonitor:
             return map_from_base
         self._now = self._look(scan, map_from_base, worth)
         pose = self._covariance.update(step, map_from_base, self._now if worth > 0.0 else None, noise, worth, slipped)
+        self._claimed.update(scan, pose, step, noise, worth)
         if self._now is not None:
             back = pose - map_from_base
             back[2] = angles.wrap(back[2])
@@ -116,9 +121,15 @@ class IntegrityMonitor:
         """Evidence other than scans weighed the particles, whose spread (3, 3) holds now."""
         if self._covariance is not None:
             self._covariance.narrow(spread)
+            self._claimed.narrow(spread)
+
+    @property
+    def least_level_m(self) -> float:
+        """Least 99.9 % level of a position [m] that the map allows."""
+        return self._claimed.least_level_m
 
     def at(self, step: Optional[np.ndarray], noise: OdometryNoise, spread: np.ndarray) -> np.ndarray:
-        """(3, 3) covariance at the present scan.
+        """(3, 3) covariance at the present scan, for decisions.
 
         Args:
             step: (3,) of odometry since the last update, in the robot's frame then; None: this scan was one.
@@ -128,14 +139,25 @@ class IntegrityMonitor:
         if self._covariance is None:
             return spread
         carried = self._covariance.carried(step, noise)
-        covariance = widened_by(carried, spread) + self._covariance.unproven
+        return widened_by(carried, spread) + self._doubts(carried)
+
+    def claimed_at(self, step: Optional[np.ndarray], noise: OdometryNoise, spread: np.ndarray) -> np.ndarray:
+        """(3, 3) covariance at the present scan, to be reported; arguments as of at()."""
+        if self._covariance is None:
+            return spread
+        return self._claimed.at(step, noise, spread) + self._doubts(self._covariance.carried(step, noise))
+
+    def _doubts(self, carried: np.ndarray) -> np.ndarray:
+        """(3, 3) of reasons to believe another pose than the tracked one with that covariance (3, 3)."""
+        assert self._covariance is not None
+        doubts = self._covariance.unproven
         if self._now is not None:
             beside = _beside(self._now, carried)
             excess = max(0.0, 1.0 - 4.0 / max(beside**2, 1e-9))  # that is not chance
-            covariance = covariance + excess * np.outer(self._now.offset, self._now.offset)
+            doubts = doubts + excess * np.outer(self._now.offset, self._now.offset)
         if self._other is not None:
-            covariance = covariance + np.outer(self._other, self._other)
-        return covariance
+            doubts = doubts + np.outer(self._other, self._other)
+        return doubts
 
     def _look(self, scan: Scan, map_from_base: np.ndarray, worth: float) -> Optional[FitInformation]:
         chosen = spread_evenly(scan.answered, _BEAMS)

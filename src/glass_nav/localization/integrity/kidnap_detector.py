@@ -18,7 +18,7 @@ other places from the first scan on, until it leads over them, or none has overt
 from __future__ import annotations
 
 import collections
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Deque, Optional, Tuple
 
@@ -53,6 +53,7 @@ _SETTLED_M = 6.0  # after this distance as the best candidate, the fit at the tr
 _CALM_M = 2.0  # after this distance of usual fits nothing was wrong
 _CLEAR = 3.0  # log likelihood ratio of the tracked pose to all others: it is trusted though the robot was moved
 _POOR_LEAD = 2.0  # times the margin that a place needs where scans fit worse than they did
+_OFF_MAP_M = 20.0  # where odometry leads off the map: distance over which a place elsewhere has to be the right one
 _CLOSE = -1.0  # log likelihood ratio of another place to the tracked pose from which it may be the right one
 
 
@@ -127,6 +128,7 @@ class KidnapDetector:
         self._search: Optional[GlobalSearch] = None
         self._search_m = self._calm_m = 0.0
         self._search_fit_m = 0.0  # sum of fit times distance during the search
+        self._elsewhere_m = 0.0  # distance over which another place has been the right one, as far as scans can tell
         self._odom_from_base: Optional[np.ndarray] = None
         self._continuity = ScanContinuity()
         self._moved = False  # without driving, since the last search that found the tracked pose right
@@ -205,9 +207,11 @@ class KidnapDetector:
             self._calm_m = 0.0 if doubted else self._calm_m + step_m
             prior = None if dead_reckoning is None else partial(dead_reckoning.log_likelihood, least=_CARRIED_AWAY)
             candidates = self._search.update(scan, odom_from_base, log_prior=prior, period_s=period_s)
-            self._verdict = self._compare(
-                candidates, points, map_from_base, doubted, dead_reckoning, kept, fit is not None
-            )
+            verdict = self._compare(candidates, points, map_from_base, doubted, dead_reckoning, kept, fit is not None)
+            self._elsewhere_m = 0.0 if verdict.found is None else self._elsewhere_m + step_m
+            if self._elsewhere_m < _OFF_MAP_M and self._is_off_map(dead_reckoning, points, verdict.found):
+                verdict = replace(verdict, found=None)
+            self._verdict = verdict
             if self._search is not None:
                 self._search.correct(map_from_base)
         return self._verdict
@@ -216,7 +220,7 @@ class KidnapDetector:
         self, matcher: ScanMatcher, map_from_base: np.ndarray, dead_reckoning: Optional[DeadReckoning]
     ) -> None:
         self._search = GlobalSearch(matcher, self._field, self._params, self._area)
-        self._search_m = self._calm_m = self._search_fit_m = 0.0
+        self._search_m = self._calm_m = self._search_fit_m = self._elsewhere_m = 0.0
         if dead_reckoning is None:
             self._search.add(map_from_base, 0.0 if self._moved else _HEAD_START)
         else:
@@ -285,6 +289,16 @@ class KidnapDetector:
         fit = self._fit_at(points, candidates.poses[0])
         usual = fit is not None and fit >= self._usual - self._tolerance
         return usual or (on_map and candidates.lead > _POOR_LEAD * self._params.search_margin)
+
+    def _is_off_map(
+        self, dead_reckoning: Optional[DeadReckoning], points: np.ndarray, found: Optional[np.ndarray]
+    ) -> bool:
+        """Odometry leads off the map, where a scan may look like any place of it, and not to the place found (3,)."""
+        if dead_reckoning is None or self._area is None or found is None:
+            return False
+        there = dead_reckoning.map_from_base
+        unmapped = bool(self._area.is_unmapped(there[:2])) or self._fit_at(points, there) is None
+        return unmapped and bool(dead_reckoning.mahalanobis(found[None])[0] >= _KEPT)
 
     def _fit_at(self, points: np.ndarray, map_from_base: np.ndarray) -> Optional[float]:
         """Fit of the points (B, 2) that end in mapped space, at a pose (3,); None: too few points."""

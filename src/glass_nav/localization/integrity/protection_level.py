@@ -4,9 +4,8 @@ The term is that of satellite navigation (RTCA DO-229): the error exceeds its pr
 risk. A pose that is reported as LOCALIZED while its error exceeds the level is misleading information.
 
 Errors of scan registration have heavier tails than a normal distribution, so the multiples of the standard deviation
-are those of Student's t, scaled to the same variance. A grid map gives the position of a wall to half a cell, and all
-walls of one direction may be drawn off to the same side. So the 99.9 % level is at least half a cell, however many
-beams agree.
+are those of Student's t, scaled to the same variance. However many beams agree, the map limits how well a pose can be
+known: see IntegrityMonitor.least_level_m.
 """
 
 from __future__ import annotations
@@ -40,8 +39,13 @@ class ProtectionLevels:
 UNKNOWN = ProtectionLevels(np.full(3, np.nan), np.full(3, np.nan))
 
 
-def of(map_from_base: np.ndarray, covariance: np.ndarray, resolution_m: float) -> ProtectionLevels:
-    """Levels of a pose (3,) in a map of cells so wide, with a covariance (3, 3) over x [m], y [m], yaw [rad] in map."""
+def of(map_from_base: np.ndarray, covariance: np.ndarray, least_m: float) -> ProtectionLevels:
+    """Levels of a pose (3,) with a covariance (3, 3) over x [m], y [m], yaw [rad] in map.
+
+    Args:
+        map_from_base, covariance: the pose.
+        least_m: 99.9 % level along and across that the map allows.
+    """
     cos, sin = math.cos(map_from_base[2]), math.sin(map_from_base[2])
     (xx, xy, _), (_, yy, _), (_, _, yaw) = covariance.tolist()
     along, across = (
@@ -51,5 +55,5 @@ def of(map_from_base: np.ndarray, covariance: np.ndarray, resolution_m: float) -
     deviations = [math.sqrt(max(variance, 0.0)) for variance in (along, across, yaw)]
     p95, p999 = (np.array([multiple * each for each in deviations]) for multiple in _MULTIPLES)
     p95[2], p999[2] = min(p95[2], math.pi), min(p999[2], math.pi)
-    p999[:2] = np.maximum(p999[:2], 0.5 * resolution_m)
+    p999[:2] = np.maximum(p999[:2], least_m)
     return ProtectionLevels(p95, p999)

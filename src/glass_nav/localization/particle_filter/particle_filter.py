@@ -172,8 +172,13 @@ class ParticleFilter:
 
     def move_to(self, map_from_base: np.ndarray) -> None:
         """Put all particles elsewhere as one, the best cluster's mean at a pose (3,)."""
+        self.estimate()  # of the particles as they are, which may have been drawn anew
         self.particles = se2.compose(map_from_base, se2.compose(se2.inverse(self.best.map_from_base), self.particles))
-        self.estimate()
+        members = self.best.members
+        _, covariance = pose_estimate.moments(
+            self.particles[members], self._weights[members] / self._weights[members].sum()
+        )
+        self.best = replace(self.best, map_from_base=np.array(map_from_base), covariance=covariance)
 
     def weigh_by_bearings(self, bearings: LandmarkBearings, landmarks: LandmarkMap) -> None:
         """Bearings taken where the particles are now."""

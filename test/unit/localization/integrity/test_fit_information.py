@@ -141,7 +141,7 @@ def test_the_compiled_fit_agrees_with_numpy(seed):
     rng = np.random.default_rng(seed)
     grid_map = ROOM if seed % 2 else CORRIDOR
     field = DistanceField(grid_map)
-    compiled, slow = (kind(field, RESOLUTION_M) for kind in (ScanFit, SlowScanFit))
+    compiled, slow = (kind(field, RESOLUTION_M, square=seed % 4 > 1) for kind in (ScanFit, SlowScanFit))
     for matched in rng.uniform(size=12) < 0.7:
         pose = INSIDE + rng.normal(0.0, [0.5, 0.3, 0.5])
         points_m = ends_in_room(

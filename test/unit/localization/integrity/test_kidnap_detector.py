@@ -13,6 +13,7 @@ from glass_nav.hypotheses import global_search
 from glass_nav.hypotheses.global_search import Candidates, SearchParams
 from glass_nav.hypotheses.pose_tracker import same_place
 from glass_nav.hypotheses.scan_matcher import ScanMatcher
+from glass_nav.localization.integrity import kidnap_detector
 from glass_nav.localization.integrity.dead_reckoning import DeadReckoning
 from glass_nav.localization.integrity.kidnap_detector import KidnapDetector
 from glass_nav.sensing.distance_field import DistanceField
@@ -153,6 +154,28 @@ def test_a_search_goes_on_though_the_wrong_pose_leads_off_the_map():
     verdicts = watched.drive(true[4:], outside, odom=odom[4:])
     found = next(index for index, verdict in enumerate(verdicts) if verdict.found is not None)
     assert off(verdicts[found].found, true[4 + found])[0] < 0.1
+
+
+def found_while_away(leads_back):
+    """What is found while the tracked pose leaves the map, and dead reckoning too, or it leads where the robot is."""
+    watched = Watched(edge=True)
+    watched.drive(loop_drive(10))
+    true, wrong = carried(30)
+    odom = odometry(true, watched.rng)
+    assert watched.drive(true[:4], wrong[:4], odom=odom[:4], reckoned=wrong[:4])[-1].candidates is not None
+    outside = [pose + [100.0, 0.0, 0.0] for pose in wrong[4:]]
+    verdicts = watched.drive(true[4:], outside, odom=odom[4:], reckoned=true[4:] if leads_back else outside)
+    return any(each.found is not None for each in verdicts)
+
+
+@pytest.mark.parametrize("enough_m, believed", [(20.0, False), (1.0, True)])
+def test_where_odometry_leads_off_the_map_another_place_is_not_believed_at_once(monkeypatch, enough_m, believed):
+    monkeypatch.setattr(kidnap_detector, "_OFF_MAP_M", enough_m)
+    assert found_while_away(leads_back=False) == believed
+
+
+def test_a_robot_that_returns_to_the_map_where_odometry_leads_is_believed():
+    assert found_while_away(leads_back=True)
 
 
 def test_off_the_map_nothing_is_doubted_that_was_not_before():

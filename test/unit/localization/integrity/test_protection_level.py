@@ -26,7 +26,7 @@ def test_levels_bound_errors_of_the_claimed_variance(freedom):
 
 
 def test_no_pose_is_surer_than_the_map_says_where_its_walls_are():
-    levels = protection_level.of(np.zeros(3), np.diag([1e-6, 1e-2, 1e-6]), 0.1)
+    levels = protection_level.of(np.zeros(3), np.diag([1e-6, 1e-2, 1e-6]), 0.05)
     assert levels.p999[0] == 0.05 and levels.p999[1] > 0.3
     assert levels.p95[0] < 0.003 and levels.p999[2] < 0.01
 
