@@ -361,7 +361,7 @@ class Localizer:
         registration = self._filter.register(scan, odom_from_base, self._classifier, carried)
         cases, expected = self._classifier.classify(scan, registration.map_from_base, registration.covariance)
         if registration.fits:
-            self._classifier.learn(scan, expected)
+            self._classifier.learn(scan, expected, registration.map_from_base)
         self._filter.weigh(scan, cases, registration, self._classifier)
         self._filter.estimate()
         self._filter.resample()
