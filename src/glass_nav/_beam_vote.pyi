@@ -27,6 +27,7 @@ def soft_votes(
     returns: np.ndarray,  # (B,) float64
     unmapped_end: np.ndarray,  # (B,) bool
     glass: np.ndarray,  # (2, 2, B) float64
+    target_returns: np.ndarray,  # (B,) float64
     gains: np.ndarray,  # (C,) float64
     frequencies: np.ndarray,  # (C,) float64
     porous_returns: float,
@@ -69,7 +70,7 @@ def seen_from(
 def pane_echoes(
     measured_m: np.ndarray,  # (B,) float64
     range_m: np.ndarray,  # (4, B) float64
-    mirrored_cos: np.ndarray,  # (B,) float64
+    cos: np.ndarray,  # (4, B) float64
     turned_rad: np.ndarray,  # (B,) float64
     reflectance: np.ndarray,  # (B,) float64
     seen_side: np.ndarray,  # (4, B) bool

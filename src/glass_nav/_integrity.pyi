@@ -6,8 +6,6 @@ from glass_nav._distance_field import DistanceField
 
 class ScanFit:
     def __init__(self, resolution_m: float, square: bool) -> None: ...
-    @property
-    def wall_deviation_m(self) -> float: ...
     def of(
         self,
         field: DistanceField,

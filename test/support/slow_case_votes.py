@@ -22,7 +22,7 @@ _OTHER_SURFACE_M = 0.3  # between two expected ranges: an edge lies between them
 _REPORTED_GATES = 2.0  # the samples that won the vote may be one gate away from the reported pose
 _UNSEEN_SIDE = 0.002  # probability that a beam meets a wall from an unmapped side, over that from the mapped side
 _MIN_SEEN_THROUGH = 0.05  # a cell may hold a post and the edge of the pane beside it
-_MIRROR_MIN_SHARE = 0.65  # of the vote: a beam that is called mirrored wrongly costs more than an uncertain one
+_MIRROR_MIN_SHARE = 0.4  # of the vote: a beam that is called mirrored wrongly costs more than an uncertain one
 _TEMPER = 0.2  # of a sample's evidence: the errors of beams are correlated, and the best sample shall not vote alone
 _REACH, _ROUNDS = 2, 3  # of the pull between neighbouring beams
 _BY_SAMPLE = ("range_m", "cos_incidence", "thickness_m")  # fields of ExpectedRanges that hold all samples
@@ -47,11 +47,12 @@ def classify(
     max_range_m: float,
     unmapped_end: np.ndarray,
     coatings: Coatings,
+    target_returns: np.ndarray,
 ) -> BeamCases:
     """As case_votes.classify(), by the soft vote."""
     answered = np.isfinite(measured_m)
     at_pose = _inside_walls(_of_sample_0(expected), residuals)
-    prior = _priors(measured_m, at_pose, residuals, glass, max_range_m, unmapped_end, coatings, vote)
+    prior = _priors(measured_m, at_pose, residuals, glass, max_range_m, unmapped_end, coatings, vote, target_returns)
     alone = _soft_votes(measured_m, expected, residuals, vote, prior)
     share = _pulled(alone, answered, vote.neighbour_pull)
     doubtful = alone[BeamCase.SPECULAR] < _MIRROR_MIN_SHARE  # and neighbours would only repeat it
@@ -165,6 +166,7 @@ def _priors(
     unmapped_end: np.ndarray,
     coatings: Coatings,
     vote: CaseVote,
+    target_returns: np.ndarray,
 ) -> np.ndarray:
     """(6, B) prior of cases 1 to 4, then of the ends that are case 0: at the second surface where the first is gone, and
     behind a pane at something that no map shows, as a density on the scale of those of the cases.
@@ -176,7 +178,7 @@ def _priors(
     first = np.clip(first, _MIN_SEEN_THROUGH, 1.0)
     passes = first * there * (1.0 - glass_return_model.min_share(incidence))
     echoes = _echoes(measured_m, expected, residuals.sigma_m, max_range_m, vote.mirror_gain, unmapped_end, coatings)
-    mirrored = passes * echoes.mirrored
+    mirrored = passes * echoes.mirrored * target_returns
     behind = (passes - mirrored) * (1.0 - vote.prior_uncertain_behind)
     passes_again = second * (1.0 - glass_return_model.min_share(np.full(len(first), np.nan)))
     gone = first * (1.0 - there)

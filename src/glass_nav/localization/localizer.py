@@ -360,7 +360,7 @@ class Localizer:
         registration = self._filter.register(scan, odom_from_base, self._classifier, carried)
         cases, expected = self._classifier.classify(scan, registration.map_from_base, registration.covariance)
         if registration.fits:
-            self._classifier.learn(scan, expected)
+            self._classifier.learn(scan, expected, registration.map_from_base)
         self._filter.weigh(scan, cases, registration, self._classifier)
         self._filter.estimate()
         self._filter.resample()
@@ -457,7 +457,7 @@ class Localizer:
             seen is not None,
             judgement.confidence,
             judgement.places,
-            protection_level.of(map_from_base, claimed, self._integrity.least_level_m),
+            protection_level.of(map_from_base, covariance, 0.5 * self._grid_map.resolution_m),
         )
 
     def _look_for_panes(self, scan: Scan, estimate: Estimate) -> None:

@@ -64,8 +64,7 @@ PYBIND11_MODULE(_integrity, module) {
   py::class_<ScanFit>(module, "ScanFit")
       .def(py::init<double, bool>(), py::arg("resolution_m"), py::arg("square"))
       .def("of", &fit_of, py::arg("field"), py::arg("points_m"), py::arg("laser_m"), py::arg("map_from_base"),
-           py::arg("beam_share"), py::arg("worth"))
-      .def_property_readonly("wall_deviation_m", &ScanFit::wall_deviation_m);
+           py::arg("beam_share"), py::arg("worth"));
   module.def(
       "better_of",
       [](const Array& first, const Array& second) { return array_of(better_of(matrix_of(first), matrix_of(second))); },

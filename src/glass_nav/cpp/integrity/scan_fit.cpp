@@ -141,7 +141,7 @@ FitInformation ScanFit::of(const DistanceField& field, const SeenScan& scan, dou
   const Matrix3 inverted = inverse(information + Matrix3::diagonal(kPriorBeams));
   Matrix3 covariance = inverted * spread_of(beams, pieces, beam_share) * inverted;
   if (matched) {
-    if (square_) covariance = covariance + Matrix3::diagonal(kCommon * square(wall_deviation_m()));
+    if (square_) covariance = covariance + Matrix3::diagonal(kCommon * (variance(kSide) + variance(kPiece)));
     for (double& value : covariance.values) value /= worth;
     const double pieces_per_beam = static_cast<double>(pieces.size()) / static_cast<double>(beams.size());
     widen(field, pose, beams, information, lever_m, worth * pieces_per_beam, covariance);
@@ -308,8 +308,6 @@ double ScanFit::added_variance(const DistanceField& field, const Vector3& pose, 
   }
   return variance_of(loss) - std::max(variance_of(linearized), variance);
 }
-
-double ScanFit::wall_deviation_m() const { return std::sqrt(variance(kSide) + variance(kPiece)); }
 
 double ScanFit::variance(Size size) const {
   return std::max(squares_[size] / std::max(freedom_[size], 1e-3), square(square_ ? kMinSquareM : kMinDeviationM));

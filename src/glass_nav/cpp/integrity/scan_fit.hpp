@@ -35,9 +35,6 @@ class ScanFit {
   /// 0: the pose was not fitted to this scan.
   FitInformation of(const DistanceField& field, const SeenScan& scan, double beam_share, double worth);
 
-  /// Of a piece of wall from where the map has it.
-  double wall_deviation_m() const;
-
  private:
   static constexpr int kSides = 8;  // directions that walls face
   enum Size { kOffset, kSide, kPiece, kBeam, kSizes };

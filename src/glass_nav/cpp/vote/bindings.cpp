@@ -76,10 +76,10 @@ py::array_t<double> soft_votes(const Array<double>& measured_m, const Array<doub
                                const Array<float>& thickness_m, const Array<double>& axis_rad,
                                const Array<bool>& seen_side, const Array<double>& reflectance,
                                const Array<double>& returns, const Array<bool>& unmapped_end,
-                               const Array<double>& glass, const Array<double>& gains, const Array<double>& frequencies,
-                               double porous_returns, double uncertain, double uncertain_behind, double max_range_m,
-                               double depth_share, double sigma_m, double gate_m, double min_cos, double temper,
-                               double pull) {
+                               const Array<double>& glass, const Array<double>& target_returns,
+                               const Array<double>& gains, const Array<double>& frequencies, double porous_returns,
+                               double uncertain, double uncertain_behind, double max_range_m, double depth_share,
+                               double sigma_m, double gate_m, double min_cos, double temper, double pull) {
   const Offers offers = offers_of(measured_m, range_m, cos, thickness_m);
   check_rows(axis_rad, kPaths, offers, "axes must be (4, B)");
   check_rows(seen_side, kPaths, offers, "seen sides must be (4, B)");
@@ -87,13 +87,15 @@ py::array_t<double> soft_votes(const Array<double>& measured_m, const Array<doub
   check_rows(returns, 1, offers, "returns must be (B,)");
   check_rows(unmapped_end, 1, offers, "unmapped ends must be (B,)");
   check_rows(glass, 4, offers, "chances of glass must be (2, 2, B)");
+  check_rows(target_returns, 1, offers, "returns of mirrored surfaces must be (B,)");
   const PoseView view{axis_rad.data(),
                       seen_side.data(),
                       reflectance.data(),
                       returns.data(),
                       unmapped_end.data(),
                       glass.data(),
-                      glass.data() + 2 * offers.beams};
+                      glass.data() + 2 * offers.beams,
+                      target_returns.data()};
   const PaneModel panes = panes_of(gains, frequencies, sigma_m, max_range_m, min_cos);
   const SoftVote vote{{porous_returns, uncertain, uncertain_behind}, depth_share, gate_m, temper, pull};
   py::array_t<double> share = shares_for(offers);
@@ -306,10 +308,10 @@ PYBIND11_MODULE(_beam_vote, module) {
              py::arg("gate_m"), py::arg("min_cos"), py::arg("temper"));
   module.def("soft_votes", &soft_votes, py::arg("measured_m"), py::arg("range_m"), py::arg("cos"),
              py::arg("thickness_m"), py::arg("axis_rad"), py::arg("seen_side"), py::arg("reflectance"),
-             py::arg("returns"), py::arg("unmapped_end"), py::arg("glass"), py::arg("gains"), py::arg("frequencies"),
-             py::arg("porous_returns"), py::arg("uncertain"), py::arg("uncertain_behind"), py::arg("max_range_m"),
-             py::arg("depth_share"), py::arg("sigma_m"), py::arg("gate_m"), py::arg("min_cos"), py::arg("temper"),
-             py::arg("pull"));
+             py::arg("returns"), py::arg("unmapped_end"), py::arg("glass"), py::arg("target_returns"), py::arg("gains"),
+             py::arg("frequencies"), py::arg("porous_returns"), py::arg("uncertain"), py::arg("uncertain_behind"),
+             py::arg("max_range_m"), py::arg("depth_share"), py::arg("sigma_m"), py::arg("gate_m"), py::arg("min_cos"),
+             py::arg("temper"), py::arg("pull"));
   module.def("decided", &decided, py::arg("share"), py::arg("measured_m"), py::arg("range_m"), py::arg("cos"),
              py::arg("thickness_m"), py::arg("min_share"), py::arg("gate_m"), py::arg("depth_share"),
              py::arg("min_cos"));

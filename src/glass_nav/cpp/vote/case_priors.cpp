@@ -59,7 +59,7 @@ void case_priors(const Offers& offers, const PoseView& view, const PaneModel& pa
     const PaneEcho echo = pane_echo(pane_beams[b], panes);
     const double through = std::min(std::max(view.seen_through[b], kMinSeenThrough), 1.0);
     const double passes = through * view.there[b] * (1.0 - view.returns[b]), gone = through * (1.0 - view.there[b]);
-    const double mirrored = passes * echo.mirrored;
+    const double mirrored = passes * echo.mirrored * view.target_returns[b];
     const double behind = (passes - mirrored) * (1.0 - model.uncertain_behind);
     const double again = view.seen_through[beams + b] * (1.0 - model.porous_returns);
     const double peak_m = std::sqrt(2.0 * kPi) * panes.sigma_m / std::max(pane_beams[b].cos[kMirrored], panes.min_cos);

@@ -8,13 +8,14 @@ namespace glass_nav {
 
 /// What is known of a beam's surfaces at the pose itself. Row-major arrays of kPaths * beams, or beams.
 struct PoseView {
-  const double* axis_rad;      // kPaths * beams: of the walls, of mirrored ones that of the image; NaN: none
-  const bool* seen_side;       // kPaths * beams: met from a side that a mapper saw
-  const double* reflectance;   // of clear glass at the incidence
-  const double* returns;       // share of beams that a pane returns at that incidence
-  const bool* unmapped_end;    // a mapper did not see where the beam ended
-  const double* seen_through;  // 2 * beams: probability that the first, the second surface can be seen through
-  const double* there;         // beams: probability that the first surface is there, if it can be seen through
+  const double* axis_rad;        // kPaths * beams: of the walls, of mirrored ones that of the image; NaN: none
+  const bool* seen_side;         // kPaths * beams: met from a side that a mapper saw
+  const double* reflectance;     // of clear glass at the incidence
+  const double* returns;         // share of beams that a pane returns at that incidence
+  const bool* unmapped_end;      // a mapper did not see where the beam ended
+  const double* seen_through;    // 2 * beams: probability that the first, the second surface can be seen through
+  const double* there;           // beams: probability that the first surface is there, if it can be seen through
+  const double* target_returns;  // beams: share that comes back from the surface at the end of the mirrored path
 };
 
 struct PriorModel {

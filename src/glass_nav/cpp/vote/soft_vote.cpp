@@ -8,7 +8,7 @@ namespace glass_nav {
 namespace {
 
 // A beam that is called mirrored wrongly costs more than an uncertain one, and neighbours would only repeat it.
-constexpr double kMirrorMinShare = 0.65;
+constexpr double kMirrorMinShare = 0.4;
 constexpr std::size_t kUncertain = 0, kSpecular = 2;  // rows of the shares
 
 }  // namespace

@@ -25,6 +25,7 @@ from glass_nav.localization.beam_classification.behind_panes import UNKNOWN_COAT
 from glass_nav.localization.beam_classification.case_votes import BeamCases, CaseVote
 from glass_nav.localization.beam_classification.expected_ranges import MIN_COS, ExpectedRanges
 from glass_nav.localization.beam_classification.glass_map import GlassEvidence, GlassMap
+from glass_nav.localization.beam_classification.glass_return_model import ObliqueReturns
 from glass_nav.localization.beam_classification.preliminary_samples import PreliminarySamples
 from glass_nav.localization.beam_classification.range_residuals import RangeResiduals
 from glass_nav.localization.beam_classification.surface_scan import SurfaceScan
@@ -68,6 +69,7 @@ class BeamClassifier:
         self.residuals = RangeResiduals(_DEPTH_SHARE, params.min_sigma_m)
         self.glass_map = GlassMap(grid_map, params.glass)
         self._coatings = UNKNOWN_COATINGS
+        self._oblique_returns = ObliqueReturns()
 
     def reconfigure(self, params: BeamClassifierParams) -> None:
         """Use other parameters from the next scan on; what was learnt stays."""
@@ -110,16 +112,19 @@ class BeamClassifier:
         if for_weights:  # the glass map learns from them, too
             behind_m = max(behind_m, glass_map.reach_m(self.residuals))
         expected = self._expected(scan, samples, behind_m)
-        glass = self.glass_map.chances(expected.cell[[0, 2], 0])
+        glass = self.glass_map.chances(
+            expected.cell[[0, 2, 1], 0]
+        )  # of the first surface, the second, and a mirrored one
         cases = case_votes.classify(
             scan.ranges_m,
             expected,
             self.residuals,
             self._params.vote,
-            glass,
+            glass[:, :2],
             scan.range_max_m,
             self._at_ends(self.known_area.is_unmapped, scan, map_from_base),
             self._coatings,
+            self._oblique_returns.of_surfaces(expected.cos_incidence[1, 0], glass[0, 2]),
         )
         return cases, expected
 
@@ -131,8 +136,8 @@ class BeamClassifier:
         """The cases with the ranges and residuals of the pose that `expected` is of."""
         return case_votes.as_seen_from(cases, scan.ranges_m, expected, self.residuals, self._params.vote)
 
-    def learn(self, scan: Scan, expected: ExpectedRanges) -> None:
-        """Learn where beams end in walls, and which walls let them pass; `expected` is of a trusted pose."""
+    def learn(self, scan: Scan, expected: ExpectedRanges, map_from_base: np.ndarray) -> None:
+        """Learn where beams end in walls, and which walls let them pass; `expected` is of a trusted pose (3,)."""
         with np.errstate(invalid="ignore"):
             across = (scan.ranges_m - expected.line_m[0]) * expected.cos_incidence[0, 0] + expected.face_m
         met = np.isfinite(across)
@@ -140,7 +145,23 @@ class BeamClassifier:
             across[met], expected.thickness_m[0, 0][met], self._params.min_sigma_m, self._params.max_sigma_m
         )
         self._coatings = case_votes.learn_coatings(
-            self._coatings, scan.ranges_m, expected, self.residuals, self._params.vote
+            self._coatings,
+            scan.ranges_m,
+            expected,
+            self.residuals,
+            self._params.vote,
+            scan.range_max_m,
+            self._at_ends(self.known_area.is_unmapped, scan, map_from_base),
+            self._oblique_returns.of_surfaces(
+                expected.cos_incidence[1, 0], self.glass_map.chances(expected.cell[1, 0])[0]
+            ),
+        )
+        self._oblique_returns = self._oblique_returns.learn(
+            scan.ranges_m,
+            expected.line_m[0],
+            expected.pane_incidence[0],
+            self.glass_map.chances(expected.cell[0, 0])[0],
+            case_votes.gate_m(self.residuals, self._params.vote),
         )
         self.glass_map.learn(*glass_map.crossings(scan.ranges_m, expected, self.residuals))
 

@@ -23,7 +23,7 @@ _PANE_INDEX = 1.51  # of soda-lime glass
 COATINGS = np.array([0.5, 1.0, 2.0])  # times the usual reflectance; which it is, is learnt while driving
 _FREQUENT = np.array([0.5, 0.25, 0.25])  # until then
 _WRONG = 0.05  # share of the echoes that are told wrongly, whatever the coating
-_SCAN_SHARE, _SCAN_BEAMS, _MOST_LOG = 0.5, 5.0, 4.0  # beams of one scan are one piece of evidence; it is bounded
+_SCAN_SHARE, _SCAN_BEAMS, _MOST_LOG = 0.5, 5.0, 3.2  # beams of one scan are one piece of evidence; it is bounded
 _MOST_REFLECTED = 0.9
 _OTHER_WALL = 2.0  # steepness of a victory: reflectances of other walls differ by factors
 _FIRST, _MIRRORED, _SECOND = BeamCase.DIFFUSE - 1, BeamCase.SPECULAR - 1, BeamCase.FIRST_PENETRATION - 1
@@ -70,7 +70,40 @@ class Coatings:
         log_odds = self.log_odds + added
         return Coatings(np.maximum(log_odds - log_odds.max(), -_MOST_LOG))
 
+    def learn_from_open_ends(
+        self,
+        measured_m: np.ndarray,
+        expected: ExpectedRanges,
+        sigma_m: float,
+        gate_m: float,
+        max_range_m: float,
+        gain: float,
+        unmapped_end: np.ndarray,
+        target_returns: np.ndarray,
+    ) -> "Coatings":
+        """Learn from the beams that ended where the map knows nothing: did the mirrored echo win over what is there?"""
+        mirrored_m = expected.range_m[_MIRRORED, 0]
+        cos = np.maximum(expected.cos_incidence[_MIRRORED, 0], MIN_COS)
+        with np.errstate(invalid="ignore"):
+            across_m = np.abs(measured_m - mirrored_m) * cos
+            told = unmapped_end & np.isfinite(mirrored_m) & ((across_m <= 3.0 * sigma_m) | (across_m > 2.0 * gate_m))
+            told &= measured_m - expected.range_m[_FIRST, 0] > 2.0 * gate_m / MIN_COS
+        if not told.any():
+            return self
+        at_mirrored = across_m[told] <= 3.0 * sigma_m
+        chance = np.stack(
+            [
+                target_returns * of(measured_m, expected, sigma_m, max_range_m, gain, unmapped_end, one).mirrored
+                for one in _EACH_COATING
+            ]
+        )[:, told]
+        likelihood = _WRONG + (1.0 - 2.0 * _WRONG) * np.where(at_mirrored, chance, 1.0 - chance)
+        added = _SCAN_SHARE * min(len(at_mirrored) / _SCAN_BEAMS, 1.0) * np.log(likelihood).mean(axis=1)
+        log_odds = self.log_odds + added
+        return Coatings(np.maximum(log_odds - log_odds.max(), -_MOST_LOG))
 
+
+_EACH_COATING = [Coatings(np.where(np.arange(len(COATINGS)) == each, 0.0, -np.inf)) for each in range(len(COATINGS))]
 UNKNOWN_COATINGS = Coatings(np.log(_FREQUENT))
 
 

@@ -86,6 +86,7 @@ def classify(
     max_range_m: float,
     unmapped_end: Optional[np.ndarray] = None,
     coatings: Coatings = UNKNOWN_COATINGS,
+    target_returns: Optional[np.ndarray] = None,
 ) -> BeamCases:
     """Cases of the beams of one scan.
 
@@ -101,13 +102,19 @@ def classify(
         unmapped_end: (B,) bool: the mapper did not see the place where the beam ended; None: it saw all. For the soft
             vote.
         coatings: of the panes, as far as they are known; for the soft vote.
+        target_returns: (B,) share of beams that come back from the surface at the end of the mirrored path, which may be
+            a pane; None: all. For the soft vote.
     """
     if vote.vote_mode == "paper":
         share = _paper_votes(measured_m, expected, residuals, vote)  # (5, B), column sums 1
     else:
         if unmapped_end is None:
             unmapped_end = np.zeros(len(measured_m), bool)
-        share = _soft_votes(measured_m, expected, residuals, vote, glass, max_range_m, unmapped_end, coatings)
+        if target_returns is None:
+            target_returns = np.ones(len(measured_m))
+        share = _soft_votes(
+            measured_m, expected, residuals, vote, glass, max_range_m, unmapped_end, coatings, target_returns
+        )
     return BeamCases(
         *_beam_vote.decided(
             share,
@@ -147,11 +154,28 @@ def as_seen_from(
 
 
 def learn_coatings(
-    coatings: Coatings, measured_m: np.ndarray, expected: ExpectedRanges, residuals: RangeResiduals, vote: CaseVote
+    coatings: Coatings,
+    measured_m: np.ndarray,
+    expected: ExpectedRanges,
+    residuals: RangeResiduals,
+    vote: CaseVote,
+    max_range_m: float,
+    unmapped_end: np.ndarray,
+    target_returns: np.ndarray,
 ) -> Coatings:
     """Learn the coating of the panes from sample 0 of `expected`, a trusted pose."""
     at_pose = _inside_walls(_of_sample_0(expected), residuals)
-    return coatings.learn(measured_m, at_pose, residuals.sigma_m, gate_m(residuals, vote), vote.mirror_gain)
+    coatings = coatings.learn(measured_m, at_pose, residuals.sigma_m, gate_m(residuals, vote), vote.mirror_gain)
+    return coatings.learn_from_open_ends(
+        measured_m,
+        at_pose,
+        residuals.sigma_m,
+        gate_m(residuals, vote),
+        max_range_m,
+        vote.mirror_gain,
+        unmapped_end,
+        target_returns,
+    )
 
 
 def _of_sample_0(expected: ExpectedRanges) -> ExpectedRanges:
@@ -201,6 +225,7 @@ def _soft_votes(
     max_range_m: float,
     unmapped_end: np.ndarray,
     coatings: Coatings,
+    target_returns: np.ndarray,
 ) -> np.ndarray:
     """(5, B) posterior over the cases; samples are weighted by how well each explains the scan.
 
@@ -226,6 +251,7 @@ def _soft_votes(
         glass_return_model.min_share(incidence),
         unmapped_end,
         glass,
+        target_returns,
         vote.mirror_gain * behind_panes.COATINGS,
         coatings.frequencies(),
         float(glass_return_model.min_share(np.array(np.nan))),

@@ -1,7 +1,8 @@
 """The covariance that is reported with a pose: as wide as its errors, and no wider.
 
 What decides inside the filter, such as how much odometry counts against an ambiguous scan, uses the wider covariance of
-integrity_monitor.py. There a covariance that is too small once costs the pose, and one that is too wide costs little. To
+integrity_monitor.py, and so do protection levels, which must also bound what no scan shows: a map that is drawn off as a
+whole by a fraction of a cell. There a covariance that is too small once costs the pose, and one that is too wide costs little. To
 a user both are wrong. So the reported one measures residuals more sharply (fit_information.py, `square`), from more
 beams. In all else it is propagated in the same way (pose_covariance.py).
 """
@@ -22,7 +23,6 @@ from glass_nav.sensing.known_area import KnownArea
 from glass_nav.sensing.scan import Scan, spread_evenly
 
 _BEAMS, _MIN_BEAMS = 180, 10
-_UNIFORM = 3.0**0.5  # half the width of a uniform distribution, in its standard deviations
 
 
 class ClaimedCovariance:
@@ -36,16 +36,6 @@ class ClaimedCovariance:
         self._field, self._known_area = field, known_area
         self._fit = ScanFit(field, known_area.resolution_m, square=True)
         self._covariance = PoseCovariance(SURE)
-
-    @property
-    def least_level_m(self) -> float:
-        """Least 99.9 % level of a position: how far off walls are drawn.
-
-        In a grid map that is up to half a cell, and all walls that face one way may be off to the same side. Where
-        pieces of walls agree better with each other, they are drawn better: errors of a uniform distribution are at most
-        sqrt(3) of its standard deviations.
-        """
-        return min(0.5 * self._known_area.resolution_m, _UNIFORM * self._fit.wall_deviation_m)
 
     def start(self, covariance: np.ndarray) -> None:
         """The pose was placed anew, with a covariance (3, 3)."""

@@ -52,11 +52,6 @@ class ScanFit:
         self._field = field
         self._compiled = _integrity.ScanFit(resolution_m, square)
 
-    @property
-    def wall_deviation_m(self) -> float:
-        """Standard deviation of a piece of wall from where the map has it, as it was learnt."""
-        return float(self._compiled.wall_deviation_m)
-
     def of(
         self, points_m: np.ndarray, laser_m: np.ndarray, map_from_base: np.ndarray, beam_share: float, worth: float
     ) -> FitInformation:

@@ -123,11 +123,6 @@ class IntegrityMonitor:
             self._covariance.narrow(spread)
             self._claimed.narrow(spread)
 
-    @property
-    def least_level_m(self) -> float:
-        """Least 99.9 % level of a position [m] that the map allows."""
-        return self._claimed.least_level_m
-
     def at(self, step: Optional[np.ndarray], noise: OdometryNoise, spread: np.ndarray) -> np.ndarray:
         """(3, 3) covariance at the present scan, for decisions.
 

@@ -5,7 +5,7 @@ risk. A pose that is reported as LOCALIZED while its error exceeds the level is 
 
 Errors of scan registration have heavier tails than a normal distribution, so the multiples of the standard deviation
 are those of Student's t, scaled to the same variance. However many beams agree, the map limits how well a pose can be
-known: see IntegrityMonitor.least_level_m.
+known: a grid map gives the position of a wall to half a cell, and all walls may be drawn off to the same side.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ def learnt(passes=True):
     for x in np.linspace(3.0, 5.0, 10):
         pose = np.array([x, 1.8, 0.0])
         scan, _ = seen(passes, pose)
-        classifier.learn(scan, classifier.classify(scan, pose, NARROW)[1])
+        classifier.learn(scan, classifier.classify(scan, pose, NARROW)[1], pose)
     return classifier
 
 
@@ -96,7 +96,7 @@ def test_how_thick_glass_may_be_can_change_at_run_time():
             pose = np.array([x, 2.0, 0.0])
             scan, _ = seen(True, pose)
             cases, expected = classifier.classify(scan, pose, NARROW)
-            classifier.learn(scan, expected)
+            classifier.learn(scan, expected, pose)
         return classifier.surfaces(scan, cases, expected, True).ranges_m
 
     thin_ranges, thick_ranges = surfaces(PARAMS, PARAMS), surfaces(thick, thick)

@@ -100,3 +100,29 @@ def test_how_much_panes_mirror_is_learnt_from_echoes_that_are_not_in_doubt(measu
     assert coatings.learn(np.full(1, measured_m), next_pane, SIGMA_M, 0.15, 2.0) is coatings
     doubtful = expect(first=2.0, mirrored=6.0, second=6.1, incidence=np.radians(65.0))
     assert coatings.learn(np.array([6.0]), doubtful, SIGMA_M, 0.15, 2.0) is coatings
+
+
+@pytest.mark.parametrize(
+    "measured_m, stronger", [pytest.param(6.0, True, id="mirrored"), pytest.param(9.0, False, id="behind")]
+)
+def test_how_much_panes_mirror_is_learnt_from_beams_that_ended_where_the_map_knows_nothing(measured_m, stronger):
+    def learnt(unmapped_end, returns=1.0):
+        coatings = UNKNOWN_COATINGS
+        for _ in range(20):
+            coatings = coatings.learn_from_open_ends(
+                np.full(1, measured_m),
+                expect(first=2.0, mirrored=6.0, incidence=np.radians(50.0)),
+                SIGMA_M,
+                0.15,
+                RANGE_MAX_M,
+                2.0,
+                np.array([unmapped_end]),
+                np.array([returns]),
+            )
+        return coatings.frequencies()
+
+    before = UNKNOWN_COATINGS.frequencies()
+    assert (learnt(True)[-1] > before[-1]) == stronger
+    assert np.array_equal(learnt(False), before)
+    by_a_pane = learnt(True, returns=0.01)  # which mostly returns nothing, whatever mirrors
+    assert np.ptp(by_a_pane / before) < np.ptp(learnt(True) / before)

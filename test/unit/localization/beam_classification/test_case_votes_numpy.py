@@ -41,7 +41,7 @@ def drawn(seed):
     measured_m[rng.uniform(size=BEAMS) < 0.05] = np.nan
     glass = rng.uniform(0.3, 1.0, (2, 2, BEAMS))
     unmapped_end = rng.uniform(size=BEAMS) < 0.3
-    return measured_m, expected, glass, unmapped_end, Coatings(rng.normal(0.0, 1.0, 3))
+    return measured_m, expected, glass, unmapped_end, Coatings(rng.normal(0.0, 1.0, 3)), rng.uniform(0.1, 1.0, BEAMS)
 
 
 def same(found, wanted):
@@ -52,8 +52,8 @@ def same(found, wanted):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_compiled_vote_is_that_of_numpy(seed):
-    measured_m, expected, glass, unmapped_end, coatings = drawn(seed)
-    arguments = measured_m, expected, RESIDUALS, VOTE, glass, RANGE_MAX_M, unmapped_end, coatings
+    measured_m, expected, *known = drawn(seed)
+    arguments = measured_m, expected, RESIDUALS, VOTE, known[0], RANGE_MAX_M, *known[1:]
     found = case_votes.classify(*arguments)
     assert set(found.case) == {0, 1, 2, 3, 4}
     same(found, slow_case_votes.classify(*arguments))
@@ -61,8 +61,8 @@ def test_the_compiled_vote_is_that_of_numpy(seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_what_is_seen_from_another_pose_is_as_in_numpy(seed):
-    measured_m, expected, glass, unmapped_end, coatings = drawn(seed)
-    cases = case_votes.classify(measured_m, expected, RESIDUALS, VOTE, glass, RANGE_MAX_M, unmapped_end, coatings)
+    measured_m, expected, *known = drawn(seed)
+    cases = case_votes.classify(measured_m, expected, RESIDUALS, VOTE, known[0], RANGE_MAX_M, *known[1:])
     moved_m = np.random.default_rng(seed).choice([0.0, 0.1, 0.25, 0.4], expected.range_m.shape)
     elsewhere = replace(expected, range_m=expected.range_m + moved_m, cos_incidence=np.ones(expected.range_m.shape))
     arguments = cases, measured_m, elsewhere, RESIDUALS, replace(VOTE, case_gate_m=0.05)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from glass_nav.localization.beam_classification import glass_return_model
+from glass_nav.localization.beam_classification.glass_return_model import ObliqueReturns
 
 INCIDENCE_RAD = np.radians(np.linspace(0.0, 89.0, 90))
 
@@ -32,3 +33,28 @@ def test_what_has_no_normal_is_neither_pane_nor_wall():
         assert answers.shape == (2, 2)
         assert answers[0, 0] == answers[1, 1] and 0.1 < answers[0, 0] < 0.9
         assert answers[0, 1] == share(np.zeros(1))[0]
+
+
+def test_how_many_beams_come_back_from_oblique_panes_is_learnt():
+    count, oblique = 400, np.radians(60.0)
+    returned = np.arange(count) < count // 4
+
+    def learnt(incidence_rad=oblique, glass=1.0):
+        returns = ObliqueReturns()
+        for _ in range(30):
+            measured_m = np.where(returned, 2.0, 8.0)
+            returns = returns.learn(
+                measured_m, np.full(count, 2.0), np.full(count, incidence_rad), np.full(count, glass), 0.15
+            )
+        return returns.share
+
+    usual = ObliqueReturns().share
+    assert learnt() == pytest.approx(0.25, abs=0.01)
+    assert learnt(incidence_rad=0.1) == learnt(incidence_rad=np.nan) == learnt(glass=0.5) == usual
+
+
+def test_a_surface_that_may_be_a_pane_returns_fewer_beams():
+    returns = ObliqueReturns()
+    wall, unsure, pane = returns.of_surfaces(np.full(3, 0.5), np.array([0.0, 0.5, 1.0]))
+    assert wall == 1.0 > unsure > pane == pytest.approx(returns.share)
+    assert returns.of_surfaces(np.ones(1), np.ones(1))[0] > 0.8  # head on

@@ -58,7 +58,7 @@ def test_a_spread_of_millimetres_is_no_doubt_and_one_of_decimetres_is():
     np.testing.assert_allclose(deviations(claimed.at(None, NOISE, wide)), deviations(wide), rtol=0.01)
 
 
-def test_walls_that_are_drawn_off_widen_it_and_its_least_level():
+def test_walls_that_are_drawn_off_widen_it():
     """The same scans in a map in which every second metre of the walls is drawn a cell off."""
     rows, columns = np.nonzero(GRID.occupied)
     moved = (rows + columns) * GRID.resolution_m % 2.0 > 1.0
@@ -67,13 +67,6 @@ def test_walls_that_are_drawn_off_widen_it_and_its_least_level():
     right, wrong = followed(), followed(grid_map=replace(GRID, occupancy=occupancy))
     assert np.all(
         deviations(wrong.at(None, NOISE, NO_SPREAD))[:2] > 1.5 * deviations(right.at(None, NOISE, NO_SPREAD))[:2]
-    )
-    assert right.least_level_m < wrong.least_level_m <= 0.5 * GRID.resolution_m
-
-
-def test_before_any_scan_the_least_level_is_half_a_cell():
-    assert ClaimedCovariance(DistanceField(GRID), KnownArea(GRID)).least_level_m == pytest.approx(
-        0.5 * GRID.resolution_m
     )
 
 
