@@ -318,7 +318,7 @@ PYBIND11_MODULE(_beam_vote, module) {
   module.def("seen_from", &seen_from, py::arg("case"), py::arg("expected_m"), py::arg("weight"), py::arg("measured_m"),
              py::arg("range_m"), py::arg("cos"), py::arg("thickness_m"), py::arg("gate_m"), py::arg("depth_share"),
              py::arg("min_cos"));
-  module.def("pane_echoes", &pane_echoes, py::arg("measured_m"), py::arg("range_m"), py::arg("mirrored_cos"),
+  module.def("pane_echoes", &pane_echoes, py::arg("measured_m"), py::arg("range_m"), py::arg("cos"),
              py::arg("turned_rad"), py::arg("reflectance"), py::arg("seen_side"), py::arg("unmapped_end"),
              py::arg("gains"), py::arg("frequencies"), py::arg("sigma_m"), py::arg("max_range_m"), py::arg("min_cos"));
   module.def("reflectance", &reflectance, py::arg("incidence_rad"), py::arg("index"));
