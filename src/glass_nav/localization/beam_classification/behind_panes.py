@@ -24,6 +24,8 @@ COATINGS = np.array([0.5, 1.0, 2.0])  # times the usual reflectance; which it is
 _FREQUENT = np.array([0.5, 0.25, 0.25])  # until then
 _WRONG = 0.05  # share of the echoes that are told wrongly, whatever the coating
 _SCAN_SHARE, _SCAN_BEAMS, _MOST_LOG = 0.5, 5.0, 3.2  # beams of one scan are one piece of evidence; it is bounded
+_MOST_OPEN_LOG = 1.6  # the same for beams that end where the map knows nothing
+_COINCIDES = 0.7  # of what stands where the map knows nothing: it ends beams at the mirrored range, as a wall that goes on
 _MOST_REFLECTED = 0.9
 _OTHER_WALL = 2.0  # steepness of a victory: reflectances of other walls differ by factors
 _FIRST, _MIRRORED, _SECOND = BeamCase.DIFFUSE - 1, BeamCase.SPECULAR - 1, BeamCase.FIRST_PENETRATION - 1
@@ -97,10 +99,12 @@ class Coatings:
                 for one in _EACH_COATING
             ]
         )[:, told]
-        likelihood = _WRONG + (1.0 - 2.0 * _WRONG) * np.where(at_mirrored, chance, 1.0 - chance)
+        ends_there = chance + (1.0 - chance) * _COINCIDES
+        likelihood = _WRONG + (1.0 - 2.0 * _WRONG) * np.where(at_mirrored, ends_there, 1.0 - ends_there)
         added = _SCAN_SHARE * min(len(at_mirrored) / _SCAN_BEAMS, 1.0) * np.log(likelihood).mean(axis=1)
         log_odds = self.log_odds + added
-        return Coatings(np.maximum(log_odds - log_odds.max(), -_MOST_LOG))
+        least = np.minimum(self.log_odds, -_MOST_OPEN_LOG)  # what is not on the map is weaker evidence than what is
+        return Coatings(np.maximum(log_odds - log_odds.max(), least))
 
 
 _EACH_COATING = [Coatings(np.where(np.arange(len(COATINGS)) == each, 0.0, -np.inf)) for each in range(len(COATINGS))]
