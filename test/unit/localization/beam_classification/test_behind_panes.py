@@ -106,9 +106,9 @@ def test_how_much_panes_mirror_is_learnt_from_echoes_that_are_not_in_doubt(measu
     "measured_m, stronger", [pytest.param(6.0, True, id="mirrored"), pytest.param(9.0, False, id="behind")]
 )
 def test_how_much_panes_mirror_is_learnt_from_beams_that_ended_where_the_map_knows_nothing(measured_m, stronger):
-    def learnt(unmapped_end, returns=1.0):
+    def learnt(unmapped_end, returns=1.0, scans=20):
         coatings = UNKNOWN_COATINGS
-        for _ in range(20):
+        for _ in range(scans):
             coatings = coatings.learn_from_open_ends(
                 np.full(1, measured_m),
                 expect(first=2.0, mirrored=6.0, incidence=np.radians(50.0)),
@@ -126,3 +126,5 @@ def test_how_much_panes_mirror_is_learnt_from_beams_that_ended_where_the_map_kno
     assert np.array_equal(learnt(False), before)
     by_a_pane = learnt(True, returns=0.01)  # which mostly returns nothing, whatever mirrors
     assert np.ptp(by_a_pane / before) < np.ptp(learnt(True) / before)
+    for_long = learnt(True, scans=500)
+    assert for_long.max() / for_long.min() < np.exp(2.0) + 1e-6  # it is bounded: what is there is not known
