@@ -25,7 +25,9 @@ _FREQUENT = np.array([0.5, 0.25, 0.25])  # until then
 _WRONG = 0.05  # share of the echoes that are told wrongly, whatever the coating
 _SCAN_SHARE, _SCAN_BEAMS, _MOST_LOG = 0.5, 5.0, 4.0  # beams of one scan are one piece of evidence; it is bounded
 _MOST_OPEN_LOG = 2.0  # the same for beams that end where the map knows nothing
-_COINCIDES = 0.7  # of what stands where the map knows nothing: it ends beams at the mirrored range, as a wall that goes on
+_COINCIDES = (
+    0.7  # of what stands where the map knows nothing: it ends beams at the mirrored range, as a wall that goes on
+)
 _MOST_REFLECTED = 0.9
 _OTHER_WALL = 2.0  # steepness of a victory: reflectances of other walls differ by factors
 _FIRST, _MIRRORED, _SECOND = BeamCase.DIFFUSE - 1, BeamCase.SPECULAR - 1, BeamCase.FIRST_PENETRATION - 1
