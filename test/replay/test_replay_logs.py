@@ -43,7 +43,7 @@ TABLE = {
     "wean4": Limits(600, 0.190, 0.229, 0.400, 1.6, 0.0),
 }
 # The ground truth is rotated against the map by 1.2 degrees, which makes up the median; seeds differ by 5 mm around 0.120.
-UWB = Limits(343, 0.125, 0.150, 0.250, 1.5, 0.0)
+UWB = Limits(343, 0.125, 0.153, 0.250, 1.5, 0.0)
 
 
 @pytest.fixture
