@@ -112,9 +112,8 @@ class BeamClassifier:
         if for_weights:  # the glass map learns from them, too
             behind_m = max(behind_m, glass_map.reach_m(self.residuals))
         expected = self._expected(scan, samples, behind_m)
-        glass = self.glass_map.chances(
-            expected.cell[[0, 2, 1], 0]
-        )  # of the first surface, the second, and a mirrored one
+        # Of the first surface, the second, and a mirrored one.
+        glass = self.glass_map.chances(expected.cell[[0, 2, 1], 0])
         cases = case_votes.classify(
             scan.ranges_m,
             expected,
@@ -144,6 +143,7 @@ class BeamClassifier:
         self.residuals = self.residuals.learn(
             across[met], expected.thickness_m[0, 0][met], self._params.min_sigma_m, self._params.max_sigma_m
         )
+        first_glass, mirrored_glass = self.glass_map.chances(expected.cell[:2, 0])[0]
         self._coatings = case_votes.learn_coatings(
             self._coatings,
             scan.ranges_m,
@@ -152,15 +152,13 @@ class BeamClassifier:
             self._params.vote,
             scan.range_max_m,
             self._at_ends(self.known_area.is_unmapped, scan, map_from_base),
-            self._oblique_returns.of_surfaces(
-                expected.cos_incidence[1, 0], self.glass_map.chances(expected.cell[1, 0])[0]
-            ),
+            self._oblique_returns.of_surfaces(expected.cos_incidence[1, 0], mirrored_glass),
         )
         self._oblique_returns = self._oblique_returns.learn(
             scan.ranges_m,
             expected.line_m[0],
             expected.pane_incidence[0],
-            self.glass_map.chances(expected.cell[0, 0])[0],
+            first_glass,
             case_votes.gate_m(self.residuals, self._params.vote),
         )
         self.glass_map.learn(*glass_map.crossings(scan.ranges_m, expected, self.residuals))

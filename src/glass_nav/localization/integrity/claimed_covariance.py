@@ -17,12 +17,11 @@ from glass_nav.localization.integrity.dead_reckoning import SURE
 from glass_nav.localization.integrity.fit_information import ScanFit
 from glass_nav.localization.integrity.pose_covariance import PoseCovariance, widened_by
 from glass_nav.localization.particle_filter.motion import OdometryNoise
-from glass_nav.sensing import wall_backs
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.known_area import KnownArea
-from glass_nav.sensing.scan import Scan, spread_evenly
+from glass_nav.sensing.scan import Scan
 
-_BEAMS, _MIN_BEAMS = 180, 10
+_BEAMS = 180  # looked at
 
 
 class ClaimedCovariance:
@@ -33,7 +32,7 @@ class ClaimedCovariance:
         Args:
             field, known_area: of the map.
         """
-        self._field, self._known_area = field, known_area
+        self._known_area = known_area
         self._fit = ScanFit(field, known_area.resolution_m, square=True)
         self._covariance = PoseCovariance(SURE)
 
@@ -45,14 +44,7 @@ class ClaimedCovariance:
         self, scan: Scan, map_from_base: np.ndarray, step: Optional[np.ndarray], noise: OdometryNoise, worth: float
     ) -> None:
         """A scan moved the particles; arguments as of IntegrityMonitor.update()."""
-        fit = None
-        if worth > 0.0:
-            chosen = spread_evenly(scan.answered, _BEAMS)
-            beams = wall_backs.without(scan, chosen, map_from_base, self._field, self._known_area)
-            if len(beams) >= _MIN_BEAMS:
-                share = len(chosen) / int(np.count_nonzero(scan.answered))
-                points_m = scan.points_in_base()[beams]
-                fit = self._fit.of(points_m, scan.base_from_laser[:2], map_from_base, share, worth)
+        fit = self._fit.of_scan(scan, map_from_base, worth, self._known_area, _BEAMS) if worth > 0.0 else None
         self._covariance.update(step, map_from_base, fit, noise, worth, slipped=True)  # the pose is decided already
 
     def narrow(self, spread: np.ndarray) -> None:

@@ -19,12 +19,17 @@ robot that keeps its heading is. The sums over the beams are computed in the com
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Optional
 
 import numpy as np
 
 from glass_nav import _integrity
+from glass_nav.sensing import wall_backs
 from glass_nav.sensing.distance_field import DistanceField
+from glass_nav.sensing.known_area import KnownArea
+from glass_nav.sensing.scan import Scan, spread_evenly
 
+_MIN_BEAMS = 10  # of a scan
 FREE_M = 2.0  # deviation in a direction that no wall constrains
 
 
@@ -68,3 +73,22 @@ class ScanFit:
         return FitInformation(
             *self._compiled.of(self._field.compiled, points_m, laser_m, map_from_base, beam_share, worth)
         )
+
+    def of_scan(
+        self, scan: Scan, map_from_base: np.ndarray, worth: float, known_area: KnownArea, most_beams: int
+    ) -> Optional[FitInformation]:
+        """How well a scan determines a pose (3,), by so many of its beams; None: too few of them tell.
+
+        Args:
+            scan: one revolution of a lidar.
+            map_from_base: (3,) pose to look at.
+            worth: as of of().
+            known_area: of the map; beams that end at the back of a wall do not count.
+            most_beams: to look at.
+        """
+        chosen = spread_evenly(scan.answered, most_beams)
+        beam_share = len(chosen) / max(int(np.count_nonzero(scan.answered)), 1)
+        beams = wall_backs.without(scan, chosen, map_from_base, self._field, known_area)
+        if len(beams) < _MIN_BEAMS:
+            return None
+        return self.of(scan.points_in_base()[beams], scan.base_from_laser[:2], map_from_base, beam_share, worth)

@@ -19,13 +19,11 @@ from glass_nav.localization.integrity.claimed_covariance import ClaimedCovarianc
 from glass_nav.localization.integrity.fit_information import FitInformation, ScanFit
 from glass_nav.localization.integrity.pose_covariance import PoseCovariance, widened_by
 from glass_nav.localization.particle_filter.motion import OdometryNoise
-from glass_nav.sensing import wall_backs
 from glass_nav.sensing.distance_field import DistanceField
 from glass_nav.sensing.known_area import KnownArea
-from glass_nav.sensing.scan import Scan, spread_evenly
+from glass_nav.sensing.scan import Scan
 
 _BEAMS = 90  # looked at
-_MIN_BEAMS = 10
 _BESIDE = 3.0  # deviations between the pose and the best fit: the scan no longer fits
 _FARTHER = 3.0  # times as far as after the last update
 _LESS = 0.15  # share of the beams at walls, below that at the last update: the scan no longer fits
@@ -39,7 +37,7 @@ class IntegrityMonitor:
         Args:
             field, known_area: of the map.
         """
-        self._field, self._known_area = field, known_area
+        self._known_area = known_area
         self._fit = ScanFit(field, known_area.resolution_m)
         self._covariance: Optional[PoseCovariance] = None
         self._claimed = ClaimedCovariance(field, known_area)
@@ -155,12 +153,7 @@ class IntegrityMonitor:
         return doubts
 
     def _look(self, scan: Scan, map_from_base: np.ndarray, worth: float) -> Optional[FitInformation]:
-        chosen = spread_evenly(scan.answered, _BEAMS)
-        share = len(chosen) / max(int(np.count_nonzero(scan.answered)), 1)
-        beams = wall_backs.without(scan, chosen, map_from_base, self._field, self._known_area)
-        if len(beams) < _MIN_BEAMS:
-            return None
-        return self._fit.of(scan.points_in_base()[beams], scan.base_from_laser[:2], map_from_base, share, worth)
+        return self._fit.of_scan(scan, map_from_base, worth, self._known_area, _BEAMS)
 
 
 def _beside(fit: FitInformation, covariance: np.ndarray) -> float:
